@@ -1,0 +1,1 @@
+//! ngspice XSPICE code model for Bimorph.

@@ -1,0 +1,53 @@
+//! The verbs that every front shares: the command, the service and sweeps call these and nothing below.
+
+pub mod modes;
+pub mod pull_in;
+pub mod statics;
+pub mod transient;
+
+use thiserror::Error;
+
+/// Told how far a long analysis has come, as a fraction 0…1; answers whether to go on.
+pub type Watch<'a> = &'a mut dyn FnMut(f64) -> bool;
+
+/// Why an analysis has no result.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum AnalysisError {
+    /// A port or signal name, or a number, that does not fit this model.
+    #[error("{what}: {detail}")]
+    BadRequest {
+        /// Which option.
+        what: String,
+        /// What is wrong with it and what would be accepted.
+        detail: String,
+    },
+    /// No equilibrium was found.
+    #[error("no static equilibrium: {detail}")]
+    NoEquilibrium {
+        /// Where it stopped and why.
+        detail: String,
+    },
+    /// The structure can move without any stiffness against it.
+    #[error("singular structure: {detail}")]
+    Singular {
+        /// Which body and direction.
+        detail: String,
+    },
+    /// An integration gave up.
+    #[error("transient stopped at t = {t:e} s (dt = {dt:e} s): {detail}")]
+    StepFailed {
+        /// Time reached [s].
+        t: f64,
+        /// Step that failed [s].
+        dt: f64,
+        /// Which body and direction, and why.
+        detail: String,
+    },
+    /// [`Watch`] said stop.
+    #[error("cancelled")]
+    Cancelled,
+}
+
+/// Voltages on ports for a whole analysis: (port name, volts). Ports not named are at 0 V.
+pub type PortVoltages = [(String, f64)];

@@ -1,0 +1,79 @@
+//! From netlist text to a ready model: netlist → structure → discretize.
+
+use crate::netlist::{Bundle, Diagnostics, Setting};
+use crate::structure::Structure;
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// How beams meet.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Junctions {
+    /// Centrelines meet in points, as in SUGAR.
+    #[default]
+    Centreline,
+}
+
+/// What a compilation may be told. `Default` is the only place where the numbers stand.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CompileOptions {
+    /// Netlist parameters set from outside.
+    pub set: Vec<(String, Setting)>,
+    /// Highest frequency the model must resolve [Hz]; none: a rule by slenderness. Higher: more segments.
+    pub band: Option<f64>,
+    /// Relative error aimed at [1], default 1e-3. Smaller: more segments, shorter steps.
+    pub tol: f64,
+    /// Small displacements about the drawn geometry, as SUGAR.
+    pub linear: bool,
+    /// Leave out gas damping.
+    pub undamped: bool,
+    /// How beams meet.
+    pub junctions: Junctions,
+}
+
+impl Default for CompileOptions {
+    fn default() -> Self {
+        Self { set: Vec::new(), band: None, tol: 1e-3, linear: false, undamped: false, junctions: Junctions::Centreline }
+    }
+}
+
+/// A ready model with everything it came from.
+#[derive(Debug, Clone)]
+pub struct Compiled {
+    /// What was drawn.
+    pub structure: Structure,
+    /// Netlist parameters with the values they took.
+    pub parameters: Vec<(String, Setting)>,
+    /// Warnings of the netlist.
+    pub warnings: Diagnostics,
+    /// The options it was compiled with.
+    pub options: CompileOptions,
+}
+
+/// Why no model came out.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum CompileError {
+    /// The netlist has errors.
+    #[error("{0}")]
+    Netlist(Diagnostics),
+    /// The structure cannot be made into a model.
+    #[error("{what}: {detail}; {hint}")]
+    Structure {
+        /// Which part of the drawing.
+        what: String,
+        /// What is wrong with it.
+        detail: String,
+        /// A way out.
+        hint: String,
+    },
+}
+
+/// Compiles a netlist.
+///
+/// # Errors
+/// See [`CompileError`].
+pub fn compile(bundle: &Bundle, options: &CompileOptions) -> Result<Compiled, CompileError> {
+    let loaded = crate::netlist::load(bundle, &options.set).map_err(CompileError::Netlist)?;
+    Ok(Compiled { structure: loaded.structure, parameters: loaded.parameters, warnings: loaded.warnings, options: options.clone() })
+}

@@ -1,0 +1,1 @@
+//! Sweeps: a grid of parameter values over one analysis.

@@ -1,0 +1,2 @@
+//! The `bimorph` command.
+fn main() {}

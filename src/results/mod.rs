@@ -1,0 +1,1 @@
+//! Results as files: tables, ngspice `.raw`, CSV, pictures.
