@@ -1,1 +1,3 @@
 //! Sweeps: a grid of parameter values over one analysis.
+
+pub mod sweep;

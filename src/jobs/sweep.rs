@@ -1,0 +1,212 @@
+//! A parameter grid over one analysis, on all cores, in a fixed order.
+//!
+//! Each point of the grid compiles the netlist with its own parameter values and runs one analysis on it. Points do not
+//! know of each other, and rows come back in grid order, so the table has the same bits on one thread and on many, and
+//! the shards of a sweep put together are the whole sweep.
+
+pub mod parse;
+mod point;
+mod table;
+
+pub use table::{SweepRow, SweepTable};
+
+use crate::compile::CompileOptions;
+use crate::netlist::{Bundle, Setting};
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use thiserror::Error;
+
+/// What to sweep.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SweepSpec {
+    /// The full grid of these is run; the last one varies fastest. Empty: one point, as the netlist stands.
+    pub parameters: Vec<SweepParameter>,
+    /// What to compute at each point.
+    pub analysis: SweepAnalysis,
+    /// Which part of the grid to run.
+    pub shard: Shard,
+    /// Worker threads; none: one per core. The table does not depend on it.
+    pub threads: Option<usize>,
+}
+
+/// One axis of the grid.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SweepParameter {
+    /// A netlist parameter.
+    pub name: String,
+    /// The values it takes, in order. SI.
+    pub values: Vec<Setting>,
+}
+
+/// What to compute at each point.
+#[derive(Debug, Clone, PartialEq)]
+pub enum SweepAnalysis {
+    /// Static equilibrium.
+    Static {
+        /// Columns wanted: `NODE.x` [m], `NODE.y` [m], `NODE.rz` [rad], `PORT.i` [A], `PORT.q` [C], `BEAM.T` [K];
+        /// empty: x, y and rz of every node.
+        outputs: Vec<String>,
+        /// Port voltages by name [V].
+        voltages: Vec<(String, f64)>,
+    },
+    /// Natural frequencies [Hz].
+    Modes {
+        /// How many, from the lowest.
+        count: usize,
+        /// Port voltages of the operating point by name [V].
+        voltages: Vec<(String, f64)>,
+    },
+    /// Pull-in and release voltages [V].
+    PullIn {
+        /// Port or netlist source to raise; none: the first.
+        port: Option<String>,
+        /// Highest voltage tried [V].
+        max: f64,
+    },
+}
+
+/// One of `count` equal parts of a grid: the points whose number modulo `count` is `index`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Shard {
+    /// From 0.
+    pub index: usize,
+    /// At least 1.
+    pub count: usize,
+}
+
+impl Default for Shard {
+    fn default() -> Self {
+        Self { index: 0, count: 1 }
+    }
+}
+
+/// How far a sweep has come.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct SweepProgress {
+    /// Points finished, failed ones among them.
+    pub done: u64,
+    /// Points of this shard.
+    pub points: u64,
+    /// Points finished with an error.
+    pub failed: u64,
+}
+
+/// Why a sweep has no table. A point that fails is not an error of the sweep: its row says why.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum SweepError {
+    /// A specification that means nothing.
+    #[error("{what}: expected {expected}, got {got}")]
+    BadSpec {
+        /// Which part.
+        what: String,
+        /// What was expected.
+        expected: String,
+        /// What came.
+        got: String,
+    },
+    /// The progress callback said stop.
+    #[error("cancelled after {done} of {points} points")]
+    Cancelled {
+        /// Points finished.
+        done: u64,
+        /// Points of this shard.
+        points: u64,
+    },
+    /// The operating system gave no threads.
+    #[error("no worker threads: {reason}")]
+    Threads {
+        /// What it said.
+        reason: String,
+    },
+}
+
+/// Runs a sweep. `progress` is told after every point, from any thread, and answers whether to go on.
+///
+/// # Errors
+/// [`SweepError`]; a point without a result is a row with its error, not an error here.
+pub fn run(
+    spec: &SweepSpec,
+    bundle: &Bundle,
+    options: &CompileOptions,
+    progress: &(dyn Fn(SweepProgress) -> bool + Sync),
+) -> Result<SweepTable, SweepError> {
+    let numbers = spec.point_numbers()?;
+    let points = numbers.len() as u64;
+    let (done, failed, stop) = (AtomicU64::new(0), AtomicU64::new(0), AtomicBool::new(false));
+    let one = |&number: &usize| -> Option<point::Outcome> {
+        if stop.load(Ordering::Relaxed) {
+            return None;
+        }
+        let outcome = point::run(spec, number, bundle, options);
+        if outcome.values.is_err() {
+            failed.fetch_add(1, Ordering::Relaxed);
+        }
+        let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+        if !progress(SweepProgress { done, points, failed: failed.load(Ordering::Relaxed) }) {
+            stop.store(true, Ordering::Relaxed);
+        }
+        Some(outcome)
+    };
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(spec.threads.unwrap_or(0))
+        .build()
+        .map_err(|error| SweepError::Threads { reason: error.to_string() })?;
+    let outcomes: Option<Vec<_>> = pool.install(|| numbers.par_iter().map(one).collect());
+    match outcomes {
+        Some(outcomes) => Ok(table::assemble(spec, outcomes)),
+        None => Err(SweepError::Cancelled { done: done.into_inner(), points }),
+    }
+}
+
+impl SweepSpec {
+    /// Points of the whole grid, before sharding.
+    ///
+    /// # Errors
+    /// [`SweepError::BadSpec`] for an axis without values or a grid too large to number.
+    pub fn grid_points(&self) -> Result<usize, SweepError> {
+        self.parameters.iter().try_fold(1usize, |product, axis| {
+            if axis.values.is_empty() {
+                return Err(bad(format!("parameter {}", axis.name), "at least one value", "none"));
+            }
+            product
+                .checked_mul(axis.values.len())
+                .ok_or_else(|| bad("parameters".into(), "a grid that can be numbered", "too many points"))
+        })
+    }
+
+    /// Numbers of the points this shard runs.
+    ///
+    /// # Errors
+    /// [`SweepError::BadSpec`].
+    pub fn point_numbers(&self) -> Result<Vec<usize>, SweepError> {
+        let Shard { index, count } = self.shard;
+        if count == 0 || index >= count {
+            return Err(bad("shard".into(), "i/N with 0 <= i < N", &format!("{index}/{count}")));
+        }
+        for (i, axis) in self.parameters.iter().enumerate() {
+            if self.parameters[..i].iter().any(|other| other.name == axis.name) {
+                return Err(bad("parameters".into(), "each name once", &format!("\"{}\" twice", axis.name)));
+            }
+        }
+        Ok((index..self.grid_points()?).step_by(count).collect())
+    }
+
+    /// Values of every parameter at one point of the grid.
+    pub fn settings(&self, mut number: usize) -> Vec<(String, Setting)> {
+        let mut settings = Vec::with_capacity(self.parameters.len());
+        for axis in self.parameters.iter().rev() {
+            let n = axis.values.len().max(1);
+            if let Some(value) = axis.values.get(number % n) {
+                settings.push((axis.name.clone(), value.clone()));
+            }
+            number /= n;
+        }
+        settings.reverse();
+        settings
+    }
+}
+
+fn bad(what: String, expected: &str, got: &str) -> SweepError {
+    SweepError::BadSpec { what, expected: expected.to_owned(), got: got.to_owned() }
+}

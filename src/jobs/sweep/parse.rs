@@ -1,0 +1,130 @@
+//! Axes and shards as text: `w=1.8u:2.2u:21`, `w=1.8u,2u,2.2u`, `1/4`.
+
+use super::{Shard, SweepError, SweepParameter, bad};
+use crate::netlist::Setting;
+use std::str::FromStr;
+
+/// Most values one axis may be given as text; a longer one is a slip of the keyboard.
+const AXIS_MAX: usize = 10_000_000;
+
+impl FromStr for SweepParameter {
+    type Err = SweepError;
+
+    /// `NAME=low:high:count` is `count` equally spaced numbers, both ends included; `NAME=a,b,c` is a list. Numbers may
+    /// carry a netlist suffix (`2u`); a list entry that is no number is a string.
+    fn from_str(text: &str) -> Result<Self, SweepError> {
+        let what = || format!("parameter \"{text}\"");
+        let forms = "NAME=low:high:count or NAME=a,b,c";
+        let (name, values) = text.split_once('=').ok_or_else(|| bad(what(), forms, "no \"=\""))?;
+        let (name, values) = (name.trim(), values.trim());
+        if name.is_empty() || values.is_empty() {
+            return Err(bad(what(), forms, "an empty side of \"=\""));
+        }
+        let parts: Vec<&str> = values.split(':').map(str::trim).collect();
+        let values = match parts[..] {
+            [list] => list.split(',').map(|entry| setting(entry.trim())).collect(),
+            [low, high, count] => {
+                let low = number(low).ok_or_else(|| bad(what(), "a number as low end", low))?;
+                let high = number(high).ok_or_else(|| bad(what(), "a number as high end", high))?;
+                let n = count.parse().ok().filter(|n| (1..=AXIS_MAX).contains(n));
+                linear(low, high, n.ok_or_else(|| bad(what(), "a count from 1", count))?)
+            }
+            _ => return Err(bad(what(), forms, values)),
+        };
+        Ok(Self { name: name.to_owned(), values })
+    }
+}
+
+impl FromStr for Shard {
+    type Err = SweepError;
+
+    /// `i/N`, i from 0.
+    fn from_str(text: &str) -> Result<Self, SweepError> {
+        let parsed = text.split_once('/').and_then(|(i, n)| Some((i.trim().parse().ok()?, n.trim().parse().ok()?)));
+        match parsed {
+            Some((index, count)) if index < count => Ok(Self { index, count }),
+            _ => Err(bad("shard".into(), "i/N with 0 <= i < N", text)),
+        }
+    }
+}
+
+/// `count` equally spaced numbers from `low` to `high`; the ends are exact. One number: `low`.
+pub fn linear(low: f64, high: f64, count: usize) -> Vec<Setting> {
+    let last = count.saturating_sub(1).max(1) as f64;
+    let at = |i: usize| {
+        let s = i as f64 / last;
+        if i + 1 == count && count > 1 { high } else { low + (high - low) * s }
+    };
+    (0..count).map(|i| Setting::Number(at(i))).collect()
+}
+
+fn setting(text: &str) -> Setting {
+    number(text).map_or_else(|| Setting::Text(text.trim_matches('"').to_owned()), Setting::Number)
+}
+
+/// A finite number with at most one netlist suffix.
+fn number(text: &str) -> Option<f64> {
+    if !text.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c)) {
+        return None;
+    }
+    if let Ok(value) = text.parse::<f64>() {
+        return value.is_finite().then_some(value);
+    }
+    let suffix = text.chars().last()?;
+    let exponent = match suffix {
+        'a' => "e-18",
+        'f' => "e-15",
+        'p' => "e-12",
+        'n' => "e-9",
+        'u' => "e-6",
+        'm' => "e-3",
+        'c' => "e-2",
+        'd' => "e-1",
+        'h' => "e2",
+        'k' => "e3",
+        'M' => "e6",
+        'G' => "e9",
+        'T' => "e12",
+        'P' => "e15",
+        'E' => "e18",
+        _ => return None,
+    };
+    let mantissa = &text[..text.len() - suffix.len_utf8()];
+    format!("{mantissa}{exponent}").parse().ok().filter(|value: &f64| value.is_finite())
+}
+
+#[cfg(test)]
+mod tests {
+    //! Axes read as they are written, and slips are refused.
+    use super::*;
+
+    fn numbers(text: &str) -> Vec<f64> {
+        let axis: SweepParameter = text.parse().expect("an axis");
+        axis.values.iter().map(|v| if let Setting::Number(x) = v { *x } else { f64::NAN }).collect()
+    }
+
+    #[test]
+    fn linear_axes_include_both_ends_exactly() {
+        assert_eq!(numbers("w=1u:2u:3"), [1e-6, 1.5e-6, 2e-6]);
+        assert_eq!(numbers("w=0.1:0.7:7").last(), Some(&0.7));
+        assert_eq!(numbers("w=3:9:1"), [3.0]);
+    }
+
+    #[test]
+    fn lists_hold_numbers_with_suffixes_and_strings() {
+        assert_eq!(numbers("w = 1.8u, 2u,-3M"), [1.8e-6, 2e-6, -3e6]);
+        let axis: SweepParameter = "layer=p1,\"p2\"".parse().expect("an axis");
+        assert_eq!(axis.values, [Setting::Text("p1".into()), Setting::Text("p2".into())]);
+    }
+
+    #[test]
+    fn slips_are_refused() {
+        for text in ["w", "=1", "w=", "w=1:2", "w=1:2:0", "w=1:2:x", "w=a:2:3", "w=1:2:3:4", "w=1:2:1e9"] {
+            assert!(text.parse::<SweepParameter>().is_err(), "{text}");
+        }
+        for text in ["", "1", "2/2", "0/0", "-1/2", "a/b"] {
+            assert!(text.parse::<Shard>().is_err(), "{text}");
+        }
+        assert_eq!("1/4".parse(), Ok(Shard { index: 1, count: 4 }));
+    }
+}

@@ -1,0 +1,136 @@
+//! The rows of a sweep, and the same as CSV.
+
+use super::SweepSpec;
+use super::point::Outcome;
+use crate::netlist::Setting;
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+/// Everything a sweep found, in grid order.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct SweepTable {
+    /// Parameter columns.
+    pub parameters: Vec<String>,
+    /// Result columns, in order of first appearance: `b.x`, `f1`, `pull_in`, ….
+    pub results: Vec<String>,
+    /// Unit of each result column.
+    pub units: Vec<String>,
+    /// One per point.
+    pub rows: Vec<SweepRow>,
+}
+
+/// One point.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SweepRow {
+    /// Number of the point in the full grid, from 0.
+    pub point: usize,
+    /// Value of each parameter.
+    pub parameters: Vec<Setting>,
+    /// One per result column, none where the quantity does not exist at this point; or why the point has no result.
+    pub values: Result<Vec<Option<f64>>, String>,
+}
+
+/// Puts the points into one table. A netlist whose nodes depend on a parameter has more columns than any one point.
+pub(super) fn assemble(spec: &SweepSpec, outcomes: Vec<Outcome>) -> SweepTable {
+    let mut table = SweepTable {
+        parameters: spec.parameters.iter().map(|axis| axis.name.clone()).collect(),
+        ..SweepTable::default()
+    };
+    let mut columns = BTreeMap::new();
+    for value in outcomes.iter().filter_map(|outcome| outcome.values.as_ref().ok()).flatten() {
+        if !columns.contains_key(&value.name) {
+            columns.insert(value.name.clone(), table.results.len());
+            table.results.push(value.name.clone());
+            table.units.push(value.unit.to_owned());
+        }
+    }
+    for outcome in outcomes {
+        let values = outcome.values.map(|values| {
+            let mut row = vec![None; table.results.len()];
+            for value in values {
+                if let Some(&column) = columns.get(&value.name) {
+                    row[column] = value.value;
+                }
+            }
+            row
+        });
+        table.rows.push(SweepRow { point: outcome.number, parameters: outcome.parameters, values });
+    }
+    table
+}
+
+impl SweepTable {
+    /// Points with an error.
+    pub fn failed(&self) -> usize {
+        self.rows.iter().filter(|row| row.values.is_err()).count()
+    }
+
+    /// CSV (RFC 4180, LF): `point`, the parameters, the results as `name [unit]`, `error`. Numbers are the shortest
+    /// text that reads back to the same bits.
+    pub fn to_csv(&self) -> String {
+        let mut out = String::from("point");
+        for name in &self.parameters {
+            field(&mut out, name);
+        }
+        for (name, unit) in self.results.iter().zip(&self.units) {
+            field(&mut out, &format!("{name} [{unit}]"));
+        }
+        out.push_str(",error\n");
+        for row in &self.rows {
+            let _ = write!(out, "{}", row.point);
+            for setting in &row.parameters {
+                match setting {
+                    Setting::Number(x) => field(&mut out, &format!("{x:e}")),
+                    Setting::Text(text) => field(&mut out, text),
+                }
+            }
+            match &row.values {
+                Ok(values) => {
+                    for value in values {
+                        field(&mut out, &value.map(|x| format!("{x:e}")).unwrap_or_default());
+                    }
+                    out.push(',');
+                }
+                Err(error) => {
+                    out.extend(std::iter::repeat_n(',', self.results.len()));
+                    field(&mut out, error.trim_end());
+                }
+            }
+            out.push('\n');
+        }
+        out
+    }
+}
+
+fn field(out: &mut String, text: &str) {
+    out.push(',');
+    if text.contains([',', '"', '\n', '\r']) {
+        out.push('"');
+        out.push_str(&text.replace('"', "\"\""));
+        out.push('"');
+    } else {
+        out.push_str(text);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! A failed point has its reason and no number; text is quoted so that it reads back.
+    use super::*;
+
+    #[test]
+    fn a_failed_point_has_no_number() {
+        let table = SweepTable {
+            parameters: vec!["w".into()],
+            results: vec!["b.x".into(), "release".into()],
+            units: vec!["m".into(), "V".into()],
+            rows: vec![
+                SweepRow { point: 0, parameters: vec![Setting::Number(2e-6)], values: Ok(vec![Some(1.5e-9), None]) },
+                SweepRow { point: 3, parameters: vec![Setting::Text("a,b".into())], values: Err("say \"no\"".into()) },
+            ],
+        };
+        let expected = "point,w,b.x [m],release [V],error\n0,2e-6,1.5e-9,,\n3,\"a,b\",,,\"say \"\"no\"\"\"\n";
+        assert_eq!(table.to_csv(), expected);
+        assert_eq!(table.failed(), 1);
+    }
+}

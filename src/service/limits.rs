@@ -1,0 +1,65 @@
+//! What one server allows.
+
+use std::time::Duration;
+
+/// Limits of a server. A request beyond one is answered with RESOURCE_EXHAUSTED and a message that names it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Limits {
+    /// Largest message in either direction [byte], default 64 MiB. Streams send chunks of at most 1 MiB whatever this is.
+    pub message_bytes: usize,
+    /// Largest netlist, all files together [byte], default 16 MiB.
+    pub netlist_bytes: usize,
+    /// Most mechanical unknowns of one model, default 200 000. Larger: more memory and longer trials.
+    pub unknowns: usize,
+    /// Models with at most this many unknowns are stepped on the task of their stream, default 2 000; larger ones on a
+    /// thread of their own for each trial, which costs some ten microseconds but lets other streams run meanwhile.
+    pub inline_unknowns: usize,
+    /// Most compiled models kept, default 64; the one unused for longest is forgotten first.
+    pub models: usize,
+    /// Most sessions open at once, default 256.
+    pub sessions: usize,
+    /// Most trials of a session between two accepts, default 100 000: bounds the states it holds.
+    pub states_per_session: usize,
+    /// Most points of one sweep, default 1 000 000.
+    pub sweep_points: usize,
+    /// Most sweeps kept, running or finished, default 16.
+    pub sweeps: usize,
+    /// Most samples times signals of one transient, default 100 000 000.
+    pub transient_values: usize,
+    /// Most modes of one request, default 1 000.
+    pub modes: usize,
+    /// Analyses computed at once, default the number of cores; others wait their turn.
+    pub analyses: usize,
+    /// Most HTTP/2 streams of one connection, default 128.
+    pub streams_per_connection: u32,
+    /// Longest unary call [s], default 120 s; then DEADLINE_EXCEEDED.
+    pub request_timeout: Duration,
+    /// A session or a finished sweep untouched for this long is forgotten, default 10 min.
+    pub idle: Duration,
+    /// After the signal to stop, open streams may go on for this long, default 5 s; then they end with UNAVAILABLE, and
+    /// connections that do not close are cut.
+    pub drain: Duration,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self {
+            message_bytes: 64 << 20,
+            netlist_bytes: 16 << 20,
+            unknowns: 200_000,
+            inline_unknowns: 2_000,
+            models: 64,
+            sessions: 256,
+            states_per_session: 100_000,
+            sweep_points: 1_000_000,
+            sweeps: 16,
+            transient_values: 100_000_000,
+            modes: 1_000,
+            analyses: std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
+            streams_per_connection: 128,
+            request_timeout: Duration::from_secs(120),
+            idle: Duration::from_secs(600),
+            drain: Duration::from_secs(5),
+        }
+    }
+}
