@@ -1,1 +1,11 @@
-//! Results as files: tables, ngspice `.raw`, CSV, pictures.
+//! What comes out: tables, ngspice `.raw` files, CSV, and pictures.
+//!
+//! A [`table::Table`] holds named columns with units. [`csv`] and [`raw`] write it, [`plot`] draws it. Every file is
+//! written through [`atomic`]: a reader sees the whole file or none.
+
+pub mod atomic;
+pub mod csv;
+pub mod format;
+pub mod plot;
+pub mod raw;
+pub mod table;
