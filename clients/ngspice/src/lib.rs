@@ -1,1 +1,38 @@
-//! ngspice XSPICE code model for Bimorph.
+//! ngspice code model for Bimorph: an electro-mechanical netlist as one more `A` device.
+//!
+//! ngspice loads this library as an XSPICE code model, without its headers and whatever its version (39 to 47) and
+//! build flags. A deck then reads
+//!
+//! ```text
+//! .model bank bimorph(file="bank.net" ports=["heat" "sense"] monitors=["yoke.y:1e6" "b1.hot.T"])
+//! A1 %gd [hot 0 sense 0] %v [y t] bank
+//! ```
+//!
+//! # Layout
+//! What ngspice's memory looks like: `abi` the structures, [`layout`] which host this is, `table` what the plug-in
+//! declares, `exports` the symbols, `host` the host's functions, `call` one call's data. Between the two sides stand
+//! `callbacks`. What does not know ngspice: [`model_card`] and [`settings`] the `.model` line, [`opener`] from line to
+//! device, [`instance`] questions and outcomes, [`companion`] charges to currents, [`history`] what an accepted point
+//! leaves behind.
+//!
+//! This is the only crate of the project with `unsafe` code; each block says why it holds.
+
+#![deny(unsafe_op_in_unsafe_fn)]
+#![warn(clippy::undocumented_unsafe_blocks)]
+
+mod abi;
+mod call;
+mod callbacks;
+pub mod companion;
+mod exports;
+pub mod history;
+mod host;
+pub mod instance;
+pub mod layout;
+pub mod model_card;
+pub mod opener;
+pub mod settings;
+mod table;
+mod trace;
+
+pub use opener::{Opener, set_opener};

@@ -1,0 +1,138 @@
+//! The host's functions, reached through the table it gives the plug-in.
+
+use crate::abi::{Instance, Model, slot};
+use std::cell::UnsafeCell;
+use std::ffi::{CString, c_char, c_int, c_void};
+use std::path::PathBuf;
+
+/// The host's table of function pointers; null until it has been handed over.
+#[repr(transparent)]
+pub(crate) struct Core(UnsafeCell<*const *const c_void>);
+
+// SAFETY: the host writes the pointer once, from the thread that loads the plug-in, before it makes any other call.
+unsafe impl Sync for Core {}
+
+/// The place the host writes its table into.
+pub(crate) static CORE: Core = Core(UnsafeCell::new(std::ptr::null()));
+
+impl Core {
+    /// Where the host shall write.
+    pub(crate) fn place(&self) -> *mut *const *const c_void {
+        self.0.get()
+    }
+
+    /// The function in `slot`.
+    ///
+    /// # Safety
+    /// The host has written its table, and `F` is the type of the function in that slot.
+    unsafe fn function<F: Copy>(&self, slot: usize) -> F {
+        const { assert!(size_of::<F>() == size_of::<*const c_void>()) };
+        // SAFETY: by contract the table is there and has this slot; `F` is a function pointer of pointer size.
+        unsafe { std::mem::transmute_copy(&*(*self.0.get()).add(slot)) }
+    }
+}
+
+/// Model and circuit, as ngspice passes them to a device's functions.
+type OverModel = unsafe extern "C" fn(*mut Model, *mut c_void) -> c_int;
+
+/// Declares a call that is passed on to the host as it is.
+macro_rules! pass_on {
+    ($(#[$doc:meta])* $name:ident, $slot:ident, ($($arg:ident: $ty:ty),*)) => {
+        $(#[$doc])*
+        ///
+        /// # Safety
+        /// The arguments are those with which the host called the plug-in.
+        pub(crate) unsafe fn $name($($arg: $ty),*) -> c_int {
+            // SAFETY: the slot holds the host's function of this very signature.
+            unsafe {
+                CORE.function::<unsafe extern "C" fn($($ty),*) -> c_int>(slot::$slot)($($arg),*)
+            }
+        }
+    };
+}
+
+pass_on!(/// Allocates matrix entries and outputs.
+    setup, SETUP, (matrix: *mut c_void, model: *mut Model, circuit: *mut c_void, states: *mut c_int));
+pass_on!(/// Stores a model parameter.
+    model_param, MODEL_PARAM, (index: c_int, value: *mut c_void, model: *mut Model));
+pass_on!(/// Reads an instance parameter.
+    ask, ASK, (circuit: *mut c_void, instance: *mut Instance, index: c_int, value: *mut c_void, select: *mut c_void));
+pass_on!(/// Reads a model parameter.
+    model_ask, MODEL_ASK, (circuit: *mut c_void, model: *mut Model, index: c_int, value: *mut c_void));
+pass_on!(/// Bounds the next step.
+    trunc, TRUNC, (model: *mut Model, circuit: *mut c_void, step: *mut f64));
+pass_on!(/// Frees an instance.
+    delete, DELETE, (instance: *mut Instance));
+pass_on!(/// Frees a model.
+    model_delete, MODEL_DELETE, (model: *mut Model));
+
+/// Undoes [`setup`].
+///
+/// # Safety
+/// The arguments are those with which the host called the plug-in.
+pub(crate) unsafe fn unsetup(model: *mut Model, circuit: *mut c_void) -> c_int {
+    // SAFETY: the slot holds the host's function of this signature.
+    unsafe { CORE.function::<OverModel>(slot::UNSETUP)(model, circuit) }
+}
+
+/// Calls every instance of the plug-in and loads the matrix with its answers.
+///
+/// # Safety
+/// The arguments are those with which the host called the plug-in.
+pub(crate) unsafe fn load(model: *mut Model, circuit: *mut c_void) -> c_int {
+    // SAFETY: as above.
+    unsafe { CORE.function::<OverModel>(slot::LOAD)(model, circuit) }
+}
+
+/// Tests convergence.
+///
+/// # Safety
+/// The arguments are those with which the host called the plug-in.
+pub(crate) unsafe fn convergence_test(model: *mut Model, circuit: *mut c_void) -> c_int {
+    // SAFETY: as above.
+    unsafe { CORE.function::<OverModel>(slot::CONV_TEST)(model, circuit) }
+}
+
+/// Reserves state memory for the instance being called.
+///
+/// # Safety
+/// To be called from within a load, at the instance's first call.
+pub(crate) unsafe fn reserve(doubles: usize) {
+    // SAFETY: the host is loading an instance, so the instance that gets the memory is set.
+    unsafe { CORE.function::<unsafe extern "C" fn(c_int, c_int)>(slot::ANALOG_ALLOC)(0, (doubles * 8) as c_int) }
+}
+
+/// The reserved memory of the instance being called: 0 for this point, 1 for the last accepted one. Null without.
+///
+/// # Safety
+/// To be called from within a load.
+pub(crate) unsafe fn memory(point: c_int) -> *mut f64 {
+    // SAFETY: as above; the memory is an array of doubles.
+    unsafe {
+        CORE.function::<unsafe extern "C" fn(c_int, c_int) -> *mut c_void>(slot::ANALOG_GET_PTR)(0, point).cast()
+    }
+}
+
+/// Prints a message, with the name of the instance, where this host prints.
+///
+/// # Safety
+/// To be called from within a load.
+pub(crate) unsafe fn message(text: &str) {
+    let text = CString::new(text.replace('\0', " ")).unwrap_or_default();
+    // SAFETY: the host only reads the text; the instance it names is set during a load.
+    unsafe {
+        CORE.function::<unsafe extern "C" fn(*mut c_char) -> c_int>(slot::MESSAGE_SEND)(text.as_ptr().cast_mut());
+    }
+}
+
+/// The deck's directory from the host's function in `slot`.
+///
+/// # Safety
+/// `slot` is where this host keeps that function.
+pub(crate) unsafe fn deck_directory(slot: usize) -> Option<PathBuf> {
+    // SAFETY: by contract; the host answers a string it owns, or null.
+    unsafe {
+        let path = CORE.function::<unsafe extern "C" fn() -> *const c_char>(slot)();
+        crate::call::text(path).map(PathBuf::from)
+    }
+}

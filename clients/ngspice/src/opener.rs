@@ -1,0 +1,125 @@
+//! From a `.model` line to a device: find the netlist, compile it once, step it here or on a server.
+
+use crate::model_card::ModelCard;
+use bimorph::compile::{CompileError, CompileOptions, Compiled, compile};
+use bimorph::device::local::LocalDevice;
+use bimorph::device::{Device, DeviceError};
+use bimorph::netlist::Bundle;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use thiserror::Error;
+
+/// Why no device came out of a `.model` line.
+#[derive(Debug, Error)]
+pub enum OpenError {
+    /// The netlist cannot be read.
+    #[error("cannot read the netlist \"{file}\": {source} (looked for {tried})")]
+    File {
+        /// As spelled on the line.
+        file: String,
+        /// Every path that was tried.
+        tried: String,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The netlist does not compile.
+    #[error("netlist \"{file}\":\n{source}")]
+    Compile {
+        /// As spelled on the line.
+        file: String,
+        /// Diagnostics with file, line and column.
+        source: CompileError,
+    },
+    /// The device refuses the ports or monitors, or its server cannot be reached.
+    #[error(transparent)]
+    Device(#[from] DeviceError),
+    /// `remote` is asked for in a build that has no client.
+    #[error("remote=\"{0}\": this build of the plug-in steps models in process only (it was built without \"remote\")")]
+    NoRemote(String),
+}
+
+/// Makes a device from a line; `directory` is the deck's, where it is known.
+pub type Opener = fn(&ModelCard, Option<&Path>) -> Result<Box<dyn Device>, OpenError>;
+
+static OPENER: OnceLock<Opener> = OnceLock::new();
+
+/// Puts another kind of device behind the plug-in, for code that links this crate into a `.cm` of its own. To be
+/// called before ngspice loads a deck; only the first call counts.
+pub fn set_opener(opener: Opener) {
+    let _ = OPENER.set(opener);
+}
+
+/// Makes the device of a line.
+///
+/// # Errors
+/// [`OpenError`]
+pub(crate) fn open(card: &ModelCard, directory: Option<&Path>) -> Result<Box<dyn Device>, OpenError> {
+    OPENER.get().copied().unwrap_or(open_model)(card, directory)
+}
+
+/// A netlist's model, in process or on the server the line names.
+///
+/// # Errors
+/// [`OpenError`]
+pub fn open_model(card: &ModelCard, directory: Option<&Path>) -> Result<Box<dyn Device>, OpenError> {
+    let bundle = read(&card.file, directory)?;
+    match &card.remote {
+        None => Ok(Box::new(LocalDevice::new(compiled(&card.file, bundle, &card.options)?))),
+        Some(address) => connect(address, &bundle, card),
+    }
+}
+
+#[cfg(not(feature = "remote"))]
+fn connect(address: &str, _: &Bundle, _: &ModelCard) -> Result<Box<dyn Device>, OpenError> {
+    Err(OpenError::NoRemote(address.to_owned()))
+}
+
+/// Reads the netlist: absolute, or beside the deck, or in the working directory.
+fn read(file: &str, directory: Option<&Path>) -> Result<Bundle, OpenError> {
+    let beside = directory.map(|d| d.join(file));
+    let candidates: Vec<PathBuf> = beside.into_iter().chain([PathBuf::from(file)]).collect();
+    let path = candidates.iter().find(|p| p.is_file()).unwrap_or(&candidates[0]);
+    Bundle::read(path, &[]).map_err(|source| OpenError::File {
+        file: file.to_owned(),
+        tried: candidates.iter().map(|p| format!("\"{}\"", p.display())).collect::<Vec<_>>().join(", "),
+        source,
+    })
+}
+
+/// Models kept for instances and analyses to share; the oldest makes room.
+const KEPT: usize = 16;
+
+struct Kept {
+    bundle: Bundle,
+    options: CompileOptions,
+    model: Arc<Compiled>,
+}
+
+static MODELS: Mutex<Vec<Kept>> = Mutex::new(Vec::new());
+
+/// The model of a netlist text under these options, compiled once.
+fn compiled(file: &str, bundle: Bundle, options: &CompileOptions) -> Result<Arc<Compiled>, OpenError> {
+    let mut models = MODELS.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(kept) = models.iter().find(|k| k.bundle == bundle && k.options == *options) {
+        return Ok(Arc::clone(&kept.model));
+    }
+    let model =
+        compile(&bundle, options).map_err(|source| OpenError::Compile { file: file.to_owned(), source }).map(Arc::new)?;
+    if models.len() == KEPT {
+        models.remove(0);
+    }
+    models.push(Kept { bundle, options: options.clone(), model: Arc::clone(&model) });
+    Ok(model)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A missing netlist is named as spelled, with every place that was looked at.
+    #[test]
+    fn missing_file_names_every_place() {
+        let message = read("none.net", Some(Path::new("/nowhere"))).unwrap_err().to_string();
+        assert!(message.contains("\"none.net\"") && message.contains("\"/nowhere/none.net\""), "{message}");
+    }
+}
