@@ -2,97 +2,42 @@
 //!
 //! [`Bundle`] holds the text of a netlist and of every file it includes, so that nothing after it touches the disk: a
 //! bundle can be sent to a server as it is. [`load`] turns a bundle into a structure, or into diagnostics.
+//!
+//! One module a step: `lexer` makes tokens, `parser` and `expression` the tree with all includes in place, `resolve`
+//! binds names, `elaborate` runs definitions, loops and subnets, `elements` builds what they instantiate, `place` walks
+//! over the drawing for node positions, and `check` looks for loose ends. docs/netlist.md describes the language.
+
+mod ast;
+mod bundle;
+mod check;
+mod diagnostic;
+mod drawing;
+mod elaborate;
+mod elements;
+mod evaluate;
+mod expression;
+mod functions;
+mod lexer;
+mod parser;
+mod place;
+mod resolve;
+mod rotation;
+mod setting;
+mod sink;
+mod source;
+mod suggest;
+mod token;
+mod value;
+
+pub use bundle::Bundle;
+pub use diagnostic::{Diagnostic, Diagnostics, Severity};
+pub use setting::Setting;
 
 use crate::structure::Structure;
-use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
-
-/// A netlist's text with every file it includes.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Bundle {
-    /// Name of the root file, as it is shown in diagnostics.
-    pub root: String,
-    /// Text of each file, by the name under which it is included (the root under its own name).
-    pub files: BTreeMap<String, String>,
-}
-
-impl Bundle {
-    /// Reads `path` and, in turn, every file it `uses`.
-    ///
-    /// # Errors
-    /// The root cannot be read. A missing include is no error here: [`load`] reports it with its place.
-    pub fn read(path: &Path, _include: &[PathBuf]) -> Result<Self, std::io::Error> {
-        Ok(Self::from_text(&path.display().to_string(), &std::fs::read_to_string(path)?))
-    }
-
-    /// A bundle of one file.
-    pub fn from_text(name: &str, text: &str) -> Self {
-        Self { root: name.to_owned(), files: BTreeMap::from([(name.to_owned(), text.to_owned())]) }
-    }
-}
-
-/// How bad a diagnostic is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Severity {
-    /// Nothing comes out.
-    Error,
-    /// The result stands, but the author may have meant something else.
-    Warning,
-}
-
-/// One message about a place in a netlist.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Diagnostic {
-    /// Stable code ("E012", "W003").
-    pub code: String,
-    /// Error or warning.
-    pub severity: Severity,
-    /// File, as spelled.
-    pub file: String,
-    /// Line, from 1.
-    pub line: usize,
-    /// Column in characters, from 1.
-    pub column: usize,
-    /// Width of the marked text in characters.
-    pub width: usize,
-    /// What is wrong, with what was expected.
-    pub message: String,
-    /// A way out; empty when there is none to name.
-    pub help: String,
-}
-
-/// Every message of one load, with the texts they point into.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Diagnostics {
-    /// Messages in order of place.
-    pub items: Vec<Diagnostic>,
-    /// The text they point into.
-    pub bundle: Bundle,
-}
-
-impl Diagnostics {
-    /// The messages as text with source line and caret.
-    pub fn render(&self, _colour: bool) -> String {
-        self.items.iter().map(|d| format!("{}:{}:{}: {}\n", d.file, d.line, d.column, d.message)).collect()
-    }
-}
-
-impl std::fmt::Display for Diagnostics {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(&self.render(false))
-    }
-}
-
-impl std::error::Error for Diagnostics {}
-
-/// A value given to a netlist parameter from outside.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Setting {
-    /// A number, SI.
-    Number(f64),
-    /// A string.
-    Text(String),
-}
+use ast::{Program, Statement};
+use elaborate::Elaborator;
+use sink::Sink;
+use source::Span;
 
 /// What a netlist elaborates to.
 #[derive(Debug, Clone)]
@@ -109,6 +54,44 @@ pub struct Loaded {
 ///
 /// # Errors
 /// Every error found in one run; warnings are among them.
-pub fn load(bundle: &Bundle, _set: &[(String, Setting)]) -> Result<Loaded, Diagnostics> {
-    Err(Diagnostics { items: Vec::new(), bundle: bundle.clone() })
+pub fn load(bundle: &Bundle, set: &[(String, Setting)]) -> Result<Loaded, Diagnostics> {
+    let mut sink = Sink::new(&bundle.root);
+    let mut program = parser::parse(bundle, &mut sink);
+    if !sink.failed() || program.incomplete {
+        resolve::resolve(&mut program, &mut sink);
+        check_settings(&program, set, &mut sink);
+    }
+    if sink.failed() {
+        return Err(sink.finish(bundle));
+    }
+    let mut elaborated = Elaborator::run(&program, set, &mut sink);
+    if !sink.failed() {
+        place::place(&mut elaborated.drawing, &mut sink);
+        check::check(&elaborated.drawing, &mut sink);
+    }
+    if sink.failed() {
+        return Err(sink.finish(bundle));
+    }
+    let warnings = sink.finish(bundle);
+    Ok(Loaded { structure: elaborated.drawing.structure, parameters: elaborated.parameters, warnings })
+}
+
+/// Every name set from outside must be a parameter of the netlist.
+fn check_settings(program: &Program, set: &[(String, Setting)], sink: &mut Sink) {
+    let known: Vec<&str> = program
+        .statements
+        .iter()
+        .filter_map(|s| if let Statement::Param { name, .. } = s { Some(&*name.name) } else { None })
+        .collect();
+    for (name, _) in set {
+        if known.contains(&name.as_str()) {
+            continue;
+        }
+        let otherwise = match known.as_slice() {
+            [] => "the netlist has no `param`".to_owned(),
+            names => format!("its parameters are {}", names.join(" ")),
+        };
+        let help = suggest::did_you_mean(name, known.iter().copied(), &otherwise);
+        sink.error("E048", Span::NOWHERE, format!("the netlist has no parameter `{name}` to set"), help);
+    }
 }

@@ -6,6 +6,10 @@
 //! A node may be mechanical (it has a position), electrical (it has a potential), or both: as in SUGAR, one netlist name
 //! stands for the mechanical point and for the electrical net at that point.
 
+mod index;
+
+pub use index::NodeIndex;
+
 use serde::{Deserialize, Serialize};
 
 /// Index of a node in [`Structure::nodes`].
@@ -307,12 +311,15 @@ pub struct Structure {
     pub electrical_grounds: Vec<NodeId>,
     /// Ports, in netlist order.
     pub ports: Vec<Port>,
+    /// Finds nodes by name; fills itself. Takes no part in comparisons.
+    #[serde(skip)]
+    pub index: NodeIndex,
 }
 
 impl Structure {
-    /// The node of that full name.
+    /// The node of that full name. Cost: constant, after the first call.
     pub fn node(&self, name: &str) -> Option<NodeId> {
-        self.nodes.iter().position(|n| n.name == name).map(NodeId)
+        self.index.find(&self.nodes, name)
     }
 
     /// The port of that name, as an index into [`Structure::ports`].

@@ -1,0 +1,159 @@
+//! The syntax tree of a netlist with all its includes in place.
+
+use super::source::Span;
+use std::rc::Rc;
+
+/// A name with its place.
+#[derive(Debug, Clone)]
+pub(crate) struct Ident {
+    pub(crate) name: Rc<str>,
+    pub(crate) span: Span,
+}
+
+/// Where a variable lives: in the netlist itself or in the subnet instance at hand.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Slot {
+    pub(crate) global: bool,
+    pub(crate) index: usize,
+}
+
+impl Slot {
+    /// Stands in until names are resolved, and where they cannot be.
+    pub(crate) const NONE: Self = Self { global: true, index: usize::MAX };
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Binary {
+    Add,
+    Subtract,
+    Multiply,
+    Divide,
+    Power,
+    Equal,
+    NotEqual,
+    Less,
+    LessEqual,
+    Greater,
+    GreaterEqual,
+    And,
+    Or,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct Expr {
+    pub(crate) kind: ExprKind,
+    pub(crate) span: Span,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) enum ExprKind {
+    Number(f64),
+    Text(Rc<str>),
+    /// `?`: an argument that may stay open.
+    Undefined,
+    Variable(Rc<str>, Slot),
+    Negate(Box<Expr>),
+    Not(Box<Expr>),
+    Binary(Binary, Box<Expr>, Box<Expr>),
+    Call(Rc<str>, Vec<Expr>),
+}
+
+/// `ID = expr`.
+#[derive(Debug, Clone)]
+pub(crate) struct Def {
+    pub(crate) name: Ident,
+    pub(crate) slot: Slot,
+    pub(crate) value: Expr,
+}
+
+/// A name with indices: `n`, `n(3)`, `D(1,2)`.
+#[derive(Debug, Clone)]
+pub(crate) struct Name {
+    pub(crate) base: Ident,
+    pub(crate) indices: Vec<Expr>,
+    pub(crate) span: Span,
+}
+
+/// The layer word of an element.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum LayerRef {
+    /// `*`.
+    None,
+    /// `parent`: the layer of the instance that is being built.
+    Parent,
+    /// Index into [`Program::layers`].
+    Layer(usize),
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct Element {
+    /// The name given; none: `anonN` with N in [`Element::number`].
+    pub(crate) name: Option<Name>,
+    /// Count of this anonymous line, from 1, in reading order over all files.
+    pub(crate) number: usize,
+    pub(crate) model: Ident,
+    /// The subnet of that name, once resolved; none: a built-in element.
+    pub(crate) subnet: Option<usize>,
+    /// The layer's name; `*` for none.
+    pub(crate) layer_name: Ident,
+    pub(crate) layer: LayerRef,
+    pub(crate) nodes: Vec<Name>,
+    /// The place of the whole node list.
+    pub(crate) nodes_span: Span,
+    pub(crate) parameters: Vec<Def>,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) enum Statement {
+    Param { name: Ident, slot: Slot, default: Option<Expr> },
+    Process(usize),
+    Subnet(usize),
+    Def(Def),
+    Block(Vec<Statement>),
+    Element(Box<Element>),
+    For { index: Ident, slot: Slot, from: Expr, to: Expr, body: Vec<Statement> },
+    If { condition: Expr, then: Box<Statement>, otherwise: Option<Box<Statement>> },
+    Call(Expr),
+}
+
+/// `process ID [: ID] = [ … ]`. Entries are the layer's own; its parent's follow by [`Layer::parent`].
+#[derive(Debug, Clone)]
+pub(crate) struct Layer {
+    pub(crate) name: Ident,
+    pub(crate) parent_name: Option<Ident>,
+    pub(crate) parent: Option<usize>,
+    pub(crate) entries: Vec<Def>,
+    /// True when no entry (of its own or inherited) names a variable: it can be evaluated once.
+    pub(crate) constant: bool,
+}
+
+/// A formal parameter of a subnet.
+#[derive(Debug, Clone)]
+pub(crate) struct Formal {
+    pub(crate) name: Ident,
+    pub(crate) slot: Slot,
+    /// Default; none for `x=*`, [`ExprKind::Undefined`] for `x=?`.
+    pub(crate) default: Option<Expr>,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct Subnet {
+    pub(crate) name: Ident,
+    pub(crate) nodes: Vec<Name>,
+    pub(crate) formals: Vec<Formal>,
+    pub(crate) body: Vec<Statement>,
+    /// Number of variables of an instance, once resolved.
+    pub(crate) variables: usize,
+}
+
+/// A netlist with all its includes in place, in reading order.
+#[derive(Debug, Default)]
+pub(crate) struct Program {
+    pub(crate) statements: Vec<Statement>,
+    pub(crate) layers: Vec<Layer>,
+    pub(crate) subnets: Vec<Subnet>,
+    /// Number of variables of the netlist itself, once resolved.
+    pub(crate) variables: usize,
+    /// True when an included file is missing: names it would have defined are then unknown.
+    pub(crate) incomplete: bool,
+}

@@ -1,0 +1,180 @@
+//! What can be said about a finished drawing before any physics: loose nodes, loose parts, floating potentials, and
+//! one message for each thing that the planar model leaves out.
+
+use super::drawing::{Drawing, Fact};
+use super::sink::Sink;
+use crate::structure::{GapVoltage, NodeId, Structure};
+
+/// So many loose parts or floating nodes are told one by one.
+const TOLD: usize = 3;
+
+/// Checks a drawing whose nodes are placed.
+pub(crate) fn check(drawing: &Drawing, sink: &mut Sink) {
+    facts(drawing, sink);
+    let structure = &drawing.structure;
+    let mut connected = vec![false; structure.nodes.len()];
+    let mut parts = Groups::new(structure.nodes.len());
+    for (a, b) in mechanical_connections(structure) {
+        connected[a.0] = true;
+        connected[b.0] = true;
+        parts.join(a.0, b.0);
+    }
+    loose_nodes(drawing, &connected, sink);
+    unheld_parts(drawing, &connected, &mut parts, sink);
+    floating_potentials(drawing, sink);
+}
+
+fn facts(drawing: &Drawing, sink: &mut Sink) {
+    for &(fact, span, count) in &drawing.facts {
+        let (code, message, help) = match fact {
+            Fact::OutOfPlane => (
+                "W030",
+                format!("the model is planar: out-of-plane bending and torsion are left out ({count} beams)"),
+                "write `beam2d` to say that this is meant",
+            ),
+            Fact::StrainGradient => ("W031", "`straingradient` bends out of the plane and is ignored".into(), ""),
+            Fact::AmbientZero => (
+                "W032",
+                "`ambienttemperature` is 0, so that `T` is the temperature rise".into(),
+                "set the layer's `ambienttemperature`, or give the rise as `T`",
+            ),
+            Fact::NoDensity => (
+                "W033",
+                format!("no `density`: taken as massless ({count} elements)"),
+                "modes and transients need the layer's `density` [kg/m³]",
+            ),
+            Fact::SmallConductivity => (
+                "W034",
+                "the layer's `thermcond` is too small to be the thermal conductivity of a solid".into(),
+                "silicon has 30 to 150 W/(m·K); give `thermcond=` here or in the layer",
+            ),
+            Fact::Capacitor => (
+                "W021",
+                format!("capacitors are open here and left out ({count} elements)"),
+                "put them into the circuit that drives the ports",
+            ),
+        };
+        sink.warning(code, span, message, help);
+    }
+}
+
+/// Pairs of nodes that a member holds together.
+fn mechanical_connections(structure: &Structure) -> impl Iterator<Item = (NodeId, NodeId)> {
+    let beams = structure.beams.iter().map(|b| (b.a, b.b));
+    let links = structure.links.iter().map(|l| (l.a, l.b));
+    beams.chain(links).chain(structure.springs.iter().map(|s| (s.a, s.b)))
+}
+
+/// A mechanical node that no member touches and nothing holds completely.
+fn loose_nodes(drawing: &Drawing, connected: &[bool], sink: &mut Sink) {
+    let structure = &drawing.structure;
+    let mut held = vec![[false; 3]; structure.nodes.len()];
+    for support in &structure.supports {
+        for (all, one) in held[support.node.0].iter_mut().zip(support.held) {
+            *all |= one;
+        }
+    }
+    let loose = |i: &usize| structure.nodes[*i].mechanical && !connected[*i] && held[*i] != [true; 3];
+    for index in (0..structure.nodes.len()).filter(loose) {
+        let name = &structure.nodes[index].name;
+        let message = format!("node `{name}` is connected to nothing: no beam, link or spring holds it");
+        sink.error("E070", drawing.first_named[index], message, "check the spelling of the node's name");
+    }
+}
+
+/// A part that no support holds in any direction.
+fn unheld_parts(drawing: &Drawing, connected: &[bool], parts: &mut Groups, sink: &mut Sink) {
+    let structure = &drawing.structure;
+    let mut held = vec![false; structure.nodes.len()];
+    for support in &structure.supports {
+        held[parts.root(support.node.0)] = true;
+    }
+    let mut told = vec![false; structure.nodes.len()];
+    let mut loose = Vec::new();
+    for index in (0..structure.nodes.len()).filter(|&i| connected[i]) {
+        let root = parts.root(index);
+        if !held[root] && !std::mem::replace(&mut told[root], true) {
+            loose.push(index);
+        }
+    }
+    for &index in loose.iter().take(TOLD) {
+        let name = &structure.nodes[index].name;
+        let more = if loose.len() > TOLD { format!(" ({} such parts in all)", loose.len()) } else { String::new() };
+        let message = format!("nothing holds the part with node `{name}`: it has no anchor{more}");
+        sink.warning("W012", drawing.first_named[index], message, "a free part has no static equilibrium; add an `anchor`");
+    }
+}
+
+/// Potentials that no port, source or ground fixes.
+fn floating_potentials(drawing: &Drawing, sink: &mut Sink) {
+    let structure = &drawing.structure;
+    let mut nets = Groups::new(structure.nodes.len() + 1);
+    let ground = structure.nodes.len();
+    for resistor in &structure.resistors {
+        nets.join(resistor.a.0, resistor.b.0);
+    }
+    for beam in structure.beams.iter().filter(|b| b.heater.is_some()) {
+        nets.join(beam.a.0, beam.b.0);
+    }
+    for source in &structure.voltage_sources {
+        nets.join(source.plus.0, source.minus.0);
+    }
+    for node in &structure.electrical_grounds {
+        nets.join(node.0, ground);
+    }
+    for port in &structure.ports {
+        nets.join(port.plus.0, ground);
+        if let Some(minus) = port.minus {
+            nets.join(minus.0, ground);
+        }
+    }
+    let mut told = vec![false; structure.nodes.len() + 1];
+    let mut floating = Vec::new();
+    for index in (0..structure.nodes.len()).filter(|&i| structure.nodes[i].electrical) {
+        let root = nets.root(index);
+        if root != nets.root(ground) && !std::mem::replace(&mut told[root], true) {
+            floating.push(index);
+        }
+    }
+    for &index in floating.iter().take(TOLD) {
+        let name = &structure.nodes[index].name;
+        let more = if floating.len() > TOLD { format!(" ({} such nets in all)", floating.len()) } else { String::new() };
+        let message = format!("the potential of node `{name}` floats: no port, source or ground fixes it{more}");
+        let help = "connect it with `R`, or add `eground * [node] []`";
+        sink.warning("W013", drawing.first_named[index], message, help);
+    }
+    let pairs = structure.combs.iter().map(|c| &c.voltage).chain(structure.plate_gaps.iter().map(|g| &g.voltage));
+    for voltage in pairs.chain(structure.beam_gaps.iter().map(|g| &g.voltage)) {
+        if let GapVoltage::Nodes(a, b) = voltage
+            && a == b
+        {
+            let name = &structure.nodes[a.0].name;
+            let message = format!("both electrodes of a gap are the node `{name}`: it never has a voltage");
+            sink.warning("W014", drawing.first_named[a.0], message, "");
+        }
+    }
+}
+
+/// Disjoint sets (Tarjan 1975): union by index, path halving.
+struct Groups {
+    parent: Vec<usize>,
+}
+
+impl Groups {
+    fn new(count: usize) -> Self {
+        Self { parent: (0..count).collect() }
+    }
+
+    fn root(&mut self, mut of: usize) -> usize {
+        while self.parent[of] != of {
+            self.parent[of] = self.parent[self.parent[of]];
+            of = self.parent[of];
+        }
+        of
+    }
+
+    fn join(&mut self, a: usize, b: usize) {
+        let (a, b) = (self.root(a), self.root(b));
+        self.parent[a.max(b)] = a.min(b);
+    }
+}

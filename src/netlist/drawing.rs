@@ -1,0 +1,99 @@
+//! The structure under construction, with what is needed to place its nodes.
+
+use super::source::Span;
+use crate::structure::{Beam, Node, NodeId, Structure};
+
+/// How one element fixes the positions of its nodes relative to each other.
+#[derive(Debug, Clone)]
+pub(crate) struct Placement {
+    /// The element's place in the text, for messages.
+    pub(crate) span: Span,
+    /// Its nodes.
+    pub(crate) nodes: Vec<NodeId>,
+    /// Position of each node relative to the first [m], global axes.
+    pub(crate) offsets: Vec<[f64; 2]>,
+}
+
+/// A beam that takes its length and direction from the positions of its nodes.
+#[derive(Debug, Clone)]
+pub(crate) struct Unmeasured {
+    pub(crate) span: Span,
+    /// Index into [`Structure::beams`].
+    pub(crate) beam: usize,
+}
+
+/// Facts that are worth one message for the whole netlist: the first place and how many there were.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Fact {
+    /// beam3d: out-of-plane bending and torsion are left out.
+    OutOfPlane,
+    /// A layer's strain gradient is not zero.
+    StrainGradient,
+    /// A temperature is given while the ambient temperature is 0 or missing.
+    AmbientZero,
+    /// Beams or plates without a density.
+    NoDensity,
+    /// A layer's thermal conductivity is too small to be one.
+    SmallConductivity,
+    /// Capacitors, which are open in statics and are left out.
+    Capacitor,
+}
+
+/// Structure, placements and facts gathered while elements are built.
+#[derive(Debug, Default)]
+pub(crate) struct Drawing {
+    pub(crate) structure: Structure,
+    pub(crate) placements: Vec<Placement>,
+    pub(crate) unmeasured: Vec<Unmeasured>,
+    /// (fact, first place, count), in order of appearance.
+    pub(crate) facts: Vec<(Fact, Span, usize)>,
+    /// Where each node was first named.
+    pub(crate) first_named: Vec<Span>,
+}
+
+impl Drawing {
+    /// A new node.
+    pub(crate) fn add_node(&mut self, name: String, span: Span) -> NodeId {
+        self.structure.nodes.push(Node { name, position: [0.0; 2], mechanical: false, electrical: false });
+        self.first_named.push(span);
+        NodeId(self.structure.nodes.len() - 1)
+    }
+
+    /// Marks nodes as mechanical and records how they lie.
+    pub(crate) fn place(&mut self, span: Span, nodes: &[NodeId], offsets: &[[f64; 2]]) {
+        self.mechanical(nodes);
+        self.placements.push(Placement { span, nodes: nodes.to_vec(), offsets: offsets.to_vec() });
+    }
+
+    pub(crate) fn mechanical(&mut self, nodes: &[NodeId]) {
+        for node in nodes {
+            self.structure.nodes[node.0].mechanical = true;
+        }
+    }
+
+    pub(crate) fn electrical(&mut self, nodes: &[NodeId]) {
+        for node in nodes {
+            self.structure.nodes[node.0].electrical = true;
+        }
+    }
+
+    /// Adds a beam and its placement; without a length it is measured once the nodes are placed.
+    pub(crate) fn add_beam(&mut self, span: Span, beam: Beam, measured: bool) {
+        let (a, b) = (beam.a, beam.b);
+        if measured {
+            let (s, c) = beam.angle.sin_cos();
+            self.place(span, &[a, b], &[[0.0; 2], [beam.length * c, beam.length * s]]);
+        } else {
+            self.mechanical(&[a, b]);
+            self.unmeasured.push(Unmeasured { span, beam: self.structure.beams.len() });
+        }
+        self.structure.beams.push(beam);
+    }
+
+    pub(crate) fn note(&mut self, fact: Fact, span: Span) {
+        match self.facts.iter_mut().find(|(f, ..)| *f == fact) {
+            Some((_, _, count)) => *count += 1,
+            None => self.facts.push((fact, span, 1)),
+        }
+    }
+}

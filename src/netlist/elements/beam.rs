@@ -1,0 +1,173 @@
+//! Beams: beam2d, beam3d, beams with rigid arms, and beams that conduct.
+
+use super::super::drawing::Fact;
+use super::super::rotation::Rotation;
+use super::super::sink::Reported;
+use super::arguments::Site;
+use crate::structure::{Beam, Heater, Link, NodeId, Resistor};
+
+/// A layer's `thermcond` below this is no conductivity of a solid structural material [W/(m·K)]. The MUMPs process
+/// file of SUGAR has 2.33, which is the digits of silicon's expansion coefficient.
+const SMALL_CONDUCTIVITY: f64 = 5.0;
+
+/// In-plane width, thickness and direction of a rectangular section.
+struct Section {
+    width: f64,
+    thickness: f64,
+    angle: f64,
+}
+
+impl Site<'_, '_> {
+    /// The section, turned as the element is: a quarter turn about its axis swaps width and thickness.
+    fn section(&mut self, width: f64) -> Result<Section, Reported> {
+        let angle = self.direction(self.instance.rotation)?;
+        let height = self.positive("h")?;
+        match self.instance.rotation.side() {
+            Some(0) => Ok(Section { width: height, thickness: width, angle }),
+            Some(_) => Ok(Section { width, thickness: height, angle }),
+            None => {
+                let message = format!("the section of `{}` is tilted against the drawing plane", self.instance.name);
+                Err(self.error("E061", message, "turn it about its axis (`ox`) by quarter turns only"))
+            }
+        }
+    }
+
+    /// A beam between two nodes; without a length it is measured from the node positions.
+    fn beam(&mut self, name: String, ends: [NodeId; 2], width: f64, length: Option<f64>) -> Result<Beam, Reported> {
+        let section = self.section(width)?;
+        let material = self.material()?;
+        let temperature = self.temperature(&material)?;
+        Ok(Beam {
+            name,
+            a: ends[0],
+            b: ends[1],
+            length: length.unwrap_or(0.0),
+            angle: section.angle,
+            width: section.width,
+            thickness: section.thickness,
+            material,
+            temperature,
+            heater: None,
+        })
+    }
+
+    /// Adds a beam of the element's own `l` and the given width.
+    pub(super) fn add_beam(&mut self, name: String, ends: [NodeId; 2], width: f64) -> Result<(), Reported> {
+        let length = self.positive_if_any("l")?;
+        let beam = self.beam(name, ends, width, length)?;
+        self.drawing.add_beam(self.instance.span, beam, length.is_some());
+        Ok(())
+    }
+
+    /// Resistance from end to end, from `R`, `G`, `resistivity` or the layer's sheet resistance [Ω].
+    pub(super) fn resistance(&mut self, r: &str, g: &str, width: f64) -> Result<f64, Reported> {
+        if let Some(resistance) = self.positive_if_any(r)? {
+            return Ok(resistance);
+        }
+        if let Some(conductance) = self.positive_if_any(g)? {
+            return Ok(1.0 / conductance);
+        }
+        if let Some(resistivity) = self.positive_if_any("resistivity")? {
+            return Ok(resistivity * self.positive("l")? / (width * self.positive("h")?));
+        }
+        match self.positive_if_any("sheetresistance")? {
+            Some(sheet) => Ok(sheet * self.positive("l")? / width),
+            None => Err(self.missing(r)),
+        }
+    }
+}
+
+pub(super) fn beam2d(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+    let width = site.positive("w")?;
+    site.add_beam(site.name(), [site.node(0), site.node(1)], width)
+}
+
+pub(super) fn beam3d(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+    site.drawing.note(Fact::OutOfPlane, site.instance.span);
+    beam2d(site)
+}
+
+/// beam2de, beam3de: a resistor along a beam.
+pub(super) fn beam2de(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+    let (a, b) = (site.node(0), site.node(1));
+    let width = site.positive("w")?;
+    let resistance = site.resistance("R", "G", width)?;
+    site.add_beam(site.name(), [a, b], width)?;
+    site.drawing.electrical(&[a, b]);
+    site.drawing.structure.resistors.push(Resistor { name: site.name(), a, b, resistance });
+    Ok(())
+}
+
+pub(super) fn beam3de(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+    site.drawing.note(Fact::OutOfPlane, site.instance.span);
+    beam2de(site)
+}
+
+/// The electro-thermal beam.
+pub(super) fn beam2det(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+    let (a, b) = (site.node(0), site.node(1));
+    let (length, width, height) = (site.positive("l")?, site.positive("w")?, site.positive("h")?);
+    let resistance = site.resistance("R", "G", width)?;
+    let conductivity = site.positive("thermcond")?;
+    if !site.is_given("thermcond") && conductivity < SMALL_CONDUCTIVITY {
+        site.drawing.note(Fact::SmallConductivity, site.instance.span);
+    }
+    if site.number("thermalexpansion")?.is_none() {
+        return Err(site.missing("thermalexpansion"));
+    }
+    let mut beam = site.beam(site.name(), [a, b], width, Some(length))?;
+    let time_constant = match (site.number("tau")?, site.positive_if_any("specificheat")?) {
+        (Some(_), _) => site.non_negative_or("tau", 0.0)?,
+        // The slowest mode of a bar between two sinks: ρ c l² / (π² k).
+        (None, Some(heat)) => {
+            beam.material.density * heat * length * length / (std::f64::consts::PI.powi(2) * conductivity)
+        }
+        (None, None) => 0.0,
+    };
+    beam.heater = Some(Heater { resistance, conductance: conductivity * width * height / length, time_constant });
+    site.drawing.electrical(&[a, b]);
+    site.drawing.add_beam(site.instance.span, beam, true);
+    Ok(())
+}
+
+/// beam3dlink and its kin: a beam between two rigid arms.
+pub(super) fn beam3dlink(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+    site.drawing.note(Fact::OutOfPlane, site.instance.span);
+    let width = site.positive("w")?;
+    site.positive("l")?;
+    let (a, b) = (site.node(0), site.node(1));
+    let start = site.arm(1, "start")?;
+    let end = site.arm(2, "end")?;
+    let p = start.map_or(a, |(node, _)| node);
+    let q = end.map_or(b, |(node, _)| node);
+    if let Some((node, arm)) = start {
+        site.add_link(format!("{}.arm1", site.instance.name), a, node, arm);
+    }
+    site.add_beam(site.name(), [p, q], width)?;
+    if let Some((node, arm)) = end {
+        site.add_link(format!("{}.arm2", site.instance.name), node, b, arm);
+    }
+    Ok(())
+}
+
+impl Site<'_, '_> {
+    /// Arm `number` of a beam3dlink: the node between it and the beam, and the arm's vector [m]; none without a length.
+    fn arm(&mut self, number: usize, end: &str) -> Result<Option<(NodeId, [f64; 2])>, Reported> {
+        let length = self.non_negative_or(if number == 1 { "L1" } else { "L2" }, 0.0)?;
+        if length == 0.0 {
+            return Ok(None);
+        }
+        let [ox, oy, oz] = [format!("ox{number}"), format!("oy{number}"), format!("oz{number}")];
+        let (ox, oy, oz) = (self.number_or(&ox, 0.0)?, self.number_or(&oy, 0.0)?, self.number_or(&oz, 0.0)?);
+        let turned: Rotation = self.instance.rotation.turned(ox, oy, oz);
+        let angle = self.direction(turned)?;
+        let node = self.drawing.add_node(format!("{}.{end}", self.instance.name), self.instance.span);
+        Ok(Some((node, [length * angle.cos(), length * angle.sin()])))
+    }
+
+    /// Adds a rigid, massless link whose second node lies at `offset` [m] from the first.
+    pub(super) fn add_link(&mut self, name: String, a: NodeId, b: NodeId, offset: [f64; 2]) {
+        self.drawing.place(self.instance.span, &[a, b], &[[0.0; 2], offset]);
+        self.drawing.structure.links.push(Link { name, a, b });
+    }
+}

@@ -1,0 +1,120 @@
+//! Electrostatic gaps between facing beams (SUGAR's gap2d family) and between lumped plates.
+
+use super::super::drawing::Fact;
+use super::super::sink::Reported;
+use super::arguments::Site;
+use crate::structure::{BeamGap, GapVoltage, NodeId, PlateGap, Resistor};
+
+/// SUGAR's factor on the fringe field: α = 1 + 1.12·gap/h.
+const FRINGE: f64 = 1.12;
+/// Height for the contact force where nothing gives one [m]: the height SUGAR's law is scaled to.
+const CONTACT_HEIGHT: f64 = 2e-6;
+
+impl Site<'_, '_> {
+    /// Widths of the upper and the lower beam [m]: `w1` and `w2`, or `w` for both.
+    fn widths(&mut self) -> Result<[f64; 2], Reported> {
+        let both = self.positive_if_any("w")?;
+        let mut widths = [0.0; 2];
+        for (width, name) in widths.iter_mut().zip(["w1", "w2"]) {
+            *width = match (self.positive_if_any(name)?, both) {
+                (Some(w), _) | (None, Some(w)) => w,
+                (None, None) => return Err(self.missing(name)),
+            };
+        }
+        Ok(widths)
+    }
+
+    /// The field between two facing beams. Node c lies at local y = −(gap + (w1+w2)/2) under a, d under b.
+    fn facing(&mut self, voltage: GapVoltage) -> Result<(), Reported> {
+        let angle = self.direction(self.instance.rotation)?;
+        let side = self.side()?;
+        let [w1, w2] = self.widths()?;
+        let (length, gap, height) = (self.positive("l")?, self.positive("gap")?, self.positive("h")?);
+        let permittivity = self.permittivity()?;
+        let below = -(gap + (w1 + w2) / 2.0);
+        let nodes: [NodeId; 4] = std::array::from_fn(|i| self.node(i));
+        let offsets = [[0.0; 2], [length, 0.0], [0.0, below], [length, below]].map(|v| self.global(v));
+        self.drawing.place(self.instance.span, &nodes, &offsets);
+        self.drawing.structure.beam_gaps.push(BeamGap {
+            name: self.name(),
+            nodes,
+            angle,
+            side,
+            length,
+            gap,
+            height,
+            permittivity,
+            fringe: 1.0 + FRINGE * gap / height,
+            voltage,
+        });
+        Ok(())
+    }
+
+    fn facing_beams(&mut self) -> Result<(), Reported> {
+        let [w1, w2] = self.widths()?;
+        self.add_beam(format!("{}.upper", self.instance.name), [self.node(0), self.node(1)], w1)?;
+        self.add_beam(format!("{}.lower", self.instance.name), [self.node(2), self.node(3)], w2)
+    }
+
+    /// The potential difference of the nodes `i` and `j`.
+    pub(super) fn across(&mut self, i: usize, j: usize) -> GapVoltage {
+        let (a, b) = (self.node(i), self.node(j));
+        self.drawing.electrical(&[a, b]);
+        GapVoltage::Nodes(a, b)
+    }
+}
+
+/// gap2d: two beams and the field between them, at a fixed voltage.
+pub(super) fn gap2d(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+    let voltage = GapVoltage::Fixed(site.required("V")?);
+    site.facing_beams()?;
+    site.facing(voltage)
+}
+
+/// gap2dforce: the field alone, at the voltage between nodes a and c.
+pub(super) fn gap2dforce(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+    let voltage = site.across(0, 2);
+    site.facing(voltage)
+}
+
+/// gap2de: two conducting beams and the field between them.
+pub(super) fn gap2de(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+    let [w1, w2] = site.widths()?;
+    for (end, part, width, r, g) in [(0, "upper", w1, "R1", "G1"), (2, "lower", w2, "R2", "G2")] {
+        let own = site.is_given(r) || site.is_given(g);
+        let (r, g) = if own { (r, g) } else { ("R", "G") };
+        let resistance = site.resistance(r, g, width)?;
+        let (a, b) = (site.node(end), site.node(end + 1));
+        let name = format!("{}.{part}", site.instance.name);
+        site.drawing.electrical(&[a, b]);
+        site.drawing.structure.resistors.push(Resistor { name, a, b, resistance });
+    }
+    site.facing_beams()?;
+    let voltage = site.across(0, 2);
+    site.facing(voltage)
+}
+
+pub(super) fn gap3d(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+    site.drawing.note(Fact::OutOfPlane, site.instance.span);
+    gap2d(site)
+}
+
+pub(super) fn gap3de(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+    site.drawing.note(Fact::OutOfPlane, site.instance.span);
+    gap2de(site)
+}
+
+/// plategap2d: two lumped plates; b lies at `gap` along local x from a.
+pub(super) fn plategap2d(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+    let angle = site.direction(site.instance.rotation)?;
+    let (area, gap) = (site.positive("A")?, site.positive("gap")?);
+    let permittivity = site.permittivity()?;
+    let height = site.positive_if_any("h")?.unwrap_or(CONTACT_HEIGHT);
+    let axis = [angle.cos(), angle.sin()];
+    let (a, b) = (site.node(0), site.node(1));
+    let voltage = site.across(0, 1);
+    site.drawing.place(site.instance.span, &[a, b], &[[0.0; 2], [gap * axis[0], gap * axis[1]]]);
+    let name = site.name();
+    site.drawing.structure.plate_gaps.push(PlateGap { name, a, b, axis, area, gap, permittivity, height, voltage });
+    Ok(())
+}

@@ -1,0 +1,75 @@
+//! Material constants of an element, from its own list and its layer.
+
+use super::super::drawing::Fact;
+use super::super::sink::Reported;
+use super::arguments::Site;
+use crate::structure::Material;
+
+/// Poisson's ratio where a layer gives none [1]. Planar beams do not depend on it.
+const POISSON: f64 = 0.3;
+/// Film thickness of a material without damping [m]; its viscosity is 0 then, so that no number depends on it.
+const NO_FILM: f64 = 1.0;
+/// Permittivity of vacuum, as SUGAR's process files round it [F/m].
+pub(super) const VACUUM: f64 = 8.854e-12;
+
+impl Site<'_, '_> {
+    /// The material of a flexible member.
+    pub(super) fn material(&mut self) -> Result<Material, Reported> {
+        let youngs_modulus = self.positive("Youngsmodulus")?;
+        let [viscosity, fluid] = self.film()?;
+        let span = self.instance.span;
+        if self.number_or("straingradient", 0.0)? != 0.0 {
+            self.drawing.note(Fact::StrainGradient, span);
+        }
+        Ok(Material {
+            youngs_modulus,
+            poisson: self.number_or("Poisson", POISSON)?,
+            density: self.density()?,
+            viscosity,
+            fluid,
+            thermal_expansion: self.number_or("thermalexpansion", 0.0)?,
+            ambient_temperature: self.number_or("ambienttemperature", 0.0)?,
+            stress: self.number_or("stress", 0.0)?,
+        })
+    }
+
+    /// Density [kg/m³]; 0, with a warning, when there is none.
+    pub(super) fn density(&mut self) -> Result<f64, Reported> {
+        if let Some(density) = self.number("density")? {
+            return if density < 0.0 { self.non_negative_or("density", 0.0) } else { Ok(density) };
+        }
+        let span = self.instance.span;
+        self.drawing.note(Fact::NoDensity, span);
+        Ok(0.0)
+    }
+
+    /// Viscosity [Pa·s] and thickness [m] of the gas film; no viscosity when either is missing.
+    pub(super) fn film(&mut self) -> Result<[f64; 2], Reported> {
+        let viscosity = self.non_negative_or("viscosity", 0.0)?;
+        match self.number("fluid")? {
+            Some(fluid) if fluid > 0.0 && viscosity > 0.0 => Ok([viscosity, fluid]),
+            _ => Ok([0.0, NO_FILM]),
+        }
+    }
+
+    /// Permittivity [F/m].
+    pub(super) fn permittivity(&mut self) -> Result<f64, Reported> {
+        Ok(self.positive_if_any("permittivity")?.unwrap_or(VACUUM))
+    }
+
+    /// Prescribed mean temperature [K], if the element gives one.
+    pub(super) fn temperature(&mut self, material: &Material) -> Result<Option<f64>, Reported> {
+        if !self.is_given("T") {
+            return Ok(None);
+        }
+        let temperature = self.required("T")?;
+        if self.number("thermalexpansion")?.is_none() {
+            return Err(self.missing("thermalexpansion"));
+        }
+        if material.ambient_temperature == 0.0 && temperature != 0.0 {
+            let span = self.span_of("T");
+            self.drawing.note(Fact::AmbientZero, span);
+        }
+        Ok(Some(temperature))
+    }
+}

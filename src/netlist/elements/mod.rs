@@ -1,0 +1,80 @@
+//! The elements: what each takes, checks and adds to the drawing.
+
+mod arguments;
+mod beam;
+mod circuit;
+mod comb;
+mod gap;
+mod load;
+mod lumped;
+mod material;
+mod support;
+mod table;
+
+pub(crate) use arguments::{Argument, Arguments, Instance, Site};
+pub(crate) use table::{Model, model};
+
+use super::drawing::Drawing;
+use super::sink::{Reported, Sink};
+use super::source::Span;
+use super::suggest::{did_you_mean, nearest};
+
+/// Builds one element: checks its node count and its parameter names, then adds it to the drawing.
+pub(crate) fn build(instance: &Instance<'_>, drawing: &mut Drawing, sink: &mut Sink) -> Result<(), Reported> {
+    let Some(model) = model(instance.model) else {
+        return Err(unknown(sink, instance.model, instance.span, []));
+    };
+    let got = instance.nodes.len();
+    if !model.nodes.contains(&got) {
+        let wanted: Vec<String> = model.nodes.iter().map(usize::to_string).collect();
+        let plural = if model.nodes == [1] { "" } else { "s" };
+        let message = format!("`{}` takes {} node{plural}, {got} given", model.name, wanted.join(" or "));
+        let help = format!("write `{} LAYER {}`", model.name, model.node_names);
+        return Err(sink.error("E054", instance.nodes_span, message, help));
+    }
+    stray_parameters(model, instance, sink);
+    (model.build)(&mut Site { instance, drawing, sink })
+}
+
+/// Reports an unknown element, with the nearest known one or the reason why it is left out.
+pub(crate) fn unknown<'a>(sink: &mut Sink, name: &str, span: Span, subnets: impl IntoIterator<Item = &'a str>) -> Reported {
+    if let Some((_, reason)) = table::LEFT_OUT.iter().find(|(left_out, _)| *left_out == name) {
+        return sink.error("E056", span, format!("the element `{name}` is not supported"), *reason);
+    }
+    let known = table::MODELS.iter().map(|m| m.name).chain(subnets);
+    let help = did_you_mean(name, known, "it is neither built in nor a subnet defined above; is a `uses` line missing?");
+    sink.error("E055", span, format!("unknown element `{name}`"), help)
+}
+
+/// Warns of parameters that the element does not take.
+fn stray_parameters(model: &Model, instance: &Instance<'_>, sink: &mut Sink) {
+    for argument in &instance.arguments.given {
+        let takes = |names: &[&str]| names.contains(&argument.name);
+        if takes(model.parameters) || takes(table::LAYER_ENTRIES) || (model.sugar && takes(table::STRAY)) {
+            continue;
+        }
+        let otherwise = format!("it takes {}", model.parameters.join(" "));
+        let help = did_you_mean(argument.name, model.parameters.iter().copied(), &otherwise);
+        sink.warning("W004", argument.span, format!("`{}` takes no parameter `{}`: ignored", model.name, argument.name), help);
+    }
+}
+
+/// Warns of a parameter that a subnet does not take when its name looks like a slip of one that it does take and that
+/// was not given. All others are ignored, as SUGAR does.
+pub(crate) fn stray_actuals<'a>(
+    subnet: &str,
+    given: &[Argument<'_>],
+    formals: impl Iterator<Item = &'a str> + Clone,
+    sink: &mut Sink,
+) {
+    for argument in given {
+        if formals.clone().any(|formal| formal == argument.name) || argument.name.len() < 3 {
+            continue;
+        }
+        let free = formals.clone().filter(|formal| given.iter().all(|g| g.name != *formal));
+        if let Some(meant) = nearest(argument.name, free) {
+            let message = format!("subnet `{subnet}` takes no parameter `{}`: ignored", argument.name);
+            sink.warning("W004", argument.span, message, format!("did you mean `{meant}`?"));
+        }
+    }
+}

@@ -1,0 +1,137 @@
+//! Expressions, by operator precedence: `|`, `&`, comparisons, `+ -`, `* /`, unary `- !`, `^`, all left associative.
+
+use super::ast::{Binary, Expr, ExprKind, Ident};
+use super::parser::{Parsed, Parser};
+use super::source::Span;
+use super::token::{Kind, Token};
+
+/// Operators, calls and brackets that one expression may hold: bounds the depth of its tree.
+const LARGEST_EXPRESSION: usize = 500;
+
+/// How strongly unary `-` and `!` bind: below `^`, above `* /`.
+const UNARY: u8 = 6;
+
+fn binary(kind: Kind) -> Option<(Binary, u8)> {
+    Some(match kind {
+        Kind::Or => (Binary::Or, 1),
+        Kind::And => (Binary::And, 2),
+        Kind::Equal => (Binary::Equal, 3),
+        Kind::NotEqual => (Binary::NotEqual, 3),
+        Kind::Less => (Binary::Less, 3),
+        Kind::LessEqual => (Binary::LessEqual, 3),
+        Kind::Greater => (Binary::Greater, 3),
+        Kind::GreaterEqual => (Binary::GreaterEqual, 3),
+        Kind::Plus => (Binary::Add, 4),
+        Kind::Minus => (Binary::Subtract, 4),
+        Kind::Star => (Binary::Multiply, 5),
+        Kind::Slash => (Binary::Divide, 5),
+        Kind::Caret => (Binary::Power, 7),
+        _ => return None,
+    })
+}
+
+impl Parser<'_> {
+    /// One whole expression.
+    pub(super) fn expression(&mut self) -> Parsed<Expr> {
+        self.outermost(|p| p.climb(0))
+    }
+
+    /// Runs `parse` with a fresh count of the expression's size.
+    pub(super) fn outermost<T>(&mut self, parse: impl FnOnce(&mut Self) -> Parsed<T>) -> Parsed<T> {
+        let outer = std::mem::replace(&mut self.nodes, 0);
+        let result = parse(self);
+        self.nodes = outer;
+        result
+    }
+
+    fn count(&mut self) -> Parsed<()> {
+        self.nodes += 1;
+        if self.nodes > LARGEST_EXPRESSION {
+            let span = self.peek().span;
+            let message = format!("an expression with more than {LARGEST_EXPRESSION} operators and brackets");
+            return Err(self.sink.error("E018", span, message, "split it with intermediate definitions"));
+        }
+        Ok(())
+    }
+
+    /// Everything that binds more strongly than `above`.
+    fn climb(&mut self, above: u8) -> Parsed<Expr> {
+        let mut left = self.prefix()?;
+        while let Some((operator, strength)) = binary(self.peek().kind)
+            && strength > above
+        {
+            self.count()?;
+            self.next();
+            let right = self.climb(strength)?;
+            let span = left.span.to(right.span);
+            left = Expr { kind: ExprKind::Binary(operator, Box::new(left), Box::new(right)), span };
+        }
+        Ok(left)
+    }
+
+    fn prefix(&mut self) -> Parsed<Expr> {
+        let token = self.peek();
+        let kind = match token.kind {
+            Kind::Number(value) => ExprKind::Number(value),
+            Kind::Text => {
+                let quoted = self.text_of(token.span);
+                let text = quoted.trim_end_matches(['"', '\'']).get(1..).unwrap_or("");
+                ExprKind::Text(self.word(text))
+            }
+            Kind::Identifier => return self.variable_or_call(),
+            Kind::Minus | Kind::Not => {
+                self.count()?;
+                self.next();
+                let operand = Box::new(self.climb(UNARY)?);
+                let span = token.span.to(operand.span);
+                let negate = token.kind == Kind::Minus;
+                let kind = if negate { ExprKind::Negate(operand) } else { ExprKind::Not(operand) };
+                return Ok(Expr { kind, span });
+            }
+            Kind::Open => {
+                self.count()?;
+                self.next();
+                let inner = self.climb(0)?;
+                let close = self.expect(Kind::Close, "`)`")?;
+                return Ok(Expr { span: token.span.to(close.span), ..inner });
+            }
+            Kind::Plus => {
+                let help = "a number has no leading `+`";
+                return Err(self.sink.error("E010", token.span, "expected a value, found `+`".into(), help));
+            }
+            _ => return Err(self.unexpected("a value")),
+        };
+        self.next();
+        Ok(Expr { kind, span: token.span })
+    }
+
+    fn variable_or_call(&mut self) -> Parsed<Expr> {
+        let name = self.ident("a value")?;
+        match self.eat(Kind::Open) {
+            Some(open) => self.call(name, open),
+            None => Ok(Expr { span: name.span, kind: ExprKind::Variable(name.name, super::ast::Slot::NONE) }),
+        }
+    }
+
+    /// A call whose opening bracket was read.
+    pub(super) fn call(&mut self, function: Ident, open: Token) -> Parsed<Expr> {
+        self.count()?;
+        let (arguments, close) = self.arguments(open)?;
+        Ok(Expr { span: function.span.to(close), kind: ExprKind::Call(function.name, arguments) })
+    }
+
+    /// Values up to the closing bracket, and the place of that bracket.
+    pub(super) fn arguments(&mut self, _open: Token) -> Parsed<(Vec<Expr>, Span)> {
+        let mut arguments = Vec::new();
+        if let Some(close) = self.eat(Kind::Close) {
+            return Ok((arguments, close.span));
+        }
+        loop {
+            arguments.push(self.climb(0)?);
+            if let Some(close) = self.eat(Kind::Close) {
+                return Ok((arguments, close.span));
+            }
+            self.expect(Kind::Comma, "`,` or `)`")?;
+        }
+    }
+}

@@ -1,0 +1,133 @@
+//! Node positions: SUGAR's walk over the drawing (its `position.c`), and the checks of what it found.
+//!
+//! The first mechanical node by order of appearance goes to the origin; a depth-first walk lets each element carry its
+//! other nodes along. A part that is not reached starts at the origin again. Nothing forces a loop of elements to
+//! close: stiffness comes from lengths and angles, not from positions, so a loop that stays open is worth a warning.
+
+use super::drawing::Drawing;
+use super::sink::Sink;
+use super::value::short;
+
+/// A loop is open when it misses by more than this part of its largest element [1].
+const OPEN_LOOP: f64 = 1e-6;
+/// So many open loops, and so many unplaced parts, are told one by one.
+const TOLD: usize = 3;
+
+#[derive(Clone, Copy, PartialEq)]
+enum Mark {
+    /// Touched by no element that places.
+    None,
+    Unplaced,
+    Waiting,
+    Done,
+}
+
+/// Fills in the positions of all nodes, the lengths of beams that were left to be measured, and the warnings.
+pub(crate) fn place(drawing: &mut Drawing, sink: &mut Sink) {
+    let starts = walk(drawing);
+    unconnected_parts(drawing, &starts, sink);
+    open_loops(drawing, sink);
+    measure(drawing, sink);
+}
+
+/// Places every node; answers the nodes that started at the origin.
+fn walk(drawing: &mut Drawing) -> Vec<usize> {
+    let nodes = &mut drawing.structure.nodes;
+    let mut elements = vec![Vec::new(); nodes.len()];
+    let mut marks = vec![Mark::None; nodes.len()];
+    for (index, placement) in drawing.placements.iter().enumerate() {
+        for node in &placement.nodes {
+            elements[node.0].push(index);
+            marks[node.0] = Mark::Unplaced;
+        }
+    }
+    for unmeasured in &drawing.unmeasured {
+        let beam = &drawing.structure.beams[unmeasured.beam];
+        for node in [beam.a.0, beam.b.0] {
+            if marks[node] == Mark::None {
+                marks[node] = Mark::Unplaced;
+            }
+        }
+    }
+    let mut starts = Vec::new();
+    for start in 0..nodes.len() {
+        if marks[start] != Mark::Unplaced {
+            continue;
+        }
+        starts.push(start);
+        marks[start] = Mark::Waiting;
+        let mut stack = vec![start];
+        while let Some(node) = stack.pop() {
+            marks[node] = Mark::Done;
+            for &element in &elements[node] {
+                let placement = &drawing.placements[element];
+                // SUGAR takes the last node of the element that is done.
+                let Some(known) = placement.nodes.iter().rposition(|n| marks[n.0] == Mark::Done) else { continue };
+                let (from, at) = (placement.offsets[known], nodes[placement.nodes[known].0].position);
+                for (other, offset) in placement.nodes.iter().zip(&placement.offsets) {
+                    if marks[other.0] == Mark::Unplaced {
+                        nodes[other.0].position = [at[0] + offset[0] - from[0], at[1] + offset[1] - from[1]];
+                        marks[other.0] = Mark::Waiting;
+                        stack.push(other.0);
+                    }
+                }
+            }
+        }
+    }
+    starts
+}
+
+fn unconnected_parts(drawing: &Drawing, starts: &[usize], sink: &mut Sink) {
+    let later = starts.get(1..).unwrap_or(&[]);
+    for &start in later.iter().take(TOLD) {
+        let name = &drawing.structure.nodes[start].name;
+        let first = &drawing.structure.nodes[starts[0]].name;
+        let more = if later.len() > TOLD { format!(" ({} such parts in all)", later.len()) } else { String::new() };
+        let message = format!("the part with node `{name}` is not connected to node `{first}`{more}");
+        let help = format!("it is drawn from the origin again; connect it, or place it with `pos * [{first} {name}] [x= y=]`");
+        sink.warning("W010", drawing.first_named[start], message, help);
+    }
+}
+
+fn open_loops(drawing: &Drawing, sink: &mut Sink) {
+    let mut open = Vec::new();
+    for placement in &drawing.placements {
+        let largest = placement.offsets.iter().map(|o| o[0].hypot(o[1])).fold(0.0, f64::max);
+        let first = drawing.structure.nodes[placement.nodes[0].0].position;
+        let misses = placement.nodes.iter().zip(&placement.offsets).map(|(node, offset)| {
+            let at = drawing.structure.nodes[node.0].position;
+            [at[0] - first[0] - offset[0], at[1] - first[1] - offset[1]]
+        });
+        let worst = misses.fold([0.0, 0.0], |a: [f64; 2], b| if b[0].hypot(b[1]) > a[0].hypot(a[1]) { b } else { a });
+        // Sums of many offsets round off by a few units in the last place of the farthest position.
+        let rounding = 1e-12 * (first[0].abs() + first[1].abs());
+        if worst[0].hypot(worst[1]) > OPEN_LOOP * largest + rounding {
+            open.push((placement.span, worst));
+        }
+    }
+    for (span, miss) in open.iter().take(TOLD) {
+        let more = if open.len() > TOLD { format!(" ({} such elements in all)", open.len()) } else { String::new() };
+        let message = format!(
+            "this element does not reach the drawn place of its node: it misses by x = {} m, y = {} m{more}",
+            short(miss[0]),
+            short(miss[1])
+        );
+        let help = "the loop it closes stays open as drawn; check lengths and angles around it";
+        sink.warning("W011", *span, message, help);
+    }
+}
+
+/// Length and direction of beams without `l=`, from the positions of their nodes.
+fn measure(drawing: &mut Drawing, sink: &mut Sink) {
+    for unmeasured in &drawing.unmeasured {
+        let beam = &mut drawing.structure.beams[unmeasured.beam];
+        let (a, b) = (drawing.structure.nodes[beam.a.0].position, drawing.structure.nodes[beam.b.0].position);
+        let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
+        beam.length = dx.hypot(dy);
+        beam.angle = dy.atan2(dx);
+        if beam.length <= 0.0 {
+            let message = format!("`{}` has no length, and its nodes have no distance", beam.name);
+            sink.error("E064", unmeasured.span, message, "give `l=`, or place its nodes with `pos`");
+        }
+    }
+}

@@ -1,0 +1,111 @@
+//! Collects messages while a bundle is read, so that one run reports every error.
+
+use super::bundle::Bundle;
+use super::diagnostic::{Diagnostic, Diagnostics, Severity};
+use super::source::Span;
+use std::collections::HashSet;
+
+/// Marks that an error was already put into the [`Sink`]: nothing more needs to be said about it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Reported;
+
+/// Messages beyond this many are dropped: nobody reads them, and a loop could make millions.
+const MOST_MESSAGES: usize = 100;
+
+/// The messages of one load.
+#[derive(Debug)]
+pub(crate) struct Sink {
+    /// Names of the files in reading order; [`Span::file`] is an index here.
+    pub(crate) files: Vec<String>,
+    items: Vec<(Span, Severity, &'static str, String, String)>,
+    seen: HashSet<(Span, &'static str)>,
+    errors: usize,
+    /// Where the subnet instance being built was called, innermost last: (instance name, place of the call).
+    pub(crate) calls: Vec<(String, Span)>,
+}
+
+impl Sink {
+    pub(crate) fn new(root: &str) -> Self {
+        Self { files: vec![root.to_owned()], items: Vec::new(), seen: HashSet::new(), errors: 0, calls: Vec::new() }
+    }
+
+    /// Reports an error. The same code at the same place is reported once.
+    pub(crate) fn error(&mut self, code: &'static str, span: Span, message: String, help: impl Into<String>) -> Reported {
+        self.errors += 1;
+        self.push(Severity::Error, code, span, message, help.into());
+        Reported
+    }
+
+    /// Reports a warning. The same code at the same place is reported once.
+    pub(crate) fn warning(&mut self, code: &'static str, span: Span, message: String, help: impl Into<String>) {
+        self.push(Severity::Warning, code, span, message, help.into());
+    }
+
+    /// Records output of the netlist itself (`call print`): never merged with other messages.
+    pub(crate) fn output(&mut self, code: &'static str, span: Span, message: String) {
+        if self.items.len() < MOST_MESSAGES {
+            self.items.push((span, Severity::Warning, code, message, String::new()));
+        }
+    }
+
+    /// True once an error was reported.
+    pub(crate) fn failed(&self) -> bool {
+        self.errors > 0
+    }
+
+    fn push(&mut self, severity: Severity, code: &'static str, span: Span, message: String, mut help: String) {
+        if self.items.len() >= MOST_MESSAGES && severity == Severity::Warning {
+            return;
+        }
+        let repeated = span != Span::NOWHERE && !self.seen.insert((span, code));
+        if repeated || self.items.len() >= 2 * MOST_MESSAGES {
+            return;
+        }
+        if let Some((instance, _)) = self.calls.last() {
+            if !help.is_empty() {
+                help.push_str("; ");
+            }
+            help.push_str(&format!("seen in the subnet instance `{instance}`"));
+        }
+        self.items.push((span, severity, code, message, help));
+    }
+
+    /// All messages in order of place.
+    pub(crate) fn finish(mut self, bundle: &Bundle) -> Diagnostics {
+        self.items.sort_by_key(|(span, severity, ..)| (span.file.wrapping_add(1), span.start, *severity == Severity::Warning));
+        let files = &self.files;
+        let items = self
+            .items
+            .into_iter()
+            .map(|(span, severity, code, message, help)| {
+                let (file, line, column, width) = place(files, bundle, span);
+                Diagnostic { code: code.to_owned(), severity, file, line, column, width, message, help }
+            })
+            .collect();
+        Diagnostics { items, bundle: bundle.clone() }
+    }
+}
+
+/// File, line, column and width of a span; the width stops at the end of the first line.
+fn place(files: &[String], bundle: &Bundle, span: Span) -> (String, usize, usize, usize) {
+    let Some(name) = files.get(usize::from(span.file)) else {
+        return (bundle.root.clone(), 0, 0, 0);
+    };
+    let text = bundle.files.get(name).map_or("", String::as_str);
+    let start = floor(text, span.start as usize);
+    let end = floor(text, span.end as usize).max(start);
+    let before = &text[..start];
+    let line = before.matches('\n').count() + 1;
+    let column = before.rsplit('\n').next().map_or(0, |l| l.chars().count()) + 1;
+    let marked = text[start..end].split('\n').next().unwrap_or("");
+    (name.clone(), line, column, marked.trim_end().chars().count().max(1))
+}
+
+/// The nearest character boundary at or before `at`.
+fn floor(text: &str, at: usize) -> usize {
+    let mut at = at.min(text.len());
+    while !text.is_char_boundary(at) {
+        at -= 1;
+    }
+    at
+}

@@ -1,0 +1,37 @@
+//! "Did you mean": the nearest known name.
+
+/// The known name nearest to `name`, if it is near enough to be a slip of the pen.
+pub(crate) fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let limit = match name.chars().count() {
+        0..=2 => 1,
+        3..=5 => 2,
+        _ => 3,
+    };
+    let scored = known.into_iter().filter(|k| *k != name).map(|k| (distance(name, k), k));
+    // Ties go to the name that comes first in the alphabet, so that messages do not depend on any order.
+    scored.filter(|(d, k)| *d <= limit && *d < k.chars().count().max(name.chars().count())).min().map(|(_, k)| k)
+}
+
+/// "did you mean `x`?" or, without a near name, `otherwise`.
+pub(crate) fn did_you_mean<'a>(name: &str, known: impl IntoIterator<Item = &'a str>, otherwise: &str) -> String {
+    nearest(name, known).map_or_else(|| otherwise.to_owned(), |k| format!("did you mean `{k}`?"))
+}
+
+/// Edit distance with neighbouring swaps (Damerau 1964, restricted); a change of case counts as one edit.
+fn distance(a: &str, b: &str) -> usize {
+    let (a, b): (Vec<char>, Vec<char>) = (a.chars().collect(), b.chars().collect());
+    let mut two_back = vec![0; b.len() + 1];
+    let mut back: Vec<usize> = (0..=b.len()).collect();
+    for i in 1..=a.len() {
+        let mut row = vec![i; b.len() + 1];
+        for j in 1..=b.len() {
+            let change = usize::from(a[i - 1] != b[j - 1]);
+            row[j] = (back[j] + 1).min(row[j - 1] + 1).min(back[j - 1] + change);
+            if i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1] {
+                row[j] = row[j].min(two_back[j - 2] + 1);
+            }
+        }
+        two_back = std::mem::replace(&mut back, row);
+    }
+    back[b.len()]
+}
