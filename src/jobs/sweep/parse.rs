@@ -62,8 +62,8 @@ fn setting(text: &str) -> Setting {
     number(text).map_or_else(|| Setting::Text(text.trim_matches('"').to_owned()), Setting::Number)
 }
 
-/// A finite number with at most one netlist suffix.
-fn number(text: &str) -> Option<f64> {
+/// A finite number with at most one netlist suffix: `2.1u`, `1e-3`, `3M` (mega). Anything else: none.
+pub fn number(text: &str) -> Option<f64> {
     if !text.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c)) {
         return None;
     }

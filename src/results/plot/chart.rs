@@ -118,6 +118,21 @@ fn draw_panel(picture: &mut Picture, chart: &Chart, panel: &Panel, x_axis: &Axis
     }
 }
 
+/// What a unit measures, as a title for a panel.
+pub fn word(unit: &str) -> &'static str {
+    match unit {
+        "m" => "displacement",
+        "rad" => "rotation",
+        "m/s" => "velocity",
+        "rad/s" => "angular velocity",
+        "K" => "temperature",
+        "V" => "voltage",
+        "A" => "current",
+        "C" => "charge",
+        _ => "signal",
+    }
+}
+
 fn with_unit(name: &str, unit: &str) -> String {
     if unit.is_empty() { name.to_owned() } else { format!("{name} [{unit}]") }
 }

@@ -16,8 +16,19 @@ pub struct Drawing<'a> {
     pub motion: &'a [Motion],
     /// Mean temperature of beams [K], by name; colours the deflected beams.
     pub temperatures: &'a [(String, f64)],
-    /// Factor on the displacements; none: a round one that makes them visible.
-    pub exaggeration: Option<f64>,
+    /// How large displacements are drawn.
+    pub scale: Scale,
+}
+
+/// How large displacements are drawn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Scale {
+    /// Times a round factor that makes them visible; to scale where they are visible by themselves.
+    Visible,
+    /// Times this factor.
+    Times(f64),
+    /// Displacements have no size of their own (mode shapes): the largest becomes a fixed part of the picture.
+    Shape,
 }
 
 const WIDTH: f64 = super::chart::WIDTH;
@@ -50,7 +61,13 @@ pub fn draw(drawing: &Drawing<'_>) -> Picture {
     let structure = drawing.structure;
     let (low, high) = bounds(outlines(structure, &[]).iter().flat_map(|o| o.shape.iter().copied()), structure);
     let extent = (high[0] - low[0]).max(high[1] - low[1]).max(f64::MIN_POSITIVE);
-    let factor = drawing.exaggeration.unwrap_or_else(|| round_factor(drawing.motion, extent));
+    let largest = drawing.motion.iter().map(|[x, y, _]| x.hypot(*y)).fold(0.0, f64::max);
+    let factor = match drawing.scale {
+        Scale::Visible => round_factor(largest, extent),
+        Scale::Times(factor) => factor,
+        Scale::Shape if largest > 0.0 => 0.07 * extent / largest,
+        Scale::Shape => 1.0,
+    };
     let motion: Vec<Motion> = drawing.motion.iter().map(|m| m.map(|x| x * factor)).collect();
     let deflected = if motion.is_empty() { Vec::new() } else { outlines(structure, &motion) };
 
@@ -119,8 +136,7 @@ fn bounds(points: impl Iterator<Item = Point>, structure: &Structure) -> (Point,
 }
 
 /// 1 where the motion shows by itself, else the round factor that makes the largest one a tenth of the picture.
-fn round_factor(motion: &[Motion], extent: f64) -> f64 {
-    let largest = motion.iter().map(|[x, y, _]| x.hypot(*y)).fold(0.0, f64::max);
+fn round_factor(largest: f64, extent: f64) -> f64 {
     if largest == 0.0 || !largest.is_finite() || largest > 0.03 * extent {
         return 1.0;
     }
@@ -169,7 +185,7 @@ fn draw_lines(picture: &mut Picture, structure: &Structure, motion: &[Motion], v
         let zigzag: Vec<Point> = (0..=12)
             .map(|k| {
                 let s = f64::from(k) / 12.0;
-                let side = if k < 2 || k > 10 {
+                let side = if !(2..=10).contains(&k) {
                     0.0
                 } else if k % 2 == 0 {
                     1.0
@@ -210,7 +226,9 @@ fn legend(picture: &mut Picture, drawing: &Drawing<'_>, factor: f64, hot: Option
     picture.polyline(&[[x, y], [x + length * scale, y]], Paint::line(INK, 3.0));
     picture.text(x, y + 17.0, 12.0, Align::Start, INK, &round_length(length));
     let mut parts = vec!["grey: as drawn".to_owned()];
-    if !drawing.motion.is_empty() {
+    if drawing.scale == Scale::Shape {
+        parts.push("colour: shape of the mode".to_owned());
+    } else if !drawing.motion.is_empty() {
         let times = if factor == 1.0 { "to scale".to_owned() } else { format!("displacements × {factor}") };
         parts.push(format!("colour: deflected, {times}"));
         let largest = drawing.motion.iter().map(|[x, y, _]| x.hypot(*y)).fold(0.0, f64::max);
@@ -247,8 +265,13 @@ mod tests {
         structure.links.push(Link { name: "l".into(), a: NodeId(0), b: NodeId(1) });
         let picture = |v: f64| {
             let motion = [[0.0; 3], [0.0, v, 0.0]];
-            let drawing =
-                Drawing { structure: &structure, title: "t", motion: &motion, temperatures: &[], exaggeration: None };
+            let drawing = Drawing {
+                structure: &structure,
+                title: "t",
+                motion: &motion,
+                temperatures: &[],
+                scale: Scale::Visible,
+            };
             draw(&drawing).to_svg()
         };
         assert!(picture(0.3e-6).contains("displacements × 20"));

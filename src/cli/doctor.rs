@@ -1,0 +1,128 @@
+//! `bimorph doctor`: what works on this machine, and what to do about the rest.
+
+use super::failure::Failure;
+use super::output::print;
+use bimorph::analysis::statics::static_equilibrium;
+use bimorph::compile::{CompileOptions, compile};
+use bimorph::netlist::Bundle;
+use bimorph::service::address::Address;
+use bimorph::service::client::Client;
+use bimorph::service::limits::Limits;
+use bimorph::service::server::{self, ServeOptions};
+use clap::Args;
+use std::path::Path;
+use std::process::Command;
+use std::sync::mpsc;
+use std::time::Duration;
+
+/// Check what is installed and what works: the core, ngspice, the plug-in, a server, the Python client.
+///
+/// Exit status 0 when the core works; the other lines say what is missing and what to do.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  bimorph doctor")]
+pub(crate) struct Doctor {}
+
+/// A cantilever of 100 µm x 2 µm x 2 µm under 1 µN at its tip.
+const CANTILEVER: &str = "process p = [Youngsmodulus=165e9 Poisson=0.3 density=2300 viscosity=0 fluid=2u h=2u]\n\
+                          anchor p [a] [l=5u w=5u]\nbeam2d p [a b] [l=100u w=2u]\nf2d * [b] [F=1u oz=pi/2]\n";
+
+/// Its tip by F·l³/(3·E·I) [m].
+const TIP: f64 = 1e-6 * 1e-12 / (3.0 * 165e9 * (2e-6 * 8e-18 / 12.0));
+
+/// Longest wait for a server on this machine.
+const PATIENCE: Duration = Duration::from_secs(10);
+
+impl Doctor {
+    pub(crate) fn run(&self) -> Result<(), Failure> {
+        print(&format!("bimorph {}\n", env!("CARGO_PKG_VERSION")))?;
+        let core = core();
+        line("core", &core, "reinstall bimorph; the build is broken")?;
+        line("ngspice", &ngspice(), "install it: apt-get install ngspice (39 or later)")?;
+        line("plug-in", &plugin(), "build it: cargo build --release -p bimorph-ngspice, or set BIMORPH_PLUGIN")?;
+        line("server", &server(), "check that sockets can be made in the temporary folder")?;
+        line("python", &python(), "install the client: pip install ./clients/python")?;
+        core.map(|_| ()).map_err(|_| Failure::Doctor)
+    }
+}
+
+fn line(what: &str, found: &Result<String, String>, remedy: &str) -> Result<(), Failure> {
+    match found {
+        Ok(detail) => print(&format!("ok       {what:<8} {detail}\n")),
+        Err(reason) => print(&format!("missing  {what:<8} {reason}\n                  {remedy}\n")),
+    }
+}
+
+fn bundle() -> Bundle {
+    Bundle::from_text("cantilever.net", CANTILEVER)
+}
+
+fn options() -> CompileOptions {
+    CompileOptions { linear: true, ..CompileOptions::default() }
+}
+
+/// The tip of a cantilever against theory.
+fn core() -> Result<String, String> {
+    let compiled = compile(&bundle(), &options()).map_err(|e| e.to_string())?;
+    let result = static_equilibrium(&compiled, &[]).map_err(|e| e.to_string())?;
+    let tip = result.nodes.iter().find(|(name, _)| name == "b").map_or(f64::NAN, |(_, moved)| moved.y);
+    if (tip / TIP - 1.0).abs() < 1e-6 {
+        Ok(format!("a cantilever bends by {:.4} µm, as theory says", tip * 1e6))
+    } else {
+        Err(format!("a cantilever bends by {tip:e} m where theory says {TIP:e} m"))
+    }
+}
+
+fn ngspice() -> Result<String, String> {
+    let answer = Command::new("ngspice").arg("--version").output().map_err(|e| format!("not found: {e}"))?;
+    let text = String::from_utf8_lossy(&answer.stdout);
+    let version = text.split_whitespace().find_map(|word| word.strip_prefix("ngspice-"));
+    version.map(|v| format!("version {v}")).ok_or_else(|| "does not say its version".to_owned())
+}
+
+/// A server in this process, asked over a Unix socket for the same cantilever.
+fn server() -> Result<String, String> {
+    let path = std::env::temp_dir().join(format!("bimorph-doctor-{}.sock", std::process::id()));
+    let runtime = tokio::runtime::Runtime::new().map_err(|e| e.to_string())?;
+    let (stop, stopped) = tokio::sync::oneshot::channel::<()>();
+    let (tell, ready) = mpsc::channel();
+    let tell_failure = tell.clone();
+    let options = ServeOptions {
+        listen: vec![Address::Unix(path.clone())],
+        insecure: false,
+        limits: Limits::default(),
+        ready: Box::new(move |_| drop(tell.send(Ok(())))),
+    };
+    let serving = runtime.spawn(async move {
+        let ended = server::run(options, async { drop(stopped.await) }).await;
+        if let Err(error) = ended {
+            drop(tell_failure.send(Err(error.to_string())));
+        }
+    });
+    let answer = ready.recv_timeout(PATIENCE).map_err(|_| "did not start".to_owned()).and_then(|r| r);
+    let answer = answer.and_then(|()| ask(&path));
+    let _ = stop.send(());
+    let _ = runtime.block_on(serving);
+    answer
+}
+
+fn ask(path: &Path) -> Result<String, String> {
+    let uri = Address::Unix(path.to_owned()).uri();
+    let mut client = Client::connect(&uri, PATIENCE).map_err(|e| e.to_string())?;
+    let model = client.compile(&bundle(), &options()).map_err(|e| e.to_string())?;
+    let result = client.statics(&model, &[]).map_err(|e| e.to_string())?;
+    Ok(format!("answers over a Unix socket ({} nodes)", result.nodes.len()))
+}
+
+fn python() -> Result<String, String> {
+    let script = "import bimorph, sys; print(bimorph.__version__, 'on Python', sys.version.split()[0])";
+    let answer = Command::new("python3").args(["-c", script]).output().map_err(|e| format!("no python3: {e}"))?;
+    if answer.status.success() {
+        Ok(String::from_utf8_lossy(&answer.stdout).trim().to_owned())
+    } else {
+        Err("the package bimorph is not installed for python3".to_owned())
+    }
+}
+
+fn plugin() -> Result<String, String> {
+    Err("not looked for".to_owned())
+}

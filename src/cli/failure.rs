@@ -1,0 +1,88 @@
+//! Why a command did not finish, and with which exit status.
+
+use bimorph::analysis::AnalysisError;
+use bimorph::compile::CompileError;
+use bimorph::jobs::sweep::SweepError;
+use bimorph::results::format::UnknownFormat;
+use bimorph::results::plot::render::RenderError;
+use bimorph::results::raw::RawError;
+use bimorph::results::table::LengthMismatch;
+use bimorph::service::address::AddressError;
+use bimorph::service::client::ClientError;
+use bimorph::service::server::ServeError;
+use std::io::{self, IsTerminal};
+use std::path::PathBuf;
+use thiserror::Error;
+
+/// One failure, one message.
+#[derive(Debug, Error)]
+pub(crate) enum Failure {
+    #[error("cannot read {}: {source}", path.display())]
+    Read { path: PathBuf, source: io::Error },
+    #[error("cannot write {}: {source}", path.display())]
+    Write { path: PathBuf, source: io::Error },
+    #[error("cannot write to standard output: {0}")]
+    Stdout(io::Error),
+    #[error("{option}: expected {expected}, got {got}")]
+    BadOption { option: &'static str, expected: String, got: String },
+    #[error("{what} has no {kind}; {hint}")]
+    NoSuchOutput { what: &'static str, kind: &'static str, hint: &'static str },
+    #[error("{}: {source}", path.display())]
+    Raw { path: PathBuf, source: RawError },
+    #[error("interrupted")]
+    Interrupted,
+    #[error("no point of the sweep has a result; the first says: {0}")]
+    AllPoints(String),
+    #[error("the core does not work on this machine; see the lines marked missing")]
+    Doctor,
+    #[error(transparent)]
+    Format(#[from] UnknownFormat),
+    #[error(transparent)]
+    Compile(#[from] CompileError),
+    #[error(transparent)]
+    Analysis(#[from] AnalysisError),
+    #[error(transparent)]
+    Table(#[from] LengthMismatch),
+    #[error(transparent)]
+    Render(#[from] RenderError),
+    #[error(transparent)]
+    Sweep(#[from] SweepError),
+    #[error(transparent)]
+    Client(#[from] ClientError),
+    #[error(transparent)]
+    Serve(#[from] ServeError),
+    #[error(transparent)]
+    Address(#[from] AddressError),
+}
+
+impl Failure {
+    pub(crate) fn bad(option: &'static str, expected: impl Into<String>, got: impl Into<String>) -> Self {
+        Self::BadOption { option, expected: expected.into(), got: got.into() }
+    }
+
+    /// Prints the message to standard error: diagnostics with their source lines as they are, all else in one line.
+    pub(crate) fn show(&self) {
+        match self {
+            Self::Compile(CompileError::Netlist(diagnostics)) => {
+                eprint!("{}", diagnostics.render(io::stderr().is_terminal()));
+            }
+            _ if self.is_broken_pipe() => {}
+            _ => eprintln!("error: {self}"),
+        }
+    }
+
+    pub(crate) fn exit_status(&self) -> u8 {
+        match self {
+            Self::Interrupted
+            | Self::Analysis(AnalysisError::Cancelled)
+            | Self::Sweep(SweepError::Cancelled { .. }) => 130,
+            // The reader has seen what it wanted: `bimorph … | head`.
+            _ if self.is_broken_pipe() => 0,
+            _ => 1,
+        }
+    }
+
+    fn is_broken_pipe(&self) -> bool {
+        matches!(self, Self::Stdout(e) if e.kind() == io::ErrorKind::BrokenPipe)
+    }
+}

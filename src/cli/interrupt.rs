@@ -1,0 +1,40 @@
+//! Ctrl-C: long work stops at its next report of progress; anything else stops at once. No half-written file stays.
+
+use bimorph::results::atomic;
+use std::process::exit;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+static ASKED: AtomicBool = AtomicBool::new(false);
+static POLLED: AtomicBool = AtomicBool::new(false);
+
+/// Exit status of a process that a person interrupted.
+const INTERRUPTED: i32 = 130;
+
+/// Starts to listen for Ctrl-C. When that is not possible the system's own way of stopping stays in force.
+pub(crate) fn listen() {
+    std::thread::spawn(|| {
+        let Ok(runtime) = tokio::runtime::Builder::new_current_thread().enable_all().build() else {
+            return;
+        };
+        runtime.block_on(async {
+            while tokio::signal::ctrl_c().await.is_ok() {
+                // A second Ctrl-C, or work that does not ask, ends the process here.
+                if ASKED.swap(true, Ordering::SeqCst) || !POLLED.load(Ordering::SeqCst) {
+                    atomic::discard_unfinished();
+                    exit(INTERRUPTED);
+                }
+            }
+        });
+    });
+}
+
+/// True once a person asked to stop. Work that calls this promises to call it again soon.
+pub(crate) fn asked() -> bool {
+    POLLED.store(true, Ordering::SeqCst);
+    ASKED.load(Ordering::SeqCst)
+}
+
+/// Ends the promise of [`asked`]: from here on Ctrl-C stops the process at once.
+pub(crate) fn no_longer_polled() {
+    POLLED.store(false, Ordering::SeqCst);
+}

@@ -1,0 +1,72 @@
+//! The command line: one file for each subcommand, and what they share.
+//!
+//! Every subcommand is an [`clap::Args`] struct with a `run` method. It reads, computes, writes its `--out` file, and
+//! only then prints to standard output, so that a failure leaves standard output empty and no file behind.
+
+mod check;
+mod doctor;
+mod failure;
+mod interrupt;
+mod model;
+mod modes;
+mod output;
+mod plot;
+mod progress;
+mod pull_in;
+mod report;
+mod serve;
+mod statics;
+mod sweep;
+mod tran;
+mod value;
+
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+
+/// Behavioural device models of electro-mechanical microsystems.
+///
+/// A SUGAR netlist goes in; motion, modes, pull-in voltages and waveforms come out. Numbers take netlist suffixes
+/// (1.5u, 30n, 2M; m is milli, M is mega) and are SI: metres, seconds, volts, newtons, hertz.
+#[derive(Debug, Parser)]
+#[command(name = "bimorph", version, max_term_width = 100)]
+#[command(after_help = "Exit status: 0 done, 1 error (one message on standard error), 2 wrong usage, 130 interrupted.")]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Check(check::Check),
+    Static(statics::Static),
+    Modes(modes::Modes),
+    Pullin(pull_in::Pullin),
+    Tran(tran::Tran),
+    Serve(serve::Serve),
+    Sweep(sweep::Sweep),
+    Plot(plot::Plot),
+    Doctor(doctor::Doctor),
+}
+
+/// Runs the command that the process was started with.
+pub(crate) fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let done = match &cli.command {
+        Command::Check(command) => command.run(),
+        Command::Static(command) => command.run(),
+        Command::Modes(command) => command.run(),
+        Command::Pullin(command) => command.run(),
+        Command::Tran(command) => command.run(),
+        Command::Serve(command) => command.run(),
+        Command::Sweep(command) => command.run(),
+        Command::Plot(command) => command.run(),
+        Command::Doctor(command) => command.run(),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            failure.show();
+            ExitCode::from(failure.exit_status())
+        }
+    }
+}

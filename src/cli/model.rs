@@ -1,0 +1,165 @@
+//! Options that choose the model: the netlist, its parameters, and how fine the model is.
+
+use super::failure::Failure;
+use super::{interrupt, value};
+use bimorph::compile::{CompileOptions, Compiled, Junctions, compile};
+use bimorph::netlist::{Bundle, Setting};
+use clap::Args;
+use serde::ser::SerializeMap;
+use serde::{Serialize, Serializer};
+use std::io::{self, IsTerminal};
+use std::path::PathBuf;
+
+/// Options of every command that reads a netlist.
+#[derive(Debug, Args)]
+pub(crate) struct ModelArgs {
+    /// SUGAR netlist
+    file: PathBuf,
+
+    /// Set a netlist parameter: a number with suffix (2.1u) or text. Repeatable
+    #[arg(long = "set", short = 's', value_name = "NAME=VALUE", value_parser = value::setting)]
+    set: Vec<(String, Setting)>,
+
+    /// Folder to search for files that the netlist uses. Repeatable
+    #[arg(long, value_name = "DIR")]
+    include: Vec<PathBuf>,
+
+    /// Relative error aimed at; smaller means more unknowns and shorter steps [default: 1e-3]
+    #[arg(long, value_parser = value::number)]
+    tol: Option<f64>,
+
+    /// Highest frequency the model must resolve [Hz]; higher means more unknowns [default: by slenderness]
+    #[arg(long, value_name = "HZ", value_parser = value::number)]
+    band: Option<f64>,
+
+    /// How beams meet; centreline: in points, as in SUGAR
+    #[arg(long, default_value = "centreline", value_name = "KIND")]
+    junctions: String,
+
+    /// Small displacements about the drawn geometry, as SUGAR
+    #[arg(long)]
+    linear: bool,
+
+    /// Leave out gas damping
+    #[arg(long)]
+    undamped: bool,
+}
+
+impl ModelArgs {
+    /// The netlist with everything it uses.
+    pub(crate) fn bundle(&self) -> Result<Bundle, Failure> {
+        interrupt::listen();
+        Bundle::read(&self.file, &self.include).map_err(|source| Failure::Read { path: self.file.clone(), source })
+    }
+
+    /// The options of the compilation, checked.
+    pub(crate) fn options(&self) -> Result<CompileOptions, Failure> {
+        let defaults = CompileOptions::default();
+        let tol = self.tol.unwrap_or(defaults.tol);
+        if !(tol > 0.0 && tol < 1.0) {
+            return Err(Failure::bad("--tol", "a relative error between 0 and 1", tol.to_string()));
+        }
+        if let Some(band) = self.band.filter(|band| *band <= 0.0) {
+            return Err(Failure::bad("--band", "a frequency above 0 Hz", band.to_string()));
+        }
+        let junctions = match self.junctions.as_str() {
+            "centreline" | "centerline" => Junctions::Centreline,
+            "offset" | "calibrated" => {
+                let got = format!("\"{}\", which this version does not have yet", self.junctions);
+                return Err(Failure::bad("--junctions", "centreline", got));
+            }
+            other => return Err(Failure::bad("--junctions", "centreline", format!("\"{other}\""))),
+        };
+        Ok(CompileOptions {
+            set: self.set.clone(),
+            band: self.band,
+            tol,
+            linear: self.linear,
+            undamped: self.undamped,
+            junctions,
+        })
+    }
+
+    /// Compiles the netlist and shows its warnings on standard error.
+    pub(crate) fn compile(&self) -> Result<Compiled, Failure> {
+        let options = self.options()?;
+        let compiled = compile(&self.bundle()?, &options)?;
+        warn(&compiled);
+        Ok(compiled)
+    }
+
+    /// What the model was made from, for JSON.
+    pub(crate) fn context<'a>(&'a self, compiled: &'a Compiled) -> Context<'a> {
+        let options = &compiled.options;
+        Context {
+            file: self.file.display().to_string(),
+            parameters: Map(&compiled.parameters),
+            tol: options.tol,
+            band_hz: options.band,
+            junctions: options.junctions,
+            linear: options.linear,
+            undamped: options.undamped,
+            warnings: compiled.warnings.items.iter().map(|d| d.message.as_str()).collect(),
+        }
+    }
+
+    /// The netlist's file name, for titles.
+    pub(crate) fn title(&self) -> String {
+        self.file.file_name().map_or_else(|| self.file.display().to_string(), |n| n.to_string_lossy().into_owned())
+    }
+}
+
+/// Shows the warnings of a netlist on standard error.
+pub(crate) fn warn(compiled: &Compiled) {
+    if !compiled.warnings.items.is_empty() {
+        eprint!("{}", compiled.warnings.render(io::stderr().is_terminal()));
+    }
+}
+
+/// The part of every JSON document that says what the model was.
+#[derive(Debug, Serialize)]
+pub(crate) struct Context<'a> {
+    /// Netlist as named on the command line.
+    file: String,
+    /// Netlist parameters with the values they took, SI.
+    parameters: Map<'a, Setting>,
+    /// Relative error aimed at.
+    tol: f64,
+    /// Highest frequency resolved [Hz]; null: by slenderness.
+    band_hz: Option<f64>,
+    /// How beams meet.
+    junctions: Junctions,
+    /// Small displacements.
+    linear: bool,
+    /// Without gas damping.
+    undamped: bool,
+    /// Warnings of the netlist.
+    warnings: Vec<&'a str>,
+}
+
+/// Named values as a JSON object in their own order.
+#[derive(Debug)]
+pub(crate) struct Map<'a, T>(pub(crate) &'a [(String, T)]);
+
+impl Serialize for Map<'_, Setting> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(Some(self.0.len()))?;
+        for (name, value) in self.0 {
+            match value {
+                Setting::Number(x) => map.serialize_entry(name, x)?,
+                Setting::Text(text) => map.serialize_entry(name, text)?,
+            }
+        }
+        map.end()
+    }
+}
+
+/// The same for values that JSON knows.
+#[derive(Debug)]
+pub(crate) struct Named<'a, T>(pub(crate) &'a [(String, T)]);
+
+impl<T: Serialize> Serialize for Named<'_, T> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(self.0.iter().map(|(name, value)| (name, value)))
+    }
+}

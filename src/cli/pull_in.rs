@@ -1,0 +1,77 @@
+//! `bimorph pullin`: where the gap closes, and where it opens again.
+
+use super::failure::Failure;
+use super::model::{Context, ModelArgs};
+use super::output::OutputArgs;
+use super::{progress, report, value};
+use bimorph::analysis::pull_in::{PullInResult, pull_in};
+use bimorph::results::plot::axis::quantity;
+use bimorph::results::table::Table;
+use clap::Args;
+use serde::Serialize;
+
+/// Pull-in and release voltage of a gap.
+///
+/// The equilibrium is followed up to the fold, where the gap closes, and down again to where the closed gap lets go.
+/// JSON: "pull_in_v" [V]; "release_v" [V], null when it never lets go.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  bimorph pullin switch.net --max 50\n  \
+                        bimorph pullin switch.net --source drive --set gap=1.5u --json")]
+pub(crate) struct Pullin {
+    #[command(flatten)]
+    model: ModelArgs,
+
+    /// Port or voltage source to raise [default: the first port, else the first source]
+    #[arg(long, value_name = "NAME")]
+    source: Option<String>,
+
+    /// Highest voltage tried [V]
+    #[arg(long, default_value = "200", value_name = "VOLTS", value_parser = value::number)]
+    max: f64,
+
+    #[command(flatten)]
+    output: OutputArgs,
+}
+
+#[derive(Debug, Serialize)]
+struct Document<'a> {
+    #[serde(flatten)]
+    result: &'a PullInResult,
+    max_v: f64,
+    #[serde(flatten)]
+    context: Context<'a>,
+}
+
+impl Pullin {
+    pub(crate) fn run(&self) -> Result<(), Failure> {
+        self.output.check()?;
+        if self.output.format().is_some_and(|f| !f.is_table()) {
+            let hint = "write .csv or .raw";
+            return Err(Failure::NoSuchOutput { what: "pullin", kind: "picture", hint });
+        }
+        if self.max <= 0.0 {
+            return Err(Failure::bad("--max", "a voltage above 0 V", self.max.to_string()));
+        }
+        let compiled = self.model.compile()?;
+        let busy = progress::spinner("pull-in");
+        let result = pull_in(&compiled, self.source.as_deref(), self.max);
+        busy.finish_and_clear();
+        let result = result?;
+        let release = result.release_v.map_or("none: it stays closed".to_owned(), |v| quantity(v, "V"));
+        let text = format!(
+            "port     {}\npull-in  {}\nrelease  {release}\n\n{}",
+            result.port,
+            quantity(result.pull_in_v, "V"),
+            report::options(&compiled)
+        );
+        let document = Document { result: &result, max_v: self.max, context: self.model.context(&compiled) };
+        let table = || {
+            let mut table = Table::new(self.model.title(), "Pull-in");
+            table.push_real("pull_in", "V", vec![result.pull_in_v])?;
+            table.push_real("release", "V", vec![result.release_v.unwrap_or(f64::NAN)])?;
+            Ok(table)
+        };
+        let picture = || Err(Failure::NoSuchOutput { what: "pullin", kind: "picture", hint: "write .csv or .raw" });
+        self.output.finish(table, picture, &document, &text)
+    }
+}

@@ -1,0 +1,57 @@
+//! Reports for people: aligned columns in engineering units.
+
+use bimorph::compile::Compiled;
+use bimorph::results::plot::axis::quantity;
+use std::fmt::Write;
+
+/// Rows shown of a long list.
+const MOST_ROWS: usize = 40;
+
+/// Lines up cells in columns, the first to the left and the others to the right, two blanks apart.
+pub(crate) fn columns(header: &[&str], rows: &[Vec<String>]) -> String {
+    let mut widths: Vec<usize> = header.iter().map(|h| h.chars().count()).collect();
+    for row in rows.iter().take(MOST_ROWS) {
+        for (width, cell) in widths.iter_mut().zip(row) {
+            *width = (*width).max(cell.chars().count());
+        }
+    }
+    let mut text = String::new();
+    let mut line = |cells: &mut dyn Iterator<Item = &str>| {
+        let mut shown = String::new();
+        for (i, (cell, width)) in cells.zip(&widths).enumerate() {
+            let _ = if i == 0 { write!(shown, "{cell:<width$}") } else { write!(shown, "  {cell:>width$}") };
+        }
+        text.push_str(shown.trim_end());
+        text.push('\n');
+    };
+    line(&mut header.iter().copied());
+    for row in rows.iter().take(MOST_ROWS) {
+        line(&mut row.iter().map(String::as_str));
+    }
+    if rows.len() > MOST_ROWS {
+        let _ = writeln!(text, "… {} more; --json and --out have all", rows.len() - MOST_ROWS);
+    }
+    text
+}
+
+/// The last line of a report: what the numbers rest on.
+pub(crate) fn footing(compiled: &Compiled, unknowns: usize) -> String {
+    format!("{unknowns} unknowns, {}", options(compiled))
+}
+
+/// The options of a model in one line.
+pub(crate) fn options(compiled: &Compiled) -> String {
+    let options = &compiled.options;
+    let mut text = format!("tolerance {:e}", options.tol);
+    if let Some(band) = options.band {
+        let _ = write!(text, ", band {}", quantity(band, "Hz"));
+    }
+    text.push_str(", junctions centreline");
+    for (on, word) in [(options.linear, ", linear"), (options.undamped, ", undamped")] {
+        if on {
+            text.push_str(word);
+        }
+    }
+    text.push('\n');
+    text
+}

@@ -1,0 +1,142 @@
+//! `bimorph static`: where it rests.
+
+use super::failure::Failure;
+use super::model::{Context, ModelArgs, Named};
+use super::output::OutputArgs;
+use super::{progress, report, value};
+use bimorph::analysis::statics::{NodeMotion, StaticResult, static_equilibrium};
+use bimorph::compile::Compiled;
+use bimorph::results::plot::axis::quantity;
+use bimorph::results::plot::mechanism::{self, Drawing, Scale};
+use bimorph::results::plot::shapes::Motion;
+use bimorph::results::plot::svg::Picture;
+use bimorph::results::table::Table;
+use clap::Args;
+use serde::Serialize;
+use std::fmt::Write;
+
+/// Static equilibrium: displacement of every node, temperatures, port currents and charges.
+///
+/// The equilibrium is the one reached from rest by raising all loads and voltages together. JSON: "nodes" holds x [m],
+/// y [m] and rz [rad] from the drawn place; "temperatures_k", "currents_a" and "charges_c" by name.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  bimorph static bank.net --port heat=5\n  \
+                        bimorph static stage.net --set F=100u --json\n  \
+                        bimorph static bank.net --port heat=5 --out bank.svg     the mechanism, at rest and deflected")]
+pub(crate) struct Static {
+    #[command(flatten)]
+    model: ModelArgs,
+
+    /// Hold a port at a voltage [V]; others are at 0 V. Repeatable
+    #[arg(long = "port", short = 'p', value_name = "NAME=VOLTS", value_parser = value::volts)]
+    ports: Vec<(String, f64)>,
+
+    #[command(flatten)]
+    output: OutputArgs,
+}
+
+#[derive(Debug, Serialize)]
+struct Document<'a> {
+    nodes: Named<'a, NodeMotion>,
+    temperatures_k: Named<'a, f64>,
+    currents_a: Named<'a, f64>,
+    charges_c: Named<'a, f64>,
+    pulled_in: bool,
+    unknowns: usize,
+    iterations: usize,
+    port_voltages_v: Named<'a, f64>,
+    #[serde(flatten)]
+    context: Context<'a>,
+}
+
+impl Static {
+    pub(crate) fn run(&self) -> Result<(), Failure> {
+        self.output.check()?;
+        let compiled = self.model.compile()?;
+        let busy = progress::spinner("static equilibrium");
+        let result = static_equilibrium(&compiled, &self.ports);
+        busy.finish_and_clear();
+        let result = result?;
+        let document = Document {
+            nodes: Named(&result.nodes),
+            temperatures_k: Named(&result.temperatures_k),
+            currents_a: Named(&result.currents_a),
+            charges_c: Named(&result.charges_c),
+            pulled_in: result.pulled_in,
+            unknowns: result.unknowns,
+            iterations: result.iterations,
+            port_voltages_v: Named(&self.ports),
+            context: self.model.context(&compiled),
+        };
+        let title = self.model.title();
+        self.output.finish(
+            || table(&title, &result),
+            || Ok(picture(&compiled, &title, &result)),
+            &document,
+            &text(&compiled, &result),
+        )
+    }
+}
+
+/// One row: every quantity of the operating point in a column of its own.
+fn table(title: &str, result: &StaticResult) -> Result<Table, Failure> {
+    let mut table = Table::new(title, "Operating Point");
+    for (name, motion) in &result.nodes {
+        for (suffix, unit, value) in [("x", "m", motion.x), ("y", "m", motion.y), ("rz", "rad", motion.rz)] {
+            table.push_real(&format!("{name}.{suffix}"), unit, vec![value])?;
+        }
+    }
+    let lists = [(&result.temperatures_k, "T", "K"), (&result.currents_a, "i", "A"), (&result.charges_c, "q", "C")];
+    for (list, suffix, unit) in lists {
+        for (name, value) in list {
+            table.push_real(&format!("{name}.{suffix}"), unit, vec![*value])?;
+        }
+    }
+    Ok(table)
+}
+
+/// The mechanism at rest and in this equilibrium.
+pub(crate) fn picture(compiled: &Compiled, title: &str, result: &StaticResult) -> Picture {
+    mechanism::draw(&Drawing {
+        structure: &compiled.structure,
+        title,
+        motion: &motion(compiled, &result.nodes),
+        temperatures: &result.temperatures_k,
+        scale: Scale::Visible,
+    })
+}
+
+/// Displacements by node index, from displacements by name.
+pub(crate) fn motion(compiled: &Compiled, nodes: &[(String, NodeMotion)]) -> Vec<Motion> {
+    let mut motion = vec![[0.0; 3]; compiled.structure.nodes.len()];
+    for (name, moved) in nodes {
+        if let Some(id) = compiled.structure.node(name) {
+            motion[id.0] = [moved.x, moved.y, moved.rz];
+        }
+    }
+    motion
+}
+
+fn text(compiled: &Compiled, result: &StaticResult) -> String {
+    let rows: Vec<Vec<String>> = result
+        .nodes
+        .iter()
+        .map(|(name, m)| vec![name.clone(), quantity(m.x, "m"), quantity(m.y, "m"), quantity(m.rz, "rad")])
+        .collect();
+    let mut text = report::columns(&["node", "x", "y", "rz"], &rows);
+    for (list, unit, head) in [
+        (&result.temperatures_k, "K", ["beam", "temperature"]),
+        (&result.currents_a, "A", ["port", "current"]),
+        (&result.charges_c, "C", ["port", "charge"]),
+    ] {
+        if !list.is_empty() {
+            let rows: Vec<Vec<String>> = list.iter().map(|(n, v)| vec![n.clone(), quantity(*v, unit)]).collect();
+            let _ = write!(text, "\n{}", report::columns(&head, &rows));
+        }
+    }
+    if result.pulled_in {
+        text.push_str("\npulled in on the way to these voltages\n");
+    }
+    let _ = write!(text, "\n{} Newton iterations, {}", result.iterations, report::footing(compiled, result.unknowns));
+    text
+}

@@ -1,0 +1,161 @@
+//! `bimorph sweep`: many variants.
+
+use super::failure::Failure;
+use super::model::ModelArgs;
+use super::output::{check_folder, print};
+use super::{interrupt, progress, value};
+use bimorph::jobs::sweep::{self, Shard, SweepAnalysis, SweepParameter, SweepProgress, SweepSpec, SweepTable};
+use bimorph::results::atomic;
+use bimorph::service::client::Client;
+use clap::{Args, ValueEnum};
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// Run one analysis over a grid of parameter values, on all cores, here or on a server.
+///
+/// The table is CSV with one row for each point, in grid order whatever the number of cores; a point without a result
+/// has its reason in the column "error". The shards of a sweep put together are the whole sweep.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+    bimorph sweep bank.net --param w=1.8u:2.2u:21 --port heat=5 --signals yoke.y --out w.csv\n  \
+    bimorph sweep bank.net --param w=1.8u:2.2u:21 --param Lh=200u,206u --analysis modes --count 3\n  \
+    bimorph sweep switch.net --param gap=1u:3u:201 --analysis pullin --shard 0/4 --out part0.csv\n  \
+    bimorph sweep bank.net --param w=1.8u:2.2u:21 --to unix:///tmp/bimorph.sock")]
+pub(crate) struct Sweep {
+    #[command(flatten)]
+    model: ModelArgs,
+
+    /// An axis of the grid: LOW:HIGH:COUNT, ends included, or a list A,B,C. Repeatable; the last varies fastest
+    #[arg(long = "param", value_name = "NAME=LOW:HIGH:COUNT", required = true)]
+    parameters: Vec<String>,
+
+    /// What to compute at each point
+    #[arg(long, value_enum, default_value_t = Analysis::Static)]
+    analysis: Analysis,
+
+    /// Modes: how many
+    #[arg(long, short = 'n', default_value_t = 6)]
+    count: usize,
+
+    /// Static: columns wanted, NODE.x, NODE.y, NODE.rz, PORT.i, PORT.q, BEAM.T [default: every node]
+    #[arg(long, value_name = "NAMES")]
+    signals: Vec<String>,
+
+    /// Static, modes: hold a port at a voltage [V]. Repeatable
+    #[arg(long = "port", short = 'p', value_name = "NAME=VOLTS", value_parser = value::volts)]
+    ports: Vec<(String, f64)>,
+
+    /// Pull-in: port or voltage source to raise [default: the first]
+    #[arg(long, value_name = "NAME")]
+    source: Option<String>,
+
+    /// Pull-in: highest voltage tried [V]
+    #[arg(long, default_value = "200", value_name = "VOLTS", value_parser = value::number)]
+    max: f64,
+
+    /// Run part I of N (I from 0) of the grid
+    #[arg(long, value_name = "I/N", default_value = "0/1")]
+    shard: String,
+
+    /// Worker threads [default: one for each core]
+    #[arg(long)]
+    threads: Option<usize>,
+
+    /// Run on a server: unix:///path or http://host:port
+    #[arg(long, value_name = "URI")]
+    to: Option<String>,
+
+    /// Longest wait for an answer of the server [s]
+    #[arg(long, default_value = "30", value_parser = value::number)]
+    deadline: f64,
+
+    /// Write the table to a .csv file [default: standard output]
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Analysis {
+    Static,
+    Modes,
+    Pullin,
+}
+
+impl Sweep {
+    pub(crate) fn run(&self) -> Result<(), Failure> {
+        if let Some(out) = &self.out {
+            if out.extension().is_none_or(|e| !e.eq_ignore_ascii_case("csv")) {
+                return Err(Failure::bad("--out", "a .csv file", format!("\"{}\"", out.display())));
+            }
+            check_folder(out)?;
+        }
+        let spec = self.spec()?;
+        let (bundle, options) = (self.model.bundle()?, self.model.options()?);
+        let bar = progress::bar("sweep");
+        let table = match &self.to {
+            None => sweep::run(&spec, &bundle, &options, &|p| report(&bar, p)).map_err(Failure::from),
+            Some(uri) => {
+                if !(self.deadline > 0.0 && self.deadline < 1e6) {
+                    return Err(Failure::bad("--deadline", "a time above 0 s", self.deadline.to_string()));
+                }
+                let deadline = Duration::from_secs_f64(self.deadline);
+                Client::connect(uri, deadline)
+                    .and_then(|mut client| client.sweep(&spec, &bundle, &options, &mut |p| report(&bar, p)))
+                    .map_err(|e| if interrupt::asked() { Failure::Interrupted } else { e.into() })
+            }
+        };
+        bar.finish_and_clear();
+        let table = table?;
+        self.deliver(&table)?;
+        eprintln!("{}", summary(&table, spec.shard));
+        match table.rows.iter().find_map(|row| row.values.as_ref().err()) {
+            Some(first) if table.failed() == table.rows.len() => Err(Failure::AllPoints(first.trim_end().to_owned())),
+            _ => Ok(()),
+        }
+    }
+
+    fn spec(&self) -> Result<SweepSpec, Failure> {
+        let parameters = self.parameters.iter().map(|text| text.parse()).collect::<Result<Vec<SweepParameter>, _>>()?;
+        let analysis = match self.analysis {
+            Analysis::Static => {
+                SweepAnalysis::Static { outputs: value::names(&self.signals), voltages: self.ports.clone() }
+            }
+            Analysis::Modes if self.count == 0 => return Err(Failure::bad("--count", "at least one mode", "0")),
+            Analysis::Modes => SweepAnalysis::Modes { count: self.count, voltages: self.ports.clone() },
+            Analysis::Pullin => SweepAnalysis::PullIn { port: self.source.clone(), max: self.max },
+        };
+        let spec = SweepSpec { parameters, analysis, shard: self.shard.parse::<Shard>()?, threads: self.threads };
+        spec.point_numbers()?;
+        Ok(spec)
+    }
+
+    fn deliver(&self, table: &SweepTable) -> Result<(), Failure> {
+        let text = table.to_csv();
+        // A table in which no point has a result is no result: nothing is written.
+        if !table.rows.is_empty() && table.failed() == table.rows.len() {
+            return Ok(());
+        }
+        match &self.out {
+            Some(path) => atomic::write(path, |out| out.write_all(text.as_bytes()))
+                .map_err(|source| Failure::Write { path: path.clone(), source }),
+            None => print(&text),
+        }
+    }
+}
+
+fn report(bar: &indicatif::ProgressBar, progress: SweepProgress) -> bool {
+    bar.set_length(progress.points);
+    bar.set_position(progress.done);
+    !interrupt::asked()
+}
+
+fn summary(table: &SweepTable, shard: Shard) -> String {
+    let mut text = format!("{} points", table.rows.len());
+    if shard.count > 1 {
+        text += &format!(" (shard {}/{})", shard.index, shard.count);
+    }
+    match table.failed() {
+        0 => text,
+        failed => text + &format!(", {failed} without a result: see the column \"error\""),
+    }
+}
