@@ -63,8 +63,6 @@ pub(crate) mod code {
     pub(crate) const PARMVAL: c_int = 11;
     /// Newton's iteration limit: the step or the operating point is tried again by other means.
     pub(crate) const ITERLIM: c_int = 103;
-    /// Ends a transient analysis at once, without further attempts at shorter steps.
-    pub(crate) const ABORT_TRAN: c_int = 1111;
 }
 
 /// Slots of the host's function table. These have the same place from ngspice 39 to 47.

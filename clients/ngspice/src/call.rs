@@ -105,12 +105,17 @@ impl Call<'_> {
     }
 
     /// What is asked. Analyses that leave the kind of the one before them show as transients in which no time
-    /// passes; they want an operating point.
-    pub(crate) fn question(&self) -> Question {
+    /// passes; they want an operating point. `delta` is the circuit's step [s]: the difference of the two times is
+    /// the same up to their rounding.
+    pub(crate) fn question(&self, delta: f64) -> Question {
         let c = self.circuit;
+        let dt = c.t[0] - c.t[1];
         match c.anal_type {
             analysis::AC => Question::SmallSignal { omega: c.frequency },
-            analysis::TRAN if c.t[0] > c.t[1] => Question::Transient { t: c.time, dt: c.t[0] - c.t[1] },
+            analysis::TRAN if dt > 0.0 && (dt - delta).abs() <= 4.0 * f64::EPSILON * c.t[0] => {
+                Question::Transient { t: c.time, dt: delta }
+            }
+            analysis::TRAN if dt > 0.0 => Question::Transient { t: c.time, dt },
             _ => Question::Static,
         }
     }

@@ -9,12 +9,15 @@ use crate::history::{self, History};
 use crate::instance::{Instance, Outcome, Question};
 use crate::model_card::ModelCard;
 use crate::table::LAYOUT;
-use crate::{host, opener, trace};
+use crate::{host, opener, panics, trace};
 use std::ffi::{c_int, c_void};
 use std::io::Write;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// Where a circuit keeps its present step [byte].
+const CIRCUIT_DELTA: usize = 88;
 
 /// An instance with what its calls reuse.
 struct Entry {
@@ -25,24 +28,19 @@ struct Entry {
     previous: History,
 }
 
-/// What a load came to, over all instances.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Verdict {
-    Good,
-    Retry,
-    Stop,
-}
-
 struct Registry {
     entries: Vec<Entry>,
     epochs: u64,
-    verdict: Verdict,
-    transient: bool,
+    /// The step the circuit takes in this load [s].
+    delta: f64,
+    /// Whether every instance has answered in this load.
+    good: bool,
+    /// Set when the analysis must end: no device is asked any more.
     stopped: bool,
 }
 
 static REGISTRY: Mutex<Registry> =
-    Mutex::new(Registry { entries: Vec::new(), epochs: 0, verdict: Verdict::Good, transient: false, stopped: false });
+    Mutex::new(Registry { entries: Vec::new(), epochs: 0, delta: 0.0, good: true, stopped: false });
 
 fn registry() -> MutexGuard<'static, Registry> {
     REGISTRY.lock().unwrap_or_else(PoisonError::into_inner)
@@ -223,20 +221,22 @@ fn close(key: usize) {
     trace::flush();
 }
 
-/// Loads the matrix: the host calls [`evaluate`] for each instance, and the worst outcome is the load's.
+/// Loads the matrix: the host calls [`evaluate`] for each instance.
+///
+/// Where one has no answer this ends Newton's iteration, and ngspice tries a shorter step or another way to the
+/// operating point. Once an instance has stopped the analysis, none of these succeeds and ngspice gives up. (The code
+/// that ends a transient at once would make ngspice report success.)
 pub(crate) unsafe extern "C" fn load(model: *mut Model, circuit: *mut c_void) -> c_int {
     guarded(|| {
-        registry().verdict = Verdict::Good;
+        {
+            let mut registry = registry();
+            registry.good = true;
+            // SAFETY: the step stands at this place of the circuit from 39 to 47.
+            registry.delta = unsafe { *circuit.cast::<u8>().add(CIRCUIT_DELTA).cast::<f64>() };
+        }
         // SAFETY: passed on; the registry is not locked while the host calls back.
         let result = unsafe { host::load(model, circuit) };
-        let registry = registry();
-        match registry.verdict {
-            Verdict::Good => result,
-            // Ends this Newton iteration only: shorter step, or another way to the operating point.
-            Verdict::Retry => code::ITERLIM,
-            Verdict::Stop if registry.transient => code::ABORT_TRAN,
-            Verdict::Stop => code::PANIC,
-        }
+        if registry().good { result } else { code::ITERLIM }
     })
 }
 
@@ -269,47 +269,40 @@ pub(crate) unsafe extern "C" fn accept(_circuit: *mut c_void, _model: *mut Model
 
 /// The model: one call for one instance.
 pub(crate) unsafe extern "C" fn evaluate(data: *mut c_void) {
-    let body = || {
-        let Some(layout) = LAYOUT.get() else { return };
+    let outcome = catch_unwind(AssertUnwindSafe(|| {
+        let layout = LAYOUT.get()?;
         // SAFETY: the host passes the data of this call, in its layout.
         let call = unsafe { Call::new(data, layout) };
         let mut registry = registry();
-        let (outcome, transient) = respond(&call, &mut registry);
-        registry.transient = transient;
-        registry.verdict = registry.verdict.max(match &outcome {
-            Outcome::Solved => Verdict::Good,
-            Outcome::Retry => Verdict::Retry,
-            Outcome::Stop(_) => Verdict::Stop,
-        });
-        if let Outcome::Stop(text) = outcome
-            && !std::mem::replace(&mut registry.stopped, true)
-        {
-            drop(registry);
-            record_failure(&text);
-            trace::line(format_args!("stop: {text}"));
-            trace::flush();
-            // SAFETY: this is within a load.
-            unsafe { host::message(&format!("Error: bimorph: {text}")) };
+        if registry.stopped {
+            registry.good = false;
+            return None;
         }
+        Some(respond(&call, &mut registry))
+    }));
+    let outcome = match outcome {
+        Ok(None) | Ok(Some(Outcome::Solved)) => return,
+        Ok(Some(outcome)) => outcome,
+        Err(_) => Outcome::Stop(format!("internal error: {}; please report it", panics::last())),
     };
-    if catch_unwind(AssertUnwindSafe(body)).is_err() {
-        let mut registry = registry();
-        registry.verdict = Verdict::Stop;
-        if !std::mem::replace(&mut registry.stopped, true) {
-            drop(registry);
-            // SAFETY: this is within a load.
-            let _ = catch_unwind(|| unsafe { host::message("Error: bimorph: internal error (panic)") });
-        }
+    registry().good = false;
+    if let Outcome::Stop(text) = outcome {
+        registry().stopped = true;
+        record_failure(&text);
+        trace::line(format_args!("stop: {text}"));
+        trace::flush();
+        // SAFETY: this is within a load.
+        unsafe { host::message(&format!("Error: bimorph: {text}")) };
     }
 }
 
-/// Answers a call; tells whether it was one of a transient.
-fn respond(call: &Call<'_>, registry: &mut Registry) -> (Outcome, bool) {
-    let question = call.question();
-    let transient = matches!(question, Question::Transient { .. });
+/// Answers a call.
+fn respond(call: &Call<'_>, registry: &mut Registry) -> Outcome {
+    let delta = registry.delta;
     let Some(entry) = registry.entries.iter_mut().find(|e| e.key == call.key()) else {
-        return (Outcome::Stop("an instance was not set up".into()), transient);
+        return Outcome::Stop("an instance was not set up".into());
     };
+    let question = call.question(delta);
     let ports = call.size(PORTS);
     let doubles = history::len(ports);
     if call.init() {
@@ -320,7 +313,7 @@ fn respond(call: &Call<'_>, registry: &mut Registry) -> (Outcome, bool) {
     // SAFETY: this is within a load; the memory has the size that was reserved.
     let recalled = unsafe { host::memory(from).as_ref().map(|m| std::slice::from_raw_parts(m, doubles)) };
     let Some(recalled) = recalled else {
-        return (Outcome::Stop("ngspice gave no state memory".into()), transient);
+        return Outcome::Stop("ngspice gave no state memory".into());
     };
     history::read(recalled, entry.epoch, &mut entry.previous);
     call.voltages(&mut entry.voltages);
@@ -334,7 +327,7 @@ fn respond(call: &Call<'_>, registry: &mut Registry) -> (Outcome, bool) {
     if trace::on() {
         trace_call(entry, question, &outcome);
     }
-    (outcome, transient)
+    outcome
 }
 
 fn write_answer(call: &Call<'_>, entry: &Entry, doubles: usize) {

@@ -19,8 +19,11 @@ unsafe impl Send for List {}
 /// Number of devices.
 #[unsafe(no_mangle)]
 pub(crate) extern "C" fn CMdevNum() -> *const c_int {
-    // SAFETY: the host calls this while it loads the plug-in.
-    let _ = catch_unwind(|| unsafe { DEVICE.declare() });
+    let _ = catch_unwind(|| {
+        crate::panics::keep_quiet();
+        // SAFETY: the host calls this while it loads the plug-in.
+        unsafe { DEVICE.declare() }
+    });
     &raw const DEVICE_COUNT
 }
 

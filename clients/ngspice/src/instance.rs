@@ -13,6 +13,9 @@ use bimorph::device::{
 /// How often in a row a step or an operating point may fail before the analysis ends. Each attempt of a transient is
 /// eight times shorter than the one before it.
 const ATTEMPTS: u32 = 4;
+/// A step that fails although it is shorter than this share of the longest one taken is hopeless, too [1]: the steps
+/// are creeping up to a point beyond which there is no answer.
+const HOPELESS: f64 = 1e-4;
 
 /// What ngspice asks.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -76,6 +79,7 @@ pub struct Instance {
     accepted: Option<Token>,
     step_bound: f64,
     failures: u32,
+    longest: f64,
 }
 
 impl Instance {
@@ -112,6 +116,7 @@ impl Instance {
             accepted: None,
             step_bound: f64::INFINITY,
             failures: 0,
+            longest: 0.0,
         })
     }
 
@@ -190,20 +195,23 @@ impl Instance {
         if let Err(error) = result {
             return Outcome::Stop(error.to_string());
         }
+        let step = dt.unwrap_or(0.0);
         let why = match &self.reply.status {
             Status::Ok => {
                 self.failures = 0;
+                self.longest = self.longest.max(step);
                 self.step_bound = if dt.is_some() { self.reply.dt_next } else { f64::INFINITY };
                 self.fill(dt, previous);
                 return Outcome::Solved;
             }
-            // The host shortens the step and will ask again; its own limit ends a hopeless search.
-            Status::NeedDt(_) if dt.is_some() => return Outcome::Retry,
-            Status::NeedDt(bound) => format!("an equilibrium does not depend on a step of {bound:e} s"),
+            // The host shortens the step and asks again, by as much as it takes.
+            Status::NeedDt(_) if step > HOPELESS * self.longest => return Outcome::Retry,
+            Status::NeedDt(bound) => format!("the model needs steps below {bound:e} s, and even {step:e} s is too long"),
             Status::Fail(why) => why.clone(),
         };
         self.failures += 1;
-        if self.failures < ATTEMPTS { Outcome::Retry } else { Outcome::Stop(why) }
+        let hopeless = dt.is_some() && step <= HOPELESS * self.longest;
+        if self.failures < ATTEMPTS && !hopeless { Outcome::Retry } else { Outcome::Stop(why) }
     }
 
     /// Turns the reply into what ngspice wants; charges into currents where time passes.

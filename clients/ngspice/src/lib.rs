@@ -31,6 +31,7 @@ pub mod instance;
 pub mod layout;
 pub mod model_card;
 pub mod opener;
+mod panics;
 pub mod settings;
 mod table;
 mod trace;
