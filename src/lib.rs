@@ -12,6 +12,7 @@
 
 pub mod analysis;
 pub mod compile;
+pub mod cosim;
 pub mod device;
 pub mod jobs;
 pub mod netlist;
