@@ -96,6 +96,7 @@ fn contents(s: &Structure) -> String {
 
 fn shown(name: &str, value: &Setting) -> String {
     match value {
+        Setting::Number(x) if *x == 0.0 || (1e-2..1e4).contains(&x.abs()) => format!("{name} = {x}"),
         Setting::Number(x) => format!("{name} = {x:e}"),
         Setting::Text(text) => format!("{name} = \"{text}\""),
     }

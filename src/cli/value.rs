@@ -3,17 +3,19 @@
 use bimorph::jobs::sweep::parse;
 use bimorph::netlist::Setting;
 
-/// A number with an optional suffix: `30u`, `1.2e6`, `-5`.
+/// A number as netlists write it, with an optional suffix: `30u`, `1.2e6`, `-5`, `2*pi`.
 pub(crate) fn number(text: &str) -> Result<f64, String> {
-    parse::number(text.trim())
-        .ok_or_else(|| format!("expected a number such as 2.1u, 30n or 1.2e6 (m milli, M mega), got \"{text}\""))
+    match parse::number(text.trim()).map_or_else(|| Setting::parse(text).ok(), |x| Some(Setting::Number(x))) {
+        Some(Setting::Number(value)) if value.is_finite() => Ok(value),
+        _ => Err(format!("expected a number such as 2.1u, 30n or 1.2e6 (m milli, M mega), got \"{text}\"")),
+    }
 }
 
-/// `NAME=VALUE`; a value that is no number is text.
+/// `NAME=VALUE`; the value is a number, an expression of numbers, or text.
 pub(crate) fn setting(text: &str) -> Result<(String, Setting), String> {
     let (name, value) = pair(text)?;
-    let value = parse::number(&value).map_or(Setting::Text(value), Setting::Number);
-    Ok((name, value))
+    let value = number(&value).map_or_else(|_| Setting::parse(&value), |x| Ok(Setting::Number(x)));
+    Ok((name, value.map_err(|_| format!("expected a number or a text as value, got \"{text}\""))?))
 }
 
 /// `NAME=VOLTS`.
@@ -24,9 +26,7 @@ pub(crate) fn volts(text: &str) -> Result<(String, f64), String> {
 
 fn pair(text: &str) -> Result<(String, String), String> {
     match text.split_once('=').map(|(name, value)| (name.trim(), value.trim())) {
-        Some((name, value)) if !name.is_empty() && !value.is_empty() => {
-            Ok((name.to_owned(), value.trim_matches('"').to_owned()))
-        }
+        Some((name, value)) if !name.is_empty() && !value.is_empty() => Ok((name.to_owned(), value.to_owned())),
         _ => Err(format!("expected NAME=VALUE, got \"{text}\"")),
     }
 }
@@ -65,6 +65,7 @@ mod tests {
         assert_eq!(setting("w=2.1u"), Ok(("w".into(), Setting::Number(2.1e-6))));
         assert_eq!(setting("layer=\"p2\""), Ok(("layer".into(), Setting::Text("p2".into()))));
         assert_eq!(volts("heat=-500m"), Ok(("heat".into(), -0.5)));
+        assert_eq!(setting("oz=pi/4"), Ok(("oz".into(), Setting::Number(std::f64::consts::FRAC_PI_4))));
         assert!(volts("heat=ten").is_err() && setting("w").is_err() && setting("=1").is_err());
         assert_eq!(names(&["a.x, D(1,2).y".into(), "b.x".into()]), ["a.x", "D(1,2).y", "b.x"]);
     }

@@ -213,11 +213,23 @@ fn draw_lines(picture: &mut Picture, structure: &Structure, motion: &[Motion], v
 
 fn draw_ports(picture: &mut Picture, structure: &Structure, view: &View) {
     for port in &structure.ports {
-        let [x, y] = view.at(structure.nodes[port.plus.0].position);
-        picture.circle(x, y, 4.5, Paint { fill: "#ffffff", stroke: "#D55E00", width: 2.0, opacity: 1.0 });
-        let (align, shift) = if x > WIDTH - 140.0 { (Align::End, -9.0) } else { (Align::Start, 9.0) };
-        picture.text(x + shift, y - 8.0, 13.0, align, "#D55E00", &port.name);
+        for node in places(structure, port.plus) {
+            let [x, y] = view.at(structure.nodes[node.0].position);
+            picture.circle(x, y, 4.5, Paint { fill: "#ffffff", stroke: "#D55E00", width: 2.0, opacity: 1.0 });
+            let (align, shift) = if x > WIDTH - 140.0 { (Align::End, -9.0) } else { (Align::Start, 9.0) };
+            picture.text(x + shift, y - 8.0, 13.0, align, "#D55E00", &port.name);
+        }
     }
+}
+
+/// Where a port touches the mechanism: its own node, or the far ends of the resistors (wires) that start at it.
+fn places(structure: &Structure, node: NodeId) -> Vec<NodeId> {
+    let drawn = |id: &NodeId| structure.nodes[id.0].mechanical;
+    if drawn(&node) {
+        return vec![node];
+    }
+    let other_end = |a: NodeId, b: NodeId| if a == node { Some(b) } else { (b == node).then_some(a) };
+    structure.resistors.iter().filter_map(|r| other_end(r.a, r.b)).filter(drawn).collect()
 }
 
 fn legend(picture: &mut Picture, drawing: &Drawing<'_>, factor: f64, hot: Option<&(String, f64)>, scale: f64, y: f64) {

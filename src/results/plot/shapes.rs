@@ -74,28 +74,30 @@ pub fn rectangle(origin: Point, angle: f64, along: [f64; 2], across: [f64; 2]) -
 
 /// Rectangles of a comb, first those of the rotor, then those of the stator.
 ///
-/// The netlist says overlap, gap and number of gaps, not how long or wide a finger is: fingers are drawn twice as long
-/// as they overlap and as wide as their gap.
+/// The roots of the two sides are two finger lengths less the overlap apart, which gives the length. How wide a finger
+/// is the netlist does not say: it is drawn as wide as its gap.
 pub fn comb_outlines(structure: &Structure, comb: &Comb, motion: &[Motion]) -> (Vec<Vec<Point>>, Vec<Vec<Point>>) {
     let (rotor, turn) = moved(structure, comb.a.0, motion);
+    let (stator, _) = moved(structure, comb.b.0, &[]);
     let rest = structure.nodes[comb.a.0].position;
+    let apart = (stator[0] - rest[0]) * comb.axis[0] + (stator[1] - rest[1]) * comb.axis[1];
+    let length = ((apart + comb.overlap) / 2.0).max(comb.gap);
     let angle = comb.axis[1].atan2(comb.axis[0]);
-    let overlap = if comb.overlap > 0.0 { comb.overlap } else { 4.0 * comb.gap };
-    let finger = comb.gap;
-    let pitch = 2.0 * (comb.gap + finger);
+    let width = comb.gap;
+    let pitch = 2.0 * (comb.gap + width);
     let fingers = ((comb.gaps / 2.0).ceil().max(1.0) as usize).min(60);
     let half = pitch * fingers as f64 / 2.0;
-    let back = finger * 2.0;
+    let back = 2.0 * width;
 
     let mut moving = vec![rectangle(rotor, angle + turn, [-back, 0.0], [-half, half])];
-    let mut fixed = vec![rectangle(rest, angle, [3.0 * overlap, 3.0 * overlap + back], [-half - pitch / 2.0, half])];
+    let mut fixed = vec![rectangle(stator, angle, [0.0, back], [-half - width, half + width])];
     for k in 0..=fingers {
-        let y = -half + pitch * (k as f64 - 0.5) + pitch / 2.0 - finger / 2.0;
+        let edge = -half + pitch * k as f64;
+        fixed.push(rectangle(stator, angle, [-length, 0.0], [edge - width / 2.0, edge + width / 2.0]));
         if k < fingers {
-            let y = y + pitch / 2.0;
-            moving.push(rectangle(rotor, angle + turn, [0.0, 2.0 * overlap], [y, y + finger]));
+            let middle = edge + pitch / 2.0;
+            moving.push(rectangle(rotor, angle + turn, [0.0, length], [middle - width / 2.0, middle + width / 2.0]));
         }
-        fixed.push(rectangle(rest, angle, [overlap, 3.0 * overlap], [y, y + finger]));
     }
     (moving, fixed)
 }
