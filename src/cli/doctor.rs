@@ -4,7 +4,9 @@ use super::failure::Failure;
 use super::output::print;
 use bimorph::analysis::statics::static_equilibrium;
 use bimorph::compile::{CompileOptions, compile};
+use bimorph::cosim::{self, CosimOptions, find_ngspice, find_plugin};
 use bimorph::netlist::Bundle;
+use bimorph::results::raw;
 use bimorph::service::address::Address;
 use bimorph::service::client::Client;
 use bimorph::service::limits::Limits;
@@ -29,6 +31,15 @@ const CANTILEVER: &str = "process p = [Youngsmodulus=165e9 Poisson=0.3 density=2
 /// Its tip by F·l³/(3·E·I) [m].
 const TIP: f64 = 1e-6 * 1e-12 / (3.0 * 165e9 * (2e-6 * 8e-18 / 12.0));
 
+/// A plate on a spring of 1 N/m, 2 µm above its electrode.
+const PLATE: &str = "anchor * [f] [l=1u w=1u h=1u]\nmass2d * [m] [m=1e-10]\nguide2d * [m] []\n\
+                     spring2d * [f m] [kx=1]\nanchor * [e] [l=1u w=1u h=1u]\n\
+                     plategap2d * [m e] [A=1e-8 gap=2u]\neground * [e] []\ndrive port * [m] []\n";
+
+/// One volt across it; its motion in nanometres.
+const DECK: &str = "* doctor\n.model plate bimorph(file=\"plate.net\" ports=[\"drive\"] monitors=[\"m.x:1e9\"])\n\
+                    V1 drive 0 1\nA1 %gd [drive 0] %v [x] plate\n.op\n.end\n";
+
 /// Longest wait for a server on this machine.
 const PATIENCE: Duration = Duration::from_secs(10);
 
@@ -38,7 +49,7 @@ impl Doctor {
         let core = core();
         line("core", &core, "reinstall bimorph; the build is broken")?;
         line("ngspice", &ngspice(), "install it: apt-get install ngspice (39 or later)")?;
-        line("plug-in", &plugin(), "build it: cargo build --release -p bimorph-ngspice, or set BIMORPH_PLUGIN")?;
+        line("plug-in", &plugin(), "build it: cargo build --release -p bimorph-ngspice, or name it in BIMORPH_CM")?;
         line("server", &server(), "check that sockets can be made in the temporary folder")?;
         line("python", &python(), "install the client: pip install ./clients/python")?;
         core.map(|_| ()).map_err(|_| Failure::Doctor)
@@ -73,10 +84,35 @@ fn core() -> Result<String, String> {
 }
 
 fn ngspice() -> Result<String, String> {
-    let answer = Command::new("ngspice").arg("--version").output().map_err(|e| format!("not found: {e}"))?;
+    let program = find_ngspice().ok_or_else(|| "not in PATH".to_owned())?;
+    let answer = Command::new(&program).arg("--version").output();
+    let answer = answer.map_err(|e| format!("{} does not start: {e}", program.display()))?;
     let text = String::from_utf8_lossy(&answer.stdout);
     let version = text.split_whitespace().find_map(|word| word.strip_prefix("ngspice-"));
-    version.map(|v| format!("version {v}")).ok_or_else(|| "does not say its version".to_owned())
+    version.map_or(Err(format!("{} does not say its version", program.display())), |v| {
+        Ok(format!("{v} ({})", program.display()))
+    })
+}
+
+/// A plate on a spring in an ngspice deck.
+fn plugin() -> Result<String, String> {
+    let plugin = find_plugin().map_err(|_| "not found beside this program".to_owned())?;
+    let folder = std::env::temp_dir().join(format!("bimorph-doctor-{}", std::process::id()));
+    let run = || -> Result<f64, String> {
+        let (deck, raw) = (folder.join("plate.cir"), folder.join("plate.raw"));
+        std::fs::create_dir(&folder).map_err(|e| e.to_string())?;
+        std::fs::write(folder.join("plate.net"), PLATE).map_err(|e| e.to_string())?;
+        std::fs::write(&deck, DECK).map_err(|e| e.to_string())?;
+        let options = CosimOptions { deck, raw: Some(raw.clone()), capture: true, ..CosimOptions::default() };
+        cosim::run(&options).map_err(|e| e.to_string())?;
+        let bytes = std::fs::read(raw).map_err(|e| e.to_string())?;
+        let plots = raw::read(&bytes).map_err(|e| e.to_string())?;
+        let x = plots.first().and_then(|plot| plot.column("v(x)")).map(|column| column.samples.magnitudes());
+        x.and_then(|x| x.first().copied()).ok_or_else(|| "ngspice wrote no operating point".to_owned())
+    };
+    let moved = run();
+    let _ = std::fs::remove_dir_all(&folder);
+    moved.map(|x| format!("loads; 1 V moves a plate by {x:.4} nm ({})", plugin.display()))
 }
 
 /// A server in this process, asked over a Unix socket for the same cantilever.
@@ -121,8 +157,4 @@ fn python() -> Result<String, String> {
     } else {
         Err("the package bimorph is not installed for python3".to_owned())
     }
-}
-
-fn plugin() -> Result<String, String> {
-    Err("not looked for".to_owned())
 }

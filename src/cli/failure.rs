@@ -2,6 +2,7 @@
 
 use bimorph::analysis::AnalysisError;
 use bimorph::compile::CompileError;
+use bimorph::cosim::CosimError;
 use bimorph::jobs::sweep::SweepError;
 use bimorph::results::format::UnknownFormat;
 use bimorph::results::plot::render::RenderError;
@@ -50,6 +51,8 @@ pub(crate) enum Failure {
     #[error(transparent)]
     Client(#[from] ClientError),
     #[error(transparent)]
+    Cosim(#[from] CosimError),
+    #[error(transparent)]
     Serve(#[from] ServeError),
     #[error(transparent)]
     Address(#[from] AddressError),
@@ -67,6 +70,12 @@ impl Failure {
                 eprint!("{}", diagnostics.render(io::stderr().is_terminal()));
             }
             _ if self.is_broken_pipe() => {}
+            Self::Cosim(error) => {
+                eprintln!("error: {}", error.to_string().trim_end());
+                if let Some(words) = super::cosim::last_words(error) {
+                    eprintln!("ngspice's last words:\n{words}");
+                }
+            }
             _ => eprintln!("error: {self}"),
         }
     }

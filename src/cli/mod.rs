@@ -4,6 +4,7 @@
 //! only then prints to standard output, so that a failure leaves standard output empty and no file behind.
 
 mod check;
+mod cosim;
 mod doctor;
 mod failure;
 mod interrupt;
@@ -42,6 +43,7 @@ enum Command {
     Modes(modes::Modes),
     Pullin(pull_in::Pullin),
     Tran(tran::Tran),
+    Cosim(cosim::Cosim),
     Serve(serve::Serve),
     Sweep(sweep::Sweep),
     Plot(plot::Plot),
@@ -57,6 +59,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Modes(command) => command.run(),
         Command::Pullin(command) => command.run(),
         Command::Tran(command) => command.run(),
+        Command::Cosim(command) => command.run(),
         Command::Serve(command) => command.run(),
         Command::Sweep(command) => command.run(),
         Command::Plot(command) => command.run(),

@@ -2,7 +2,7 @@
 
 use super::failure::Failure;
 use super::output::{check_folder, write};
-use super::{statics, value};
+use super::{interrupt, statics, value};
 use bimorph::analysis::statics::static_equilibrium;
 use bimorph::compile::{CompileOptions, compile};
 use bimorph::netlist::{Bundle, Setting};
@@ -57,48 +57,13 @@ pub(crate) struct Plot {
 
 impl Plot {
     pub(crate) fn run(&self) -> Result<(), Failure> {
+        interrupt::listen();
         let format = Format::from_path(&self.out)?;
         check_folder(&self.out)?;
-        let table = self.read()?;
-        let picture = self.picture(&table)?;
-        write(&self.out, format, || Ok(table), || Ok(picture))
-    }
-
-    fn read(&self) -> Result<Table, Failure> {
-        let path = self.file.clone();
-        let bytes = std::fs::read(&path).map_err(|source| Failure::Read { path: path.clone(), source })?;
-        let plots = raw::read(&bytes).map_err(|source| Failure::Raw { path: path.clone(), source })?;
-        let count = plots.len();
-        let chosen = match self.plot {
-            Some(number) => plots.into_iter().nth(number.wrapping_sub(1)),
-            None => plots.into_iter().reduce(|best, next| if next.rows() > best.rows() { next } else { best }),
-        };
-        let got = || match self.plot {
-            Some(number) => format!("{number}; {} holds {count}", path.display()),
-            None => format!("none: {} is empty", path.display()),
-        };
-        chosen.ok_or_else(|| Failure::bad("--plot", "the number of a plot in the file", got()))
-    }
-
-    fn picture(&self, table: &Table) -> Result<Picture, Failure> {
-        let columns = table.columns();
-        let panels = if self.panels.is_empty() {
-            by_unit(columns.get(1..).unwrap_or_default())
-        } else {
-            self.panels.iter().map(|text| panel(text, table)).collect::<Result<_, _>>()?
-        };
-        let first = columns.first();
-        let mut pictures = vec![chart::draw(&Chart {
-            title: self.title.clone().unwrap_or_else(|| table.title.clone()),
-            x_name: first.map(|c| c.name.clone()).unwrap_or_default(),
-            x_unit: first.map(|c| c.unit.clone()).unwrap_or_default(),
-            x: first.map(|c| c.samples.magnitudes()).unwrap_or_default(),
-            panels,
-        })];
-        if let Some(netlist) = &self.mechanism {
-            pictures.push(self.mechanism(netlist)?);
-        }
-        Ok(stack(&pictures))
+        let table = longest(&self.file, self.plot)?;
+        let chart = chart_of(&table, self.title.as_deref(), &self.panels)?;
+        let mechanism = self.mechanism.as_deref().map(|netlist| self.mechanism(netlist)).transpose()?;
+        write(&self.out, format, || Ok(table), || Ok(stack(&[vec![chart], mechanism.into_iter().collect()].concat())))
     }
 
     fn mechanism(&self, netlist: &Path) -> Result<Picture, Failure> {
@@ -110,6 +75,40 @@ impl Plot {
         let title = if volts.is_empty() { name } else { format!("{name} at {}", volts.join(", ")) };
         Ok(statics::picture(&compiled, &title, &result))
     }
+}
+
+/// One plot of a raw file: that number, from 1, or the longest.
+pub(crate) fn longest(path: &Path, number: Option<usize>) -> Result<Table, Failure> {
+    let bytes = std::fs::read(path).map_err(|source| Failure::Read { path: path.to_owned(), source })?;
+    let plots = raw::read(&bytes).map_err(|source| Failure::Raw { path: path.to_owned(), source })?;
+    let count = plots.len();
+    let chosen = match number {
+        Some(number) => plots.into_iter().nth(number.wrapping_sub(1)),
+        None => plots.into_iter().reduce(|best, next| if next.rows() > best.rows() { next } else { best }),
+    };
+    let got = || match number {
+        Some(number) => format!("{number}; {} holds {count}", path.display()),
+        None => format!("none: {} is empty", path.display()),
+    };
+    chosen.ok_or_else(|| Failure::bad("--plot", "the number of a plot in the file", got()))
+}
+
+/// The chart of a table; without panels one for each unit.
+pub(crate) fn chart_of(table: &Table, title: Option<&str>, panels: &[String]) -> Result<Picture, Failure> {
+    let columns = table.columns();
+    let panels = if panels.is_empty() {
+        by_unit(columns.get(1..).unwrap_or_default())
+    } else {
+        panels.iter().map(|text| panel(text, table)).collect::<Result<_, _>>()?
+    };
+    let first = columns.first();
+    Ok(chart::draw(&Chart {
+        title: title.unwrap_or(&table.title).to_owned(),
+        x_name: first.map(|c| c.name.clone()).unwrap_or_default(),
+        x_unit: first.map(|c| c.unit.clone()).unwrap_or_default(),
+        x: first.map(|c| c.samples.magnitudes()).unwrap_or_default(),
+        panels,
+    }))
 }
 
 /// One panel for each unit, in order of appearance.

@@ -1,0 +1,100 @@
+//! `bimorph cosim`: a circuit with mechanisms in it.
+
+use super::failure::Failure;
+use super::output::{check_folder, write};
+use super::plot::{chart_of, longest};
+use super::{interrupt, progress};
+use bimorph::cosim::{CosimError, CosimOptions, run};
+use bimorph::results::format::Format;
+use clap::Args;
+use std::path::PathBuf;
+use std::time::Instant;
+
+/// Run ngspice on a deck with the plug-in loaded.
+///
+/// ngspice's own output is passed on. It runs in the working directory, as it always does; netlists named by a deck are
+/// found beside it. Nothing is written under the name of --out unless the run is good.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  bimorph cosim bank.cir --out bank.raw\n  \
+    bimorph cosim bank.cir --out bank.png              every voltage and current of the deck's analysis\n  \
+    bimorph cosim bank.cir --remote unix:///tmp/bimorph.sock --out bank.raw\n\n\
+    A device in a deck:\n  \
+    .model bank bimorph(file=\"bank.net\" ports=[\"heat\" \"sense\"] monitors=[\"yoke.y:1e6\"])\n  \
+    A1 %gd [heat 0 sense 0] %v [y] bank")]
+pub(crate) struct Cosim {
+    /// ngspice deck
+    deck: PathBuf,
+
+    /// Step every model of the deck on a server: unix:///path or http://host:port [default: as the deck says]
+    #[arg(long, value_name = "URI")]
+    remote: Option<String>,
+
+    /// Write the waveforms: .raw, .csv, .svg, .png or .html
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+
+    /// Do not pass ngspice's output on
+    #[arg(long, short)]
+    quiet: bool,
+
+    /// ngspice program [default: the first in PATH]
+    #[arg(long, value_name = "PATH", env = "NGSPICE")]
+    ngspice: Option<PathBuf>,
+
+    /// The plug-in [default: beside this program]
+    #[arg(long, value_name = "PATH", env = "BIMORPH_CM")]
+    plugin: Option<PathBuf>,
+}
+
+impl Cosim {
+    pub(crate) fn run(&self) -> Result<(), Failure> {
+        let format = self.out.as_deref().map(Format::from_path).transpose()?;
+        if let Some(out) = &self.out {
+            check_folder(out)?;
+        }
+        interrupt::listen();
+        let raw = match (&self.out, format) {
+            (Some(out), Some(Format::Raw)) => Some(out.clone()),
+            (Some(out), Some(_)) => Some(out.with_extension(format!("{}.raw", std::process::id()))),
+            _ => None,
+        };
+        let options = CosimOptions {
+            deck: self.deck.clone(),
+            remote: self.remote.clone(),
+            raw: raw.clone(),
+            ngspice: self.ngspice.clone(),
+            plugin: self.plugin.clone(),
+            capture: self.quiet,
+        };
+        let busy = self.quiet.then(|| progress::spinner("ngspice"));
+        let start = Instant::now();
+        // Ctrl-C reaches ngspice too, which ends; what it leaves behind is cleared away before this process goes.
+        interrupt::asked();
+        let report = run(&options);
+        if let Some(busy) = busy {
+            busy.finish_and_clear();
+        }
+        let report = match report {
+            Err(_) if interrupt::asked() => return Err(Failure::Interrupted),
+            other => other?,
+        };
+        eprintln!("{}: done in {:.2} s", self.deck.display(), start.elapsed().as_secs_f64());
+        let (Some(out), Some(format), Some(raw)) = (&self.out, format, report.raw) else { return Ok(()) };
+        if format == Format::Raw {
+            return Ok(());
+        }
+        let drawn = longest(&raw, None).and_then(|table| {
+            let picture = chart_of(&table, None, &[]);
+            write(out, format, || Ok(table), || picture)
+        });
+        let _ = std::fs::remove_file(&raw);
+        drawn
+    }
+}
+
+/// What ngspice said before it failed, where it was kept and the message alone does not tell.
+pub(crate) fn last_words(error: &CosimError) -> Option<String> {
+    let (CosimError::Failed { output, .. } | CosimError::Stopped { output, .. }) = error else { return None };
+    let lines: Vec<&str> = output.lines().filter(|line| !line.trim().is_empty()).collect();
+    (!lines.is_empty()).then(|| lines[lines.len().saturating_sub(6)..].join("\n"))
+}
