@@ -3,6 +3,8 @@
 
 use super::drawing::{Drawing, Fact};
 use super::sink::Sink;
+use super::suggest::did_you_mean;
+use super::value::short;
 use crate::structure::{GapVoltage, NodeId, Structure};
 
 /// So many loose parts or floating nodes are told one by one.
@@ -25,36 +27,42 @@ pub(crate) fn check(drawing: &Drawing, sink: &mut Sink) {
 }
 
 fn facts(drawing: &Drawing, sink: &mut Sink) {
-    for &(fact, span, count) in &drawing.facts {
-        let (code, message, help) = match fact {
+    for noted in &drawing.facts {
+        let number = short(noted.number);
+        let elements = if noted.count == 1 { "1 element".to_owned() } else { format!("{} elements", noted.count) };
+        let (code, message, help) = match noted.fact {
             Fact::OutOfPlane => (
                 "W030",
-                format!("the model is planar: out-of-plane bending and torsion are left out ({count} beams)"),
+                format!("the model is planar: out-of-plane bending and torsion are left out ({elements})"),
                 "write `beam2d` to say that this is meant",
             ),
-            Fact::StrainGradient => ("W031", "`straingradient` bends out of the plane and is ignored".into(), ""),
+            Fact::StrainGradient => (
+                "W031",
+                format!("`straingradient` bends out of the drawing plane and is ignored ({elements})"),
+                "models are planar (x, y, rotation about z)",
+            ),
             Fact::AmbientZero => (
                 "W032",
-                "`ambienttemperature` is 0, so that `T` is the temperature rise".into(),
+                format!("`ambienttemperature` is 0: `T` = {number} is a temperature rise of {number} K ({elements})"),
                 "set the layer's `ambienttemperature`, or give the rise as `T`",
             ),
             Fact::NoDensity => (
                 "W033",
-                format!("no `density`: taken as massless ({count} elements)"),
+                format!("no `density`: taken as massless ({elements})"),
                 "modes and transients need the layer's `density` [kg/m³]",
             ),
             Fact::SmallConductivity => (
                 "W034",
-                "the layer's `thermcond` is too small to be the thermal conductivity of a solid".into(),
-                "silicon has 30 to 150 W/(m·K); give `thermcond=` here or in the layer",
+                format!("the layer's `thermcond` = {number} W/(m·K) is small for a conductivity ({elements})"),
+                "silicon has 30 to 150 W/(m·K); SUGAR's process files hold 2.33 here, which is none",
             ),
             Fact::Capacitor => (
                 "W021",
-                format!("capacitors are open here and left out ({count} elements)"),
+                format!("capacitors are open here and left out ({elements})"),
                 "put them into the circuit that drives the ports",
             ),
         };
-        sink.warning(code, span, message, help);
+        sink.warning(code, noted.span, message, help);
     }
 }
 
@@ -78,7 +86,9 @@ fn loose_nodes(drawing: &Drawing, connected: &[bool], sink: &mut Sink) {
     for index in (0..structure.nodes.len()).filter(loose) {
         let name = &structure.nodes[index].name;
         let message = format!("node `{name}` is connected to nothing: no beam, link or spring holds it");
-        sink.error("E070", drawing.first_named[index], message, "check the spelling of the node's name");
+        let others = (0..structure.nodes.len()).filter(|&i| connected[i]).map(|i| structure.nodes[i].name.as_str());
+        let help = did_you_mean(name, others, "give it a member, or remove what stands on it");
+        sink.error("E070", drawing.first_named[index], message, help);
     }
 }
 
@@ -101,7 +111,12 @@ fn unheld_parts(drawing: &Drawing, connected: &[bool], parts: &mut Groups, sink:
         let name = &structure.nodes[index].name;
         let more = if loose.len() > TOLD { format!(" ({} such parts in all)", loose.len()) } else { String::new() };
         let message = format!("nothing holds the part with node `{name}`: it has no anchor{more}");
-        sink.warning("W012", drawing.first_named[index], message, "a free part has no static equilibrium; add an `anchor`");
+        sink.warning(
+            "W012",
+            drawing.first_named[index],
+            message,
+            "a free part has no static equilibrium; add an `anchor`",
+        );
     }
 }
 
@@ -138,7 +153,8 @@ fn floating_potentials(drawing: &Drawing, sink: &mut Sink) {
     }
     for &index in floating.iter().take(TOLD) {
         let name = &structure.nodes[index].name;
-        let more = if floating.len() > TOLD { format!(" ({} such nets in all)", floating.len()) } else { String::new() };
+        let more =
+            if floating.len() > TOLD { format!(" ({} such nets in all)", floating.len()) } else { String::new() };
         let message = format!("the potential of node `{name}` floats: no port, source or ground fixes it{more}");
         let help = "connect it with `R`, or add `eground * [node] []`";
         sink.warning("W013", drawing.first_named[index], message, help);

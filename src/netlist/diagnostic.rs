@@ -3,6 +3,9 @@
 use super::bundle::Bundle;
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 
+/// Of longer lines only the part around the mark is shown [bytes].
+const LONGEST_LINE: usize = 1000;
+
 /// How bad a diagnostic is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Severity {
@@ -91,7 +94,13 @@ impl Diagnostics {
         let line = text.split('\n').nth(item.line.checked_sub(1)?)?.trim_end_matches('\r');
         let offset = |column: usize| line.char_indices().nth(column).map_or(line.len(), |(i, _)| i);
         let first = item.column.saturating_sub(1);
-        Some((line, offset(first)..offset(first + item.width)))
+        let marked = offset(first)..offset(first + item.width);
+        if line.len() <= LONGEST_LINE {
+            return Some((line, marked));
+        }
+        let from = offset(first.saturating_sub(LONGEST_LINE / 4));
+        let to = offset(first + LONGEST_LINE / 2);
+        Some((&line[from..to], marked.start - from..marked.end.min(to) - from))
     }
 }
 

@@ -39,14 +39,23 @@ pub(crate) enum Fact {
     Capacitor,
 }
 
+/// A fact with where it was first met, how often, and its number there (a temperature, a conductivity).
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Noted {
+    pub(crate) fact: Fact,
+    pub(crate) span: Span,
+    pub(crate) count: usize,
+    pub(crate) number: f64,
+}
+
 /// Structure, placements and facts gathered while elements are built.
 #[derive(Debug, Default)]
 pub(crate) struct Drawing {
     pub(crate) structure: Structure,
     pub(crate) placements: Vec<Placement>,
     pub(crate) unmeasured: Vec<Unmeasured>,
-    /// (fact, first place, count), in order of appearance.
-    pub(crate) facts: Vec<(Fact, Span, usize)>,
+    /// In order of appearance.
+    pub(crate) facts: Vec<Noted>,
     /// Where each node was first named.
     pub(crate) first_named: Vec<Span>,
 }
@@ -62,6 +71,11 @@ impl Drawing {
     /// Marks nodes as mechanical and records how they lie.
     pub(crate) fn place(&mut self, span: Span, nodes: &[NodeId], offsets: &[[f64; 2]]) {
         self.mechanical(nodes);
+        self.lay(span, nodes, offsets);
+    }
+
+    /// Records how nodes lie; they may be mere points of the drawing.
+    pub(crate) fn lay(&mut self, span: Span, nodes: &[NodeId], offsets: &[[f64; 2]]) {
         self.placements.push(Placement { span, nodes: nodes.to_vec(), offsets: offsets.to_vec() });
     }
 
@@ -91,9 +105,13 @@ impl Drawing {
     }
 
     pub(crate) fn note(&mut self, fact: Fact, span: Span) {
-        match self.facts.iter_mut().find(|(f, ..)| *f == fact) {
-            Some((_, _, count)) => *count += 1,
-            None => self.facts.push((fact, span, 1)),
+        self.note_number(fact, span, 0.0);
+    }
+
+    pub(crate) fn note_number(&mut self, fact: Fact, span: Span, number: f64) {
+        match self.facts.iter_mut().find(|noted| noted.fact == fact) {
+            Some(noted) => noted.count += 1,
+            None => self.facts.push(Noted { fact, span, count: 1, number }),
         }
     }
 }

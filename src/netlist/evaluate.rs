@@ -37,7 +37,9 @@ impl<'p> Elaborator<'p> {
 
     fn operand(&mut self, value: &Value, expr: &Expr, operator: &str) -> Reported {
         let help = match (&expr.kind, value) {
-            (ExprKind::Variable(name, _), Value::Undefined) => format!("`{name}` has no value here; test it with `isdef`"),
+            (ExprKind::Variable(name, _), Value::Undefined) => {
+                format!("`{name}` has no value here; test it with `isdef`")
+            }
             _ => String::new(),
         };
         let message = format!("`{operator}` needs a number, this is {}", value.called());

@@ -6,17 +6,21 @@ use super::token::{Kind, Token};
 
 /// Turns the text of file number `file` into tokens. Errors go to the sink; a token stands in for what was wrong.
 pub(crate) fn tokens(file: u16, text: &str, sink: &mut Sink) -> Vec<Token> {
-    let mut lexer = Lexer { file, text, bytes: text.as_bytes(), at: 0, fresh_line: true, out: Vec::new(), sink: Some(sink) };
+    let mut lexer =
+        Lexer { file, text, bytes: text.as_bytes(), at: 0, fresh_line: true, out: Vec::new(), sink: Some(sink) };
     lexer.run();
     lexer.out
 }
 
 /// The names of the files that a text includes, in order.
 pub(crate) fn uses_of(text: &str) -> Vec<String> {
-    let mut lexer = Lexer { file: 0, text, bytes: text.as_bytes(), at: 0, fresh_line: true, out: Vec::new(), sink: None };
+    let mut lexer =
+        Lexer { file: 0, text, bytes: text.as_bytes(), at: 0, fresh_line: true, out: Vec::new(), sink: None };
     lexer.run();
     let uses = lexer.out.iter().filter(|t| t.kind == Kind::Uses);
-    uses.map(|t| used_name(&text[t.span.start as usize..t.span.end as usize]).to_owned()).filter(|n| !n.is_empty()).collect()
+    uses.map(|t| used_name(&text[t.span.start as usize..t.span.end as usize]).to_owned())
+        .filter(|n| !n.is_empty())
+        .collect()
 }
 
 /// The file named by the text of a [`Kind::Uses`] token; empty when the line names none.
@@ -183,6 +187,8 @@ impl Lexer<'_> {
             format!("units are not written, everything is SI: write `{digits}{first}`")
         } else if one_is_good {
             format!("one suffix letter at most: write `{digits}{first}`, then a blank if another word follows")
+        } else if first == "_" {
+            format!("digits are not grouped: write `{digits}{}`", &tail[1..])
         } else if suffix(lower.as_bytes()[0]).is_some() && tail.len() == 1 {
             format!("suffixes are a f p n u m c d h k M G T P E, case matters: write `{digits}{lower}`")
         } else {

@@ -3,8 +3,8 @@
 //! [`Bundle`] holds the text of a netlist and of every file it includes, so that nothing after it touches the disk: a
 //! bundle can be sent to a server as it is. [`load`] turns a bundle into a structure, or into diagnostics.
 //!
-//! One module a step: `lexer` makes tokens, `parser` and `expression` the tree with all includes in place, `resolve`
-//! binds names, `elaborate` runs definitions, loops and subnets, `elements` builds what they instantiate, `place` walks
+//! One module a step: `lexer` makes tokens, `parser`, `statement` and `expression` the tree with all includes in place, `resolve`
+//! binds names, `elaborate` and `instance` run definitions, loops and subnets, `elements` builds what they instantiate, `place` walks
 //! over the drawing for node positions, and `check` looks for loose ends. docs/netlist.md describes the language.
 
 mod ast;
@@ -17,6 +17,7 @@ mod elements;
 mod evaluate;
 mod expression;
 mod functions;
+mod instance;
 mod lexer;
 mod parser;
 mod place;
@@ -25,6 +26,7 @@ mod rotation;
 mod setting;
 mod sink;
 mod source;
+mod statement;
 mod suggest;
 mod token;
 mod value;
@@ -74,6 +76,11 @@ pub fn load(bundle: &Bundle, set: &[(String, Setting)]) -> Result<Loaded, Diagno
     }
     let warnings = sink.finish(bundle);
     Ok(Loaded { structure: elaborated.drawing.structure, parameters: elaborated.parameters, warnings })
+}
+
+/// The names of all built-in elements, in the order of docs/netlist.md.
+pub fn element_names() -> impl Iterator<Item = &'static str> {
+    elements::MODELS.iter().map(|model| model.name)
 }
 
 /// Every name set from outside must be a parameter of the netlist.

@@ -1,6 +1,6 @@
 //! Tokens → syntax tree, by recursive descent. Included files are read where they are named.
 
-use super::ast::{Def, Element, Expr, ExprKind, Formal, Ident, Layer, LayerRef, Name, Program, Slot, Statement, Subnet};
+use super::ast::{Ident, Program, Statement};
 use super::bundle::{Bundle, DEEPEST_INCLUDE, MOST_INCLUDES};
 use super::lexer;
 use super::sink::{Reported, Sink};
@@ -20,9 +20,10 @@ pub(crate) fn parse(bundle: &Bundle, sink: &mut Sink) -> Program {
         text: "",
         tokens: Vec::new(),
         at: 0,
-        file: 0,
+        blocks: Vec::new(),
         depth: 0,
         includes: 0,
+        leaving: false,
         nodes: 0,
         anonymous: 0,
         words: HashMap::new(),
@@ -40,14 +41,17 @@ pub(super) struct Parser<'a> {
     pub(super) text: &'a str,
     pub(super) tokens: Vec<Token>,
     pub(super) at: usize,
-    file: u16,
-    depth: usize,
+    /// Opening brackets of the blocks being read, outermost first.
+    pub(super) blocks: Vec<Token>,
+    pub(super) depth: usize,
     includes: usize,
+    /// True while an unclosed block is being left for the top level of its file.
+    pub(super) leaving: bool,
     /// Operators, calls and brackets of the expression at hand.
     pub(super) nodes: usize,
-    anonymous: usize,
+    pub(super) anonymous: usize,
     words: HashMap<&'a str, Rc<str>>,
-    program: Program,
+    pub(super) program: Program,
 }
 
 /// A syntax error was reported; the caller skips to where reading can go on.
@@ -106,22 +110,29 @@ impl<'a> Parser<'a> {
     fn file(&mut self, name: &str, depth: usize, out: &mut Vec<Statement>) {
         let Some(text) = self.bundle.files.get(name) else { return };
         let number = u16::try_from(self.includes).unwrap_or(u16::MAX);
+        if let Some(span) = lua(text, number) {
+            let message = format!("`{name}` looks like a SUGAR 3 (Lua) netlist");
+            self.sink.error("E005", span, message, "only SUGAR 2 netlists are read: rewrite it in that syntax");
+            return;
+        }
         let tokens = lexer::tokens(number, text, self.sink);
         let outer = (
             std::mem::replace(&mut self.tokens, tokens),
             std::mem::replace(&mut self.at, 0),
             std::mem::replace(&mut self.text, text),
-            std::mem::replace(&mut self.file, number),
             std::mem::replace(&mut self.depth, 0),
+            std::mem::take(&mut self.blocks),
         );
         while self.peek().kind != Kind::End {
+            self.leaving = false;
             if let Some(close) = self.eat(Kind::CloseList) {
                 self.sink.error("E011", close.span, "this `]` closes nothing".into(), "");
                 continue;
             }
             self.statement_or_skip(true, depth, out);
         }
-        (self.tokens, self.at, self.text, self.file, self.depth) = outer;
+        self.leaving = false;
+        (self.tokens, self.at, self.text, self.depth, self.blocks) = outer;
     }
 
     fn uses(&mut self, depth: usize, out: &mut Vec<Statement>) {
@@ -145,7 +156,12 @@ impl<'a> Parser<'a> {
                 self.sink.error("E021", token.span, format!("cannot find the file `{name}`"), help);
             }
         } else if depth >= DEEPEST_INCLUDE {
-            self.sink.error("E023", token.span, format!("files include each other more than {DEEPEST_INCLUDE} deep"), "");
+            self.sink.error(
+                "E023",
+                token.span,
+                format!("files include each other more than {DEEPEST_INCLUDE} deep"),
+                "",
+            );
         } else if self.includes >= MOST_INCLUDES {
             self.sink.error("E024", token.span, format!("more than {MOST_INCLUDES} included files"), "");
         } else {
@@ -157,7 +173,7 @@ impl<'a> Parser<'a> {
 
     // ---- statements ----
 
-    fn statement_or_skip(&mut self, top: bool, depth: usize, out: &mut Vec<Statement>) {
+    pub(super) fn statement_or_skip(&mut self, top: bool, depth: usize, out: &mut Vec<Statement>) {
         if self.peek().kind == Kind::Uses {
             return self.uses(depth, out);
         }
@@ -165,17 +181,25 @@ impl<'a> Parser<'a> {
         let result = match self.peek().kind {
             Kind::Param | Kind::Process | Kind::Subnet if !top => {
                 let token = self.peek();
+                let opened = self.blocks.last().map_or(0, |open| self.line_of(open.span));
                 let message = format!("{} stands inside a block", token.kind.called());
-                Err(self.sink.error("E012", token.span, message, "move it out of all `[ ]`"))
+                let help = format!("is a `]` missing above? the block was opened in line {opened}");
+                self.sink.error("E012", token.span, message, help);
+                self.leaving = true;
+                return;
             }
             Kind::Param => self.param(out),
             Kind::Process => self.process().map(|p| out.push(p)),
             Kind::Subnet => self.subnet().map(|s| out.push(s)),
             _ => self.line().map(|s| out.push(s)),
         };
-        if result.is_err() {
+        if result.is_err() && !self.leaving {
             self.recover(before);
         }
+    }
+
+    fn line_of(&self, span: Span) -> usize {
+        self.text.get(..span.start as usize).map_or(0, |before| before.matches('\n').count() + 1)
     }
 
     /// Skips what is left of a statement with an error: to a word that can only begin a statement, or to the first
@@ -204,12 +228,12 @@ impl<'a> Parser<'a> {
     }
 
     /// True when the tokens ahead look like the head of an element: two or three words, then a list.
-    fn element_ahead(&self) -> bool {
+    pub(super) fn element_ahead(&self) -> bool {
         let word = |n: usize| matches!(self.ahead(n).kind, Kind::Identifier | Kind::Star);
         word(1) && (self.ahead(2).kind == Kind::OpenList || (word(2) && self.ahead(3).kind == Kind::OpenList))
     }
 
-    fn nested<T>(&mut self, parse: impl FnOnce(&mut Self) -> Parsed<T>) -> Parsed<T> {
+    pub(super) fn nested<T>(&mut self, parse: impl FnOnce(&mut Self) -> Parsed<T>) -> Parsed<T> {
         if self.depth >= DEEPEST_NESTING {
             let span = self.peek().span;
             let message = format!("blocks nest more than {DEEPEST_NESTING} deep");
@@ -220,230 +244,18 @@ impl<'a> Parser<'a> {
         self.depth -= 1;
         result
     }
+}
 
-    fn line(&mut self) -> Parsed<Statement> {
-        match self.peek().kind {
-            Kind::OpenList => Ok(Statement::Block(self.block()?)),
-            Kind::For => self.nested(Self::for_loop),
-            Kind::If => self.nested(Self::condition),
-            Kind::Call => {
-                self.next();
-                let function = self.ident("the function to call")?;
-                let open = self.expect(Kind::Open, "`(`")?;
-                Ok(Statement::Call(self.outermost(|p| p.call(function, open))?))
-            }
-            Kind::Identifier if self.ahead(1).kind == Kind::Equals => Ok(Statement::Def(self.def()?)),
-            Kind::Identifier => Ok(Statement::Element(Box::new(self.element()?))),
-            _ => Err(self.unexpected("a statement")),
+/// The first line that only a SUGAR 3 netlist can have: `use(…)`, or a `--` comment.
+fn lua(text: &str, file: u16) -> Option<Span> {
+    let mut start = 0;
+    for line in text.split_inclusive('\n') {
+        let body = line.trim_start();
+        if body.starts_with("use(") || body.starts_with("use (") || body.starts_with("--") {
+            let at = |offset: usize| u32::try_from(offset).unwrap_or(u32::MAX);
+            return Some(Span { file, start: at(start), end: at(start + line.trim_end().len()) });
         }
+        start += line.len();
     }
-
-    fn block(&mut self) -> Parsed<Vec<Statement>> {
-        self.nested(|p| {
-            let open = p.expect(Kind::OpenList, "a block `[ … ]`")?;
-            let mut out = Vec::new();
-            loop {
-                match p.peek().kind {
-                    Kind::CloseList => {
-                        p.next();
-                        return Ok(out);
-                    }
-                    Kind::End => return Err(p.unclosed(open)),
-                    _ => p.statement_or_skip(false, 0, &mut out),
-                }
-            }
-        })
-    }
-
-    fn unclosed(&mut self, open: Token) -> Reported {
-        self.sink.error("E014", open.span, "this `[` is never closed".into(), "every `[` needs its `]`")
-    }
-
-    fn for_loop(&mut self) -> Parsed<Statement> {
-        self.next();
-        let index = self.ident("the loop's variable")?;
-        self.expect(Kind::Equals, "`=`")?;
-        let from = self.expression()?;
-        self.expect(Kind::Colon, "`:` between the first and the last value")?;
-        let to = self.expression()?;
-        let body = self.block()?;
-        Ok(Statement::For { index, slot: Slot::NONE, from, to, body })
-    }
-
-    fn condition(&mut self) -> Parsed<Statement> {
-        self.next();
-        let condition = self.expression()?;
-        let then = Box::new(self.line()?);
-        let otherwise = match self.eat(Kind::Else) {
-            Some(_) => Some(Box::new(self.line()?)),
-            None => None,
-        };
-        Ok(Statement::If { condition, then, otherwise })
-    }
-
-    fn def(&mut self) -> Parsed<Def> {
-        let name = self.ident("a name")?;
-        self.expect(Kind::Equals, "`=`")?;
-        Ok(Def { name, slot: Slot::NONE, value: self.expression()? })
-    }
-
-    fn param(&mut self, out: &mut Vec<Statement>) -> Parsed<()> {
-        self.next();
-        loop {
-            let name = self.ident("the parameter's name")?;
-            let default = match self.eat(Kind::Equals) {
-                Some(_) => Some(self.expression()?),
-                None => None,
-            };
-            out.push(Statement::Param { name, slot: Slot::NONE, default });
-            if self.eat(Kind::Comma).is_none() {
-                return Ok(());
-            }
-        }
-    }
-
-    fn process(&mut self) -> Parsed<Statement> {
-        self.next();
-        let name = self.ident("the layer's name")?;
-        let parent_name = match self.eat(Kind::Colon) {
-            Some(_) => Some(self.ident("the parent layer's name")?),
-            None => None,
-        };
-        self.expect(Kind::Equals, "`=`")?;
-        let (entries, _) = self.def_list()?;
-        self.program.layers.push(Layer { name, parent_name, parent: None, entries, constant: false });
-        Ok(Statement::Process(self.program.layers.len() - 1))
-    }
-
-    fn subnet(&mut self) -> Parsed<Statement> {
-        self.next();
-        let name = self.ident("the subnet's name")?;
-        let (nodes, _) = self.name_list()?;
-        let open = self.expect(Kind::OpenList, "`[` of the parameter list")?;
-        let mut formals = Vec::new();
-        while self.eat(Kind::CloseList).is_none() {
-            let name = self.list_name(open)?;
-            self.expect(Kind::Equals, "`=` and a default, `*` (must be given) or `?` (may stay open)")?;
-            let mark = self.peek();
-            let default = match mark.kind {
-                Kind::Star => None,
-                Kind::Question => Some(Expr { kind: ExprKind::Undefined, span: mark.span }),
-                _ => Some(self.expression()?),
-            };
-            if matches!(mark.kind, Kind::Star | Kind::Question) {
-                self.next();
-            }
-            formals.push(Formal { name, slot: Slot::NONE, default });
-        }
-        let body = self.block()?;
-        self.program.subnets.push(Subnet { name, nodes, formals, body, variables: 0 });
-        Ok(Statement::Subnet(self.program.subnets.len() - 1))
-    }
-
-    fn element(&mut self) -> Parsed<Element> {
-        let first = self.ident("a statement")?;
-        let mut name = None;
-        let mut words = vec![first.clone()];
-        if self.peek().kind == Kind::Open {
-            name = Some(self.indices(first)?);
-            words.clear();
-        }
-        while words.len() < 3 {
-            match self.peek().kind {
-                Kind::Identifier => words.push(self.ident("a name")?),
-                Kind::Star => {
-                    let span = self.next().span;
-                    words.push(Ident { name: self.word("*"), span });
-                    break;
-                }
-                _ => break,
-            }
-        }
-        if words.len() == 3 && name.is_none() {
-            let base = words.remove(0);
-            name = Some(Name { span: base.span, base, indices: Vec::new() });
-        }
-        let (Ok([model, layer_name]), Kind::OpenList) = (<[Ident; 2]>::try_from(words), self.peek().kind) else {
-            let help = "an element is `[NAME] MODEL LAYER [nodes] [parameters]`, with `*` for no layer";
-            let span = self.peek().span;
-            let found = self.peek().kind.called();
-            return Err(self.sink.error("E015", span, format!("expected an element's model and layer, found {found}"), help));
-        };
-        let mut number = 0;
-        if name.is_none() {
-            self.anonymous += 1;
-            number = self.anonymous;
-        }
-        let (nodes, nodes_span) = self.name_list()?;
-        let (parameters, _) = self.def_list()?;
-        let layer = LayerRef::None;
-        Ok(Element { name, number, model, subnet: None, layer_name, layer, nodes, nodes_span, parameters })
-    }
-
-    // ---- lists ----
-
-    fn indices(&mut self, base: Ident) -> Parsed<Name> {
-        if self.peek().kind != Kind::Open {
-            return Ok(Name { span: base.span, base, indices: Vec::new() });
-        }
-        let open = self.next();
-        let (indices, close) = self.outermost(|p| p.arguments(open))?;
-        if indices.is_empty() {
-            return Err(self.sink.error("E016", close, "an index is missing".into(), "write a whole number"));
-        }
-        Ok(Name { span: base.span.to(close), base, indices })
-    }
-
-    fn name_list(&mut self) -> Parsed<(Vec<Name>, Span)> {
-        let open = self.expect(Kind::OpenList, "`[` of the node list")?;
-        let mut names = Vec::new();
-        loop {
-            match self.peek().kind {
-                Kind::CloseList => {
-                    let close = self.next();
-                    return Ok((names, open.span.to(close.span)));
-                }
-                Kind::Comma => {
-                    let comma = self.next();
-                    self.sink.error("E017", comma.span, "node names are separated by blanks".into(), "remove the comma");
-                }
-                Kind::End => return Err(self.unclosed(open)),
-                _ => {
-                    let base = self.ident("a node name or `]`")?;
-                    names.push(self.indices(base)?);
-                }
-            }
-        }
-    }
-
-    fn def_list(&mut self) -> Parsed<(Vec<Def>, Span)> {
-        let open = self.expect(Kind::OpenList, "`[` of the parameter list")?;
-        let mut defs = Vec::new();
-        loop {
-            match self.peek().kind {
-                Kind::CloseList => {
-                    let close = self.next();
-                    return Ok((defs, open.span.to(close.span)));
-                }
-                Kind::Comma => {
-                    let comma = self.next();
-                    self.sink.error("E017", comma.span, "parameters are separated by blanks".into(), "remove the comma");
-                }
-                _ => {
-                    let name = self.list_name(open)?;
-                    self.expect(Kind::Equals, &format!("`=` after the parameter `{}`", name.name))?;
-                    defs.push(Def { name, slot: Slot::NONE, value: self.expression()? });
-                }
-            }
-        }
-    }
-
-    /// The next name of a parameter list, or the error that the list was left open.
-    fn list_name(&mut self, open: Token) -> Parsed<Ident> {
-        let token = self.peek();
-        if token.kind == Kind::End || (token.starts_line && (token.kind.begins_statement() || self.element_ahead())) {
-            return Err(self.unclosed(open));
-        }
-        self.ident("a parameter name or `]`")
-    }
+    None
 }

@@ -84,7 +84,8 @@ fn unconnected_parts(drawing: &Drawing, starts: &[usize], sink: &mut Sink) {
         let first = &drawing.structure.nodes[starts[0]].name;
         let more = if later.len() > TOLD { format!(" ({} such parts in all)", later.len()) } else { String::new() };
         let message = format!("the part with node `{name}` is not connected to node `{first}`{more}");
-        let help = format!("it is drawn from the origin again; connect it, or place it with `pos * [{first} {name}] [x= y=]`");
+        let help =
+            format!("it is drawn from the origin again; connect it, or place it with `pos * [{first} {name}] [x= y=]`");
         sink.warning("W010", drawing.first_named[start], message, help);
     }
 }

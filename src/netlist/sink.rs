@@ -12,6 +12,9 @@ pub(crate) struct Reported;
 /// Messages beyond this many are dropped: nobody reads them, and a loop could make millions.
 const MOST_MESSAGES: usize = 100;
 
+/// Longer instance names (deep recursion) are cut in messages.
+const LONGEST_NAME: usize = 60;
+
 /// The messages of one load.
 #[derive(Debug)]
 pub(crate) struct Sink {
@@ -20,17 +23,23 @@ pub(crate) struct Sink {
     items: Vec<(Span, Severity, &'static str, String, String)>,
     seen: HashSet<(Span, &'static str)>,
     errors: usize,
-    /// Where the subnet instance being built was called, innermost last: (instance name, place of the call).
-    pub(crate) calls: Vec<(String, Span)>,
+    /// Full names of the subnet instances being built, innermost last.
+    pub(crate) instances: Vec<String>,
 }
 
 impl Sink {
     pub(crate) fn new(root: &str) -> Self {
-        Self { files: vec![root.to_owned()], items: Vec::new(), seen: HashSet::new(), errors: 0, calls: Vec::new() }
+        Self { files: vec![root.to_owned()], items: Vec::new(), seen: HashSet::new(), errors: 0, instances: Vec::new() }
     }
 
     /// Reports an error. The same code at the same place is reported once.
-    pub(crate) fn error(&mut self, code: &'static str, span: Span, message: String, help: impl Into<String>) -> Reported {
+    pub(crate) fn error(
+        &mut self,
+        code: &'static str,
+        span: Span,
+        message: String,
+        help: impl Into<String>,
+    ) -> Reported {
         self.errors += 1;
         self.push(Severity::Error, code, span, message, help.into());
         Reported
@@ -61,18 +70,22 @@ impl Sink {
         if repeated || self.items.len() >= 2 * MOST_MESSAGES {
             return;
         }
-        if let Some((instance, _)) = self.calls.last() {
+        if let Some(instance) = self.instances.last() {
             if !help.is_empty() {
                 help.push_str("; ");
             }
-            help.push_str(&format!("seen in the subnet instance `{instance}`"));
+            let name: String = instance.chars().take(LONGEST_NAME).collect();
+            let dots = if name.len() < instance.len() { "…" } else { "" };
+            help.push_str(&format!("seen in the subnet instance `{name}{dots}`"));
         }
         self.items.push((span, severity, code, message, help));
     }
 
     /// All messages in order of place.
     pub(crate) fn finish(mut self, bundle: &Bundle) -> Diagnostics {
-        self.items.sort_by_key(|(span, severity, ..)| (span.file.wrapping_add(1), span.start, *severity == Severity::Warning));
+        self.items.sort_by_key(|(span, severity, ..)| {
+            (span.file.wrapping_add(1), span.start, *severity == Severity::Warning)
+        });
         let files = &self.files;
         let items = self
             .items

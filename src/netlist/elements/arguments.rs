@@ -158,7 +158,12 @@ impl Site<'_, '_> {
         if x > LONGEST && meaning(name).ends_with("[m]") {
             let span = self.span_of(name);
             let message = format!("`{name}` is {} m long", short(x));
-            self.sink.warning("W005", span, message, format!("lengths are in metres: micrometres are written `{}u`", short(x)));
+            let help = if x < 1e5 {
+                format!("lengths are in metres: micrometres are written `{}u`", short(x))
+            } else {
+                "lengths are in metres: check the suffix".to_owned()
+            };
+            self.sink.warning("W005", span, message, help);
         }
     }
 

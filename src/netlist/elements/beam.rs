@@ -110,7 +110,7 @@ pub(super) fn beam2det(site: &mut Site<'_, '_>) -> Result<(), Reported> {
     let resistance = site.resistance("R", "G", width)?;
     let conductivity = site.positive("thermcond")?;
     if !site.is_given("thermcond") && conductivity < SMALL_CONDUCTIVITY {
-        site.drawing.note(Fact::SmallConductivity, site.instance.span);
+        site.drawing.note_number(Fact::SmallConductivity, site.instance.span, conductivity);
     }
     if site.number("thermalexpansion")?.is_none() {
         return Err(site.missing("thermalexpansion"));
@@ -124,6 +124,7 @@ pub(super) fn beam2det(site: &mut Site<'_, '_>) -> Result<(), Reported> {
         }
         (None, None) => 0.0,
     };
+    beam.temperature = None;
     beam.heater = Some(Heater { resistance, conductance: conductivity * width * height / length, time_constant });
     site.drawing.electrical(&[a, b]);
     site.drawing.add_beam(site.instance.span, beam, true);

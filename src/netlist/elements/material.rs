@@ -68,7 +68,7 @@ impl Site<'_, '_> {
         }
         if material.ambient_temperature == 0.0 && temperature != 0.0 {
             let span = self.span_of("T");
-            self.drawing.note(Fact::AmbientZero, span);
+            self.drawing.note_number(Fact::AmbientZero, span, temperature);
         }
         Ok(Some(temperature))
     }

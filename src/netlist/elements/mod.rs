@@ -12,7 +12,7 @@ mod support;
 mod table;
 
 pub(crate) use arguments::{Argument, Arguments, Instance, Site};
-pub(crate) use table::{Model, model};
+pub(crate) use table::{MODELS, Model, model};
 
 use super::drawing::Drawing;
 use super::sink::{Reported, Sink};
@@ -37,12 +37,18 @@ pub(crate) fn build(instance: &Instance<'_>, drawing: &mut Drawing, sink: &mut S
 }
 
 /// Reports an unknown element, with the nearest known one or the reason why it is left out.
-pub(crate) fn unknown<'a>(sink: &mut Sink, name: &str, span: Span, subnets: impl IntoIterator<Item = &'a str>) -> Reported {
+pub(crate) fn unknown<'a>(
+    sink: &mut Sink,
+    name: &str,
+    span: Span,
+    subnets: impl IntoIterator<Item = &'a str>,
+) -> Reported {
     if let Some((_, reason)) = table::LEFT_OUT.iter().find(|(left_out, _)| *left_out == name) {
         return sink.error("E056", span, format!("the element `{name}` is not supported"), *reason);
     }
     let known = table::MODELS.iter().map(|m| m.name).chain(subnets);
-    let help = did_you_mean(name, known, "it is neither built in nor a subnet defined above; is a `uses` line missing?");
+    let help =
+        did_you_mean(name, known, "it is neither built in nor a subnet defined above; is a `uses` line missing?");
     sink.error("E055", span, format!("unknown element `{name}`"), help)
 }
 
@@ -55,7 +61,12 @@ fn stray_parameters(model: &Model, instance: &Instance<'_>, sink: &mut Sink) {
         }
         let otherwise = format!("it takes {}", model.parameters.join(" "));
         let help = did_you_mean(argument.name, model.parameters.iter().copied(), &otherwise);
-        sink.warning("W004", argument.span, format!("`{}` takes no parameter `{}`: ignored", model.name, argument.name), help);
+        sink.warning(
+            "W004",
+            argument.span,
+            format!("`{}` takes no parameter `{}`: ignored", model.name, argument.name),
+            help,
+        );
     }
 }
 

@@ -43,6 +43,6 @@ pub(super) fn guide2d(site: &mut Site<'_, '_>) -> Result<(), Reported> {
 pub(super) fn pos(site: &mut Site<'_, '_>) -> Result<(), Reported> {
     let offset = [site.number_or("x", 0.0)?, site.number_or("y", 0.0)?, site.number_or("z", 0.0)?];
     let [x, y, _] = site.instance.rotation.apply(offset);
-    site.drawing.place(site.instance.span, &[site.node(0), site.node(1)], &[[0.0; 2], [x, y]]);
+    site.drawing.lay(site.instance.span, &[site.node(0), site.node(1)], &[[0.0; 2], [x, y]]);
     Ok(())
 }

@@ -25,14 +25,27 @@ pub(crate) fn model(name: &str) -> Option<&'static Model> {
 
 /// Entries a layer may have; any element may override them.
 pub(super) const LAYER_ENTRIES: &[&str] = &[
-    "Youngsmodulus", "Poisson", "density", "viscosity", "fluid", "permittivity", "sheetresistance", "resistivity",
-    "stress", "straingradient", "thermalexpansion", "ambienttemperature", "thermcond", "specificheat", "h", "layer",
+    "Youngsmodulus",
+    "Poisson",
+    "density",
+    "viscosity",
+    "fluid",
+    "permittivity",
+    "sheetresistance",
+    "resistivity",
+    "stress",
+    "straingradient",
+    "thermalexpansion",
+    "ambienttemperature",
+    "thermcond",
+    "specificheat",
+    "h",
+    "layer",
 ];
 
 /// Parameters that SUGAR's netlists carry on elements which do not use them.
-pub(super) const STRAY: &[&str] = &[
-    "R", "R1", "R2", "Rs", "R_insulator", "G", "G1", "G2", "V", "l", "w", "w1", "w2", "h", "x", "y", "z", "T",
-];
+pub(super) const STRAY: &[&str] =
+    &["R", "R1", "R2", "Rs", "R_insulator", "G", "G1", "G2", "V", "l", "w", "w1", "w2", "h", "x", "y", "z", "T"];
 
 const BEAM: &[&str] = &["l", "w", "h", "T"];
 const BEAM_E: &[&str] = &["l", "w", "h", "T", "R", "G", "resistivity"];

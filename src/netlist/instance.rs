@@ -1,0 +1,214 @@
+//! Elements and subnet instances: parameters evaluated, layers looked up, frames opened.
+
+use super::ast::{Element, Layer, LayerRef};
+use super::elaborate::{Elaborator, Frame, LayerValues};
+use super::elements::{self, Argument, Arguments, Instance};
+use super::rotation::Rotation;
+use super::sink::Reported;
+use super::source::Span;
+use super::value::{Value, short};
+use crate::structure::NodeId;
+use std::collections::HashMap;
+use std::rc::Rc;
+
+/// Subnet instances may nest this deep.
+const DEEPEST_INSTANCE: usize = 100;
+
+/// A subnet instance to be built.
+#[derive(Clone, Copy)]
+struct Call<'a, 'p> {
+    element: &'p Element,
+    /// Index of the subnet.
+    subnet: usize,
+    /// The instance's name where it is called.
+    local: &'a str,
+    nodes: &'a [NodeId],
+    given: &'a [Argument<'p>],
+    rotation: Rotation,
+    layer: Option<usize>,
+}
+
+impl<'p> Elaborator<'p> {
+    pub(super) fn element(&mut self, element: &'p Element) -> Result<(), Reported> {
+        self.elements += 1;
+        let local: Rc<str> = match &element.name {
+            Some(name) => {
+                let local = self.name(name)?;
+                let full = format!("{}{local}", self.here().prefix);
+                if self.names.contains(&full) {
+                    let message = format!("there is an element `{full}` already");
+                    self.sink.warning(
+                        "W007",
+                        name.span,
+                        message,
+                        "give each its own name, so that results can be told apart",
+                    );
+                }
+                self.names.insert(full);
+                local
+            }
+            None => Rc::from(format!("anon{}", element.number)),
+        };
+        let mut nodes = Vec::with_capacity(element.nodes.len());
+        for name in &element.nodes {
+            nodes.push(self.node(name)?);
+        }
+        let mut given = Vec::with_capacity(element.parameters.len());
+        let mut angles = [0.0; 3];
+        let mut failed = false;
+        for def in &element.parameters {
+            let Ok(value) = self.evaluate(&def.value) else {
+                failed = true;
+                continue;
+            };
+            let axis = ["ox", "oy", "oz"].iter().position(|o| **o == *def.name.name);
+            match (axis, &value) {
+                (Some(axis), Value::Number(angle)) => {
+                    angles[axis] = *angle;
+                    self.check_angle(&def.name.name, *angle, def.value.span);
+                }
+                (Some(_), other) => {
+                    let message = format!("`{}` must be a number, this is {}", def.name.name, other.called());
+                    self.sink.error("E050", def.value.span, message, "");
+                    failed = true;
+                }
+                (None, _) => {
+                    given.push(Argument { name: &def.name.name, value, span: def.name.span.to(def.value.span) });
+                }
+            }
+        }
+        if failed {
+            return Err(Reported);
+        }
+        let rotation = self.here().rotation.turned(angles[0], angles[1], angles[2]);
+        let layer = match element.layer {
+            LayerRef::None => None,
+            LayerRef::Parent => self.here().layer,
+            LayerRef::Layer(index) => Some(index),
+        };
+        match element.subnet {
+            Some(subnet) => {
+                self.subnet(&Call { element, subnet, local: &local, nodes: &nodes, given: &given, rotation, layer })
+            }
+            None => {
+                let values = layer.map_or_else(|| Ok(Rc::new(Vec::new())), |layer| self.layer(layer))?;
+                let instance = Instance {
+                    name: format!("{}{local}", self.here().prefix),
+                    model: &element.model.name,
+                    span: element.model.span,
+                    nodes,
+                    nodes_span: element.nodes_span,
+                    rotation,
+                    arguments: Arguments {
+                        given,
+                        layer: values,
+                        layer_name: layer.map(|l| &*self.program.layers[l].name.name),
+                    },
+                };
+                elements::build(&instance, &mut self.drawing, self.sink)
+            }
+        }
+    }
+
+    fn check_angle(&mut self, name: &str, angle: f64, span: Span) {
+        let divides = 360.0 % angle.abs() == 0.0;
+        if angle.abs() > std::f64::consts::TAU && (divides || angle.fract() == 0.0) {
+            let help = format!("for degrees write `{name}=deg({})`", short(angle));
+            let message = format!("angles are in radians; {} looks like degrees", short(angle));
+            self.sink.warning("W003", span, message, help);
+        }
+    }
+
+    /// Values of a layer's entries, evaluated now: a layer may name variables that change along the netlist.
+    fn layer(&mut self, index: usize) -> Result<LayerValues<'p>, Reported> {
+        if let Some(values) = &self.layers[index] {
+            return Ok(Rc::clone(values));
+        }
+        let program = self.program;
+        let mut values = Vec::new();
+        let mut next: Option<&'p Layer> = Some(&program.layers[index]);
+        while let Some(layer) = next {
+            for entry in &layer.entries {
+                values.push((&*entry.name.name, self.evaluate(&entry.value)?));
+            }
+            next = layer.parent.map(|parent| &program.layers[parent]);
+        }
+        let values = Rc::new(values);
+        if program.layers[index].constant {
+            self.layers[index] = Some(Rc::clone(&values));
+        }
+        Ok(values)
+    }
+
+    // ---- subnets ----
+
+    fn subnet(&mut self, call: &Call<'_, 'p>) -> Result<(), Reported> {
+        let Call { element, nodes, given, layer, .. } = *call;
+        let subnet = &self.program.subnets[call.subnet];
+        let model = &*element.model.name;
+        if nodes.len() != subnet.nodes.len() {
+            let (wanted, got) = (subnet.nodes.len(), nodes.len());
+            let names: Vec<&str> = subnet.nodes.iter().map(|n| &*n.base.name).collect();
+            let message = format!("subnet `{model}` has {wanted} nodes, {got} given");
+            let help = format!("its nodes are [{}]", names.join(" "));
+            return Err(self.sink.error("E051", element.nodes_span, message, help));
+        }
+        if self.frames.len() > DEEPEST_INSTANCE {
+            self.stopped = true;
+            let message =
+                format!("subnet instances nest more than {DEEPEST_INSTANCE} deep: `{model}` calls itself without end");
+            return Err(self.sink.error("E052", element.model.span, message, "end the recursion with an `if`"));
+        }
+        elements::stray_actuals(model, given, subnet.formals.iter().map(|f| &*f.name.name), self.sink);
+        let layer_values = layer.map_or_else(|| Ok(Rc::new(Vec::new())), |layer| self.layer(layer))?;
+        let prefix = format!("{}{}.", self.here().prefix, call.local);
+        let frame = Frame {
+            values: vec![Value::Undefined; subnet.variables],
+            nodes: HashMap::with_capacity(2 * nodes.len()),
+            prefix,
+            rotation: call.rotation,
+            layer,
+        };
+        let instance = frame.prefix.trim_end_matches('.').to_owned();
+        self.frames.push(frame);
+        let result = self.bind(call, &layer_values);
+        if result.is_ok() {
+            self.sink.instances.push(instance);
+            self.nested(&subnet.body);
+            self.sink.instances.pop();
+        }
+        self.frames.pop();
+        result
+    }
+
+    /// Gives the formal nodes and parameters of a new frame their values: actual, then default, then layer.
+    fn bind(&mut self, call: &Call<'_, 'p>, layer: &LayerValues<'p>) -> Result<(), Reported> {
+        let Call { element, nodes, given, .. } = *call;
+        let subnet = &self.program.subnets[call.subnet];
+        for (formal, id) in subnet.nodes.iter().zip(nodes) {
+            let name = self.name(formal)?;
+            let at = self.frames.len() - 1;
+            self.frames[at].nodes.insert(name, *id);
+        }
+        for formal in &subnet.formals {
+            let name = &*formal.name.name;
+            let actual = given.iter().find(|a| a.name == name).map(|a| a.value.clone());
+            let mut value = actual.unwrap_or(Value::Undefined);
+            if let (Value::Undefined, Some(default)) = (&value, &formal.default) {
+                value = self.evaluate(default)?;
+            }
+            if value == Value::Undefined
+                && let Some((_, found)) = layer.iter().find(|(entry, _)| *entry == name)
+            {
+                value = found.clone();
+            }
+            if value == Value::Undefined && formal.default.is_none() {
+                let message = format!("subnet `{}` needs the parameter `{name}`", element.model.name);
+                let help = format!("give `{name}=`, or take it from a layer that has it");
+                return Err(self.sink.error("E053", element.model.span, message, help));
+            }
+            self.assign(formal.slot, value);
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,259 @@
+//! The grammar of statements: definitions, blocks, loops, conditions, layers, subnets, elements and their lists.
+
+use super::ast::{Def, Element, Expr, ExprKind, Formal, Ident, Layer, LayerRef, Name, Slot, Statement, Subnet};
+use super::parser::{Parsed, Parser};
+use super::sink::Reported;
+use super::source::Span;
+use super::token::{Kind, Token};
+
+impl Parser<'_> {
+    pub(super) fn line(&mut self) -> Parsed<Statement> {
+        match self.peek().kind {
+            Kind::OpenList => Ok(Statement::Block(self.block()?)),
+            Kind::For => self.nested(Self::for_loop),
+            Kind::If => self.nested(Self::condition),
+            Kind::Call => {
+                self.next();
+                let function = self.ident("the function to call")?;
+                let open = self.expect(Kind::Open, "`(`")?;
+                Ok(Statement::Call(self.outermost(|p| p.call(function, open))?))
+            }
+            Kind::Identifier if self.ahead(1).kind == Kind::Equals => Ok(Statement::Def(self.def()?)),
+            Kind::Identifier => Ok(Statement::Element(Box::new(self.element()?))),
+            _ => Err(self.unexpected("a statement")),
+        }
+    }
+
+    fn block(&mut self) -> Parsed<Vec<Statement>> {
+        self.nested(|p| {
+            let open = p.expect(Kind::OpenList, "a block `[ … ]`")?;
+            p.blocks.push(open);
+            let mut out = Vec::new();
+            let result = loop {
+                if p.leaving {
+                    break Err(Reported);
+                }
+                match p.peek().kind {
+                    Kind::CloseList => {
+                        p.next();
+                        break Ok(out);
+                    }
+                    Kind::End => {
+                        p.leaving = true;
+                        break Err(p.unclosed(open));
+                    }
+                    _ => p.statement_or_skip(false, 0, &mut out),
+                }
+            };
+            p.blocks.pop();
+            result
+        })
+    }
+
+    fn unclosed(&mut self, open: Token) -> Reported {
+        self.sink.error("E014", open.span, "this `[` is never closed".into(), "every `[` needs its `]`")
+    }
+
+    fn for_loop(&mut self) -> Parsed<Statement> {
+        self.next();
+        let index = self.ident("the loop's variable")?;
+        self.expect(Kind::Equals, "`=`")?;
+        let from = self.expression()?;
+        self.expect(Kind::Colon, "`:` between the first and the last value")?;
+        let to = self.expression()?;
+        let body = self.block()?;
+        Ok(Statement::For { index, slot: Slot::NONE, from, to, body })
+    }
+
+    fn condition(&mut self) -> Parsed<Statement> {
+        self.next();
+        let condition = self.expression()?;
+        let then = Box::new(self.line()?);
+        let otherwise = match self.eat(Kind::Else) {
+            Some(_) => Some(Box::new(self.line()?)),
+            None => None,
+        };
+        Ok(Statement::If { condition, then, otherwise })
+    }
+
+    fn def(&mut self) -> Parsed<Def> {
+        let name = self.ident("a name")?;
+        self.expect(Kind::Equals, "`=`")?;
+        Ok(Def { name, slot: Slot::NONE, value: self.expression()? })
+    }
+
+    pub(super) fn param(&mut self, out: &mut Vec<Statement>) -> Parsed<()> {
+        self.next();
+        loop {
+            let name = self.ident("the parameter's name")?;
+            let default = match self.eat(Kind::Equals) {
+                Some(_) => Some(self.expression()?),
+                None => None,
+            };
+            out.push(Statement::Param { name, slot: Slot::NONE, default });
+            if self.eat(Kind::Comma).is_none() {
+                return Ok(());
+            }
+        }
+    }
+
+    pub(super) fn process(&mut self) -> Parsed<Statement> {
+        self.next();
+        let name = self.ident("the layer's name")?;
+        let parent_name = match self.eat(Kind::Colon) {
+            Some(_) => Some(self.ident("the parent layer's name")?),
+            None => None,
+        };
+        self.expect(Kind::Equals, "`=`")?;
+        let (entries, _) = self.def_list()?;
+        self.program.layers.push(Layer { name, parent_name, parent: None, entries, constant: false });
+        Ok(Statement::Process(self.program.layers.len() - 1))
+    }
+
+    pub(super) fn subnet(&mut self) -> Parsed<Statement> {
+        self.next();
+        let name = self.ident("the subnet's name")?;
+        let (nodes, _) = self.name_list()?;
+        let open = self.expect(Kind::OpenList, "`[` of the parameter list")?;
+        let mut formals = Vec::new();
+        while self.eat(Kind::CloseList).is_none() {
+            let name = self.list_name(open)?;
+            self.expect(Kind::Equals, "`=` and a default, `*` (must be given) or `?` (may stay open)")?;
+            let mark = self.peek();
+            let default = match mark.kind {
+                Kind::Star => None,
+                Kind::Question => Some(Expr { kind: ExprKind::Undefined, span: mark.span }),
+                _ => Some(self.expression()?),
+            };
+            if matches!(mark.kind, Kind::Star | Kind::Question) {
+                self.next();
+            }
+            formals.push(Formal { name, slot: Slot::NONE, default });
+        }
+        let body = self.block()?;
+        self.program.subnets.push(Subnet { name, nodes, formals, body, variables: 0 });
+        Ok(Statement::Subnet(self.program.subnets.len() - 1))
+    }
+
+    fn element(&mut self) -> Parsed<Element> {
+        let first = self.ident("a statement")?;
+        let mut name = None;
+        let mut words = vec![first.clone()];
+        if self.peek().kind == Kind::Open {
+            name = Some(self.indices(first)?);
+            words.clear();
+        }
+        while words.len() < 3 {
+            match self.peek().kind {
+                Kind::Identifier => words.push(self.ident("a name")?),
+                Kind::Star => {
+                    let span = self.next().span;
+                    words.push(Ident { name: self.word("*"), span });
+                    break;
+                }
+                _ => break,
+            }
+        }
+        if words.len() == 3 && name.is_none() {
+            let base = words.remove(0);
+            name = Some(Name { span: base.span, base, indices: Vec::new() });
+        }
+        let (Ok([model, layer_name]), Kind::OpenList) = (<[Ident; 2]>::try_from(words), self.peek().kind) else {
+            let help = "an element is `[NAME] MODEL LAYER [nodes] [parameters]`, with `*` for no layer";
+            let span = self.peek().span;
+            let found = self.peek().kind.called();
+            return Err(self.sink.error(
+                "E015",
+                span,
+                format!("expected an element's model and layer, found {found}"),
+                help,
+            ));
+        };
+        let mut number = 0;
+        if name.is_none() {
+            self.anonymous += 1;
+            number = self.anonymous;
+        }
+        let (nodes, nodes_span) = self.name_list()?;
+        let (parameters, _) = self.def_list()?;
+        let layer = LayerRef::None;
+        Ok(Element { name, number, model, subnet: None, layer_name, layer, nodes, nodes_span, parameters })
+    }
+
+    // ---- lists ----
+
+    fn indices(&mut self, base: Ident) -> Parsed<Name> {
+        if self.peek().kind != Kind::Open {
+            return Ok(Name { span: base.span, base, indices: Vec::new() });
+        }
+        let open = self.next();
+        let (indices, close) = self.outermost(|p| p.arguments(open))?;
+        if indices.is_empty() {
+            return Err(self.sink.error("E016", close, "an index is missing".into(), "write a whole number"));
+        }
+        Ok(Name { span: base.span.to(close), base, indices })
+    }
+
+    fn name_list(&mut self) -> Parsed<(Vec<Name>, Span)> {
+        let open = self.expect(Kind::OpenList, "`[` of the node list")?;
+        let mut names = Vec::new();
+        loop {
+            match self.peek().kind {
+                Kind::CloseList => {
+                    let close = self.next();
+                    return Ok((names, open.span.to(close.span)));
+                }
+                Kind::Comma => {
+                    let comma = self.next();
+                    self.sink.error(
+                        "E017",
+                        comma.span,
+                        "node names are separated by blanks".into(),
+                        "remove the comma",
+                    );
+                }
+                Kind::End => return Err(self.unclosed(open)),
+                _ => {
+                    let base = self.ident("a node name or `]`")?;
+                    names.push(self.indices(base)?);
+                }
+            }
+        }
+    }
+
+    fn def_list(&mut self) -> Parsed<(Vec<Def>, Span)> {
+        let open = self.expect(Kind::OpenList, "`[` of the parameter list")?;
+        let mut defs = Vec::new();
+        loop {
+            match self.peek().kind {
+                Kind::CloseList => {
+                    let close = self.next();
+                    return Ok((defs, open.span.to(close.span)));
+                }
+                Kind::Comma => {
+                    let comma = self.next();
+                    self.sink.error(
+                        "E017",
+                        comma.span,
+                        "parameters are separated by blanks".into(),
+                        "remove the comma",
+                    );
+                }
+                _ => {
+                    let name = self.list_name(open)?;
+                    self.expect(Kind::Equals, &format!("`=` after the parameter `{}`", name.name))?;
+                    defs.push(Def { name, slot: Slot::NONE, value: self.expression()? });
+                }
+            }
+        }
+    }
+
+    /// The next name of a parameter list, or the error that the list was left open.
+    fn list_name(&mut self, open: Token) -> Parsed<Ident> {
+        let token = self.peek();
+        if token.kind == Kind::End || (token.starts_line && (token.kind.begins_statement() || self.element_ahead())) {
+            return Err(self.unclosed(open));
+        }
+        self.ident("a parameter name or `]`")
+    }
+}
