@@ -119,7 +119,6 @@ pub(crate) unsafe extern "C" fn setup(
                 let _ = writeln!(std::io::stderr(), "Error: bimorph: {text}");
                 record_failure(&text);
                 trace::line(format_args!("refused: {text}"));
-                trace::flush();
                 code::PARMVAL
             }
         }
@@ -157,6 +156,7 @@ unsafe fn open_all(mut model: *mut Model) -> Result<(), String> {
 }
 
 fn open(name: &str, card: &ModelCard, ports: usize, directory: Option<&Path>) -> Result<Instance, String> {
+    trace::line(format_args!("{name}: {card:?}, deck in {directory:?}"));
     let device = opener::open(card, directory).map_err(|e| e.to_string())?;
     Instance::open(name, device, &card.ports, ports, &card.monitors).map_err(|e| format!("\"{}\": {e}", card.file))
 }
@@ -218,7 +218,6 @@ pub(crate) unsafe extern "C" fn delete(instance: *mut abi::Instance) -> c_int {
 
 fn close(key: usize) {
     registry().entries.retain(|e| e.key != key);
-    trace::flush();
 }
 
 /// Loads the matrix: the host calls [`evaluate`] for each instance.
@@ -290,7 +289,6 @@ pub(crate) unsafe extern "C" fn evaluate(data: *mut c_void) {
         registry().stopped = true;
         record_failure(&text);
         trace::line(format_args!("stop: {text}"));
-        trace::flush();
         // SAFETY: this is within a load.
         unsafe { host::message(&format!("Error: bimorph: {text}")) };
     }

@@ -4,6 +4,7 @@
 //! parentheses. So `set=["w=2.1u" "F=0"]` arrives as w, 2.1u, F, 0, and a node `x1(2)` arrives as two words. Later
 //! versions keep more of it together. Both forms are read here.
 
+use bimorph::jobs::sweep::parse::number;
 use bimorph::netlist::Setting;
 
 /// A signal shown as a voltage.
@@ -22,37 +23,6 @@ impl Monitor {
         let (signal, scale) = scaled.unwrap_or((text, 1.0));
         Self { signal: signal.to_owned(), scale }
     }
-}
-
-/// A number as netlists write it: a decimal number, then at most one of SUGAR's suffix letters.
-pub fn number(text: &str) -> Option<f64> {
-    let (digits, factor) = match text.char_indices().last()? {
-        (at, letter) if letter.is_ascii_alphabetic() => (&text[..at], suffix(letter)?),
-        _ => (text, 1.0),
-    };
-    let plain = digits.bytes().all(|b| b.is_ascii_digit() || b"+-.eE".contains(&b));
-    digits.parse::<f64>().ok().filter(|_| plain).map(|x| x * factor)
-}
-
-fn suffix(letter: char) -> Option<f64> {
-    Some(match letter {
-        'a' => 1e-18,
-        'f' => 1e-15,
-        'p' => 1e-12,
-        'n' => 1e-9,
-        'u' => 1e-6,
-        'm' => 1e-3,
-        'c' => 1e-2,
-        'd' => 1e-1,
-        'h' => 1e2,
-        'k' => 1e3,
-        'M' => 1e6,
-        'G' => 1e9,
-        'T' => 1e12,
-        'P' => 1e15,
-        'E' => 1e18,
-        _ => return None,
-    })
 }
 
 /// Reads netlist parameters from words: `NAME=VALUE` in one word, or NAME and VALUE in two.
@@ -119,21 +89,10 @@ mod tests {
         assert_eq!(Monitor::parse("odd:name").signal, "odd:name");
     }
 
-    /// SUGAR's suffixes: m is milli, M is mega.
-    #[test]
-    fn suffixes() {
-        for (text, value) in [("2.1u", 2.1e-6), ("5m", 5e-3), ("5M", 5e6), ("1e-3k", 1.0), ("-3", -3.0), ("7", 7.0)] {
-            assert!((number(text).unwrap() - value).abs() <= 1e-15 * value.abs(), "{text}");
-        }
-        for text in ["", "u", "1.2.3", "2uu", "nan", "inf", "abc"] {
-            assert_eq!(number(text), None, "{text}");
-        }
-    }
-
     /// Parameters read the same from whole words and from what ngspice 39 leaves of them.
     #[test]
     fn settings_in_both_forms() {
-        let want = vec![("w".to_owned(), Setting::Number(2.1 * 1e-6)), ("mode".to_owned(), Setting::Text("fast".into()))];
+        let want = vec![("w".to_owned(), Setting::Number(2.1e-6)), ("mode".to_owned(), Setting::Text("fast".into()))];
         assert_eq!(settings(&words("w=2.1u mode=fast")), Ok(want.clone()));
         assert_eq!(settings(&words("w=2.1u,mode=fast")), Ok(want.clone()));
         assert_eq!(settings(&words("w 2.1u mode fast")), Ok(want));

@@ -2,15 +2,15 @@
 
 use std::fmt::Arguments;
 use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::{LineWriter, Write};
 use std::sync::{Mutex, OnceLock, PoisonError};
 
-static LOG: OnceLock<Option<Mutex<BufWriter<File>>>> = OnceLock::new();
+static LOG: OnceLock<Option<Mutex<LineWriter<File>>>> = OnceLock::new();
 
-fn log() -> Option<&'static Mutex<BufWriter<File>>> {
+fn log() -> Option<&'static Mutex<LineWriter<File>>> {
     LOG.get_or_init(|| {
         let path = std::env::var_os("BIMORPH_LOG")?;
-        File::create(path).ok().map(|file| Mutex::new(BufWriter::new(file)))
+        File::create(path).ok().map(|file| Mutex::new(LineWriter::new(file)))
     })
     .as_ref()
 }
@@ -24,12 +24,5 @@ pub(crate) fn on() -> bool {
 pub(crate) fn line(text: Arguments<'_>) {
     if let Some(log) = log() {
         let _ = writeln!(log.lock().unwrap_or_else(PoisonError::into_inner), "{text}");
-    }
-}
-
-/// Empties the buffer into the file.
-pub(crate) fn flush() {
-    if let Some(log) = log() {
-        let _ = log.lock().unwrap_or_else(PoisonError::into_inner).flush();
     }
 }

@@ -1,0 +1,5 @@
+//! Decks run by ngspice with the plug-in loaded. Skipped aloud where ngspice is missing.
+
+mod analytic;
+mod support;
+mod syntax;

@@ -1,0 +1,96 @@
+//! What the tests that run ngspice share: finding it, running a deck, reading what came out.
+
+use bimorph::cosim::{self, CosimError, CosimOptions};
+use bimorph::results::table::{Samples, Table};
+use std::path::{Path, PathBuf};
+
+/// A deck's run: every plot of its raw file.
+pub(crate) struct Run {
+    pub(crate) plots: Vec<Table>,
+
+}
+
+/// True, and said aloud, where ngspice is missing.
+pub(crate) fn skipped() -> bool {
+    let missing = cosim::find_ngspice().is_none_or(|p| !p.is_file());
+    if missing {
+        eprintln!("SKIPPED: ngspice was not found, so no deck was run");
+    }
+    missing
+}
+
+/// Decks of the whole project.
+pub(crate) fn deck(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/decks").join(name)
+}
+
+/// Decks for the analytic device.
+pub(crate) fn analytic_deck(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/ngspice/decks").join(name)
+}
+
+/// The plug-in of the analytic example.
+pub(crate) fn analytic_plugin() -> PathBuf {
+    use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
+    let tests = std::env::current_exe().unwrap();
+    let built = tests.parent().unwrap().join("../examples").join(format!("{DLL_PREFIX}analytic{DLL_SUFFIX}"));
+    assert!(built.is_file(), "{} is missing; build it with `cargo build --example analytic`", built.display());
+    built
+}
+
+/// Runs a deck whose raw file is asked for, in a folder of its own.
+pub(crate) fn run(options: CosimOptions) -> Result<Run, CosimError> {
+    let folder = tempfile::tempdir().unwrap();
+    let raw = folder.path().join("out.raw");
+    cosim::run(&CosimOptions { raw: Some(raw.clone()), capture: true, ..options })?;
+    let plots = bimorph::results::raw::read(&std::fs::read(raw).unwrap()).unwrap();
+    Ok(Run { plots })
+}
+
+impl Run {
+    /// The plot whose name begins so ("Transient", "AC", "DC", "Operating").
+    pub(crate) fn plot(&self, name: &str) -> &Table {
+        self.plots.iter().find(|p| p.plot_name.starts_with(name)).unwrap_or_else(|| panic!("no plot {name}"))
+    }
+}
+
+/// A column of real samples.
+pub(crate) fn real<'a>(plot: &'a Table, name: &str) -> &'a [f64] {
+    match &plot.column(name).unwrap_or_else(|| panic!("no column {name}")).samples {
+        Samples::Real(samples) => samples,
+        Samples::Complex(_) => panic!("{name} is complex"),
+    }
+}
+
+/// A column of complex samples.
+pub(crate) fn complex<'a>(plot: &'a Table, name: &str) -> &'a [[f64; 2]] {
+    match &plot.column(name).unwrap_or_else(|| panic!("no column {name}")).samples {
+        Samples::Complex(samples) => samples,
+        Samples::Real(_) => panic!("{name} is real"),
+    }
+}
+
+/// The value of a waveform at `at`, straight between its points.
+pub(crate) fn value(t: &[f64], y: &[f64], at: f64) -> f64 {
+    let i = t.partition_point(|&x| x < at).clamp(1, t.len() - 1);
+    y[i - 1] + (y[i] - y[i - 1]) * (at - t[i - 1]) / (t[i] - t[i - 1])
+}
+
+/// Largest difference of two waveforms between `from` and `to`, over the range of the second.
+pub(crate) fn deviation(a: (&[f64], &[f64]), b: (&[f64], &[f64]), from: f64, to: f64) -> f64 {
+    let times: Vec<f64> = (0..=2000).map(|i| from + (to - from) * f64::from(i) / 2000.0).collect();
+    let (mut worst, mut low, mut high) = (0.0f64, f64::INFINITY, f64::NEG_INFINITY);
+    for at in times {
+        let (x, y) = (value(a.0, a.1, at), value(b.0, b.1, at));
+        worst = worst.max((x - y).abs());
+        (low, high) = (low.min(y), high.max(y));
+    }
+    worst / (high - low)
+}
+
+/// Largest difference of two complex columns over the largest magnitude of the second.
+pub(crate) fn complex_deviation(a: &[[f64; 2]], b: &[[f64; 2]]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    let worst = a.iter().zip(b).map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1])).fold(0.0, f64::max);
+    worst / b.iter().map(|b| b[0].hypot(b[1])).fold(0.0, f64::max)
+}

@@ -1,0 +1,76 @@
+//! How a `.model` line is read, as ngspice leaves it.
+
+use crate::support::{analytic_deck, analytic_plugin, skipped};
+use bimorph::cosim::{self, CosimError, CosimOptions};
+
+/// Writes a deck with this `.model` parameter list and instance, runs it, and returns the error's text, if any.
+fn refused(parameters: &str, instance: &str) -> Option<String> {
+    let folder = tempfile::tempdir().unwrap();
+    let deck = folder.path().join("deck.cir");
+    let text = format!("* syntax\nVd d 0 1\nVs s 0 1\n{instance}\nR1 x 0 1k\n.model m bimorph({parameters})\n.op\n.print op v(d)\n.end\n");
+    std::fs::write(&deck, text).unwrap();
+    let options =
+        CosimOptions { deck, plugin: Some(analytic_plugin()), capture: true, ..CosimOptions::default() };
+    match cosim::run(&options) {
+        Ok(_) => None,
+        Err(CosimError::Stopped { reason, .. }) => Some(reason),
+        Err(CosimError::Failed { output, .. }) => Some(output),
+        Err(other) => Some(other.to_string()),
+    }
+}
+
+const PLAIN: &str = "A1 %gd [d 0 s 0] %v [x] m";
+
+/// What users write is accepted: quotes, case, lists, settings, several forms of ports.
+#[test]
+fn accepted_forms() {
+    if skipped() {
+        return;
+    }
+    for (parameters, instance) in [
+        (r#"file="plate" ports=["drive" "sense"] monitors=["plate.x:1e6"]"#, PLAIN),
+        (r#"file="plate" monitors=["plate.x"] set=["w=2.1u" "F=0"] tol=1e-4 band=1e6 linear=true undamped=t"#, PLAIN),
+        (r#"file="plate" monitors=["plate.x"] set=["w=2.1u,F=0"] deadline=2"#, PLAIN),
+        (r#"file="plate""#, "A1 %gd [d 0 s 0] null m\nR2 x d 1k"),
+        (r#"file="plate""#, "A1 %g [d s] null m\nR2 x d 1k"),
+        (r#"file="plate" monitors=["plate.x"]"#, "A1 %gd [d 0 s 0] %vd [x d] m"),
+    ] {
+        assert_eq!(refused(parameters, instance), None, "{parameters}");
+    }
+}
+
+/// What cannot be used is refused before the analysis starts, with the instance, the model, and what is wrong.
+#[test]
+fn refusals() {
+    if skipped() {
+        return;
+    }
+    let head = "instance a1 (model m): ";
+    for (parameters, instance, want) in [
+        (r#"monitors=["plate.x"]"#, PLAIN, "the .model line names no netlist; write file=\"NAME.net\""),
+        (r#"file="plate" monitors=["Plate.X"]"#, PLAIN, "\"plate\": no signal named \"Plate.X\"; there is plate.x"),
+        (r#"file="plate" ports=["a"] monitors=["plate.x"]"#, PLAIN, "ports: the .model line names 1, but the instance connects 2"),
+        (r#"file="plate""#, PLAIN, "monitors: the .model line names 0, but the instance connects 1"),
+        (r#"file="plate" monitors=["plate.x"] tol=-1"#, PLAIN, "tol=-1 must be positive"),
+        (r#"file="plate" monitors=["plate.x"] set=["w"]"#, PLAIN, "set: \"w\" has no value; write set=[\"NAME=VALUE\" …] with quotes"),
+    ] {
+        assert_eq!(refused(parameters, instance), Some(format!("{head}{want}")), "{parameters}");
+    }
+}
+
+/// A deck that is not there, and one that asks for nothing, are errors.
+#[test]
+fn nothing_to_run() {
+    if skipped() {
+        return;
+    }
+    let options = CosimOptions {
+        deck: analytic_deck("none.cir"),
+        plugin: Some(analytic_plugin()),
+        capture: true,
+        ..CosimOptions::default()
+    };
+    assert!(matches!(cosim::run(&options), Err(CosimError::Deck { .. })));
+    let options = CosimOptions { deck: analytic_deck("two.cir"), ..options };
+    assert!(matches!(cosim::run(&options), Err(CosimError::NothingRun { .. })));
+}
