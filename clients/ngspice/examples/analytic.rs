@@ -185,7 +185,7 @@ impl Device for Plate {
     }
 }
 
-fn open(card: &ModelCard, _: Option<&Path>) -> Result<Box<dyn Device>, OpenError> {
+fn open(card: &mut ModelCard, _: Option<&Path>) -> Result<Box<dyn Device>, OpenError> {
     Ok(Box::new(Plate { behaviour: card.file.clone(), states: BTreeMap::new() }))
 }
 

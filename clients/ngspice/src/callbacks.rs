@@ -140,9 +140,9 @@ unsafe fn open_all(mut model: *mut Model) -> Result<(), String> {
                 let card = ModelCard::new(&call::card(this.param, this.num_param), remote.clone());
                 let (ports, monitors) = (call::size(at.conn, PORTS), call::size(at.conn, MONITORS));
                 let directory = deck_directory(at.conn);
-                let opened = card.map_err(|e| e.to_string()).and_then(|card| {
+                let opened = card.map_err(|e| e.to_string()).and_then(|mut card| {
                     card.check_counts(ports, monitors).map_err(|e| e.to_string())?;
-                    open(&name, &card, ports, directory.as_deref())
+                    open(&name, &mut card, ports, directory.as_deref())
                 });
                 let model_name = call::text(this.name).unwrap_or_default();
                 let opened = opened.map_err(|e| format!("instance {name} (model {model_name}): {e}"))?;
@@ -155,9 +155,9 @@ unsafe fn open_all(mut model: *mut Model) -> Result<(), String> {
     Ok(())
 }
 
-fn open(name: &str, card: &ModelCard, ports: usize, directory: Option<&Path>) -> Result<Instance, String> {
-    trace::line(format_args!("{name}: {card:?}, deck in {directory:?}"));
+fn open(name: &str, card: &mut ModelCard, ports: usize, directory: Option<&Path>) -> Result<Instance, String> {
     let device = opener::open(card, directory).map_err(|e| e.to_string())?;
+    trace::line(format_args!("{name}: {card:?}, deck in {directory:?}"));
     Instance::open(name, device, &card.ports, ports, &card.monitors).map_err(|e| format!("\"{}\": {e}", card.file))
 }
 

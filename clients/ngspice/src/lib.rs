@@ -11,7 +11,7 @@
 //! # Layout
 //! What ngspice's memory looks like: `abi` the structures, [`layout`] which host this is, `table` what the plug-in
 //! declares, `exports` the symbols, `host` the host's functions, `call` one call's data. Between the two sides stand
-//! `callbacks`. What does not know ngspice: [`model_card`] and [`settings`] the `.model` line, [`opener`] from line to
+//! `callbacks`. What does not know ngspice: [`model_card`], [`settings`] and `names` the `.model` line, [`opener`] from line to
 //! device, [`instance`] questions and outcomes, [`companion`] charges to currents, [`history`] what an accepted point
 //! leaves behind.
 //!
@@ -30,6 +30,7 @@ mod host;
 pub mod instance;
 pub mod layout;
 pub mod model_card;
+mod names;
 pub mod opener;
 mod panics;
 pub mod settings;

@@ -54,11 +54,14 @@ pub enum CardError {
     #[error("the .model line names no netlist; write file=\"NAME.net\"")]
     NoFile,
     /// `set` holds a name without a value.
-    #[error("set: \"{word}\" has no value; write set=[\"NAME=VALUE\" …] with quotes")]
+    #[error("set: \"{word}\" has no value; write set=[\"NAME=VALUE\" …]")]
     Set {
         /// The name.
         word: String,
     },
+    /// An address that ngspice cut at its `//`.
+    #[error("remote: ngspice takes // for a comment; write remote=\"unix:/PATH\" or remote=\"HOST:PORT\"")]
+    Address,
     /// A number is not positive.
     #[error("{name}={value} must be positive")]
     NotPositive {
@@ -97,7 +100,10 @@ impl ModelCard {
             file: raw.file.clone().filter(|f| !f.is_empty()).ok_or(CardError::NoFile)?,
             ports: settings::rejoin(&raw.ports),
             monitors: settings::rejoin(&raw.monitors).iter().map(|m| Monitor::parse(m)).collect(),
-            remote: remote.or_else(|| raw.remote.clone()).filter(|r| !r.is_empty()),
+            remote: match remote.or_else(|| raw.remote.clone()).filter(|r| !r.is_empty()) {
+                Some(cut) if ["unix:", "http:", "grpc:"].contains(&cut.as_str()) => return Err(CardError::Address),
+                address => address,
+            },
             options: CompileOptions {
                 set: settings::settings(&raw.set).map_err(|word| CardError::Set { word })?,
                 band: positive("band", raw.band)?,
@@ -163,7 +169,7 @@ mod tests {
         assert_eq!((card.options.tol, card.options.band), (1e-4, Some(1e6)));
         assert!(card.options.linear && card.options.undamped && card.options.set.len() == 1);
         assert_eq!(card.deadline, Duration::from_millis(500));
-        assert_eq!(ModelCard::new(&raw, Some("b".into())).unwrap().remote.as_deref(), Some("b"));
+        assert_eq!(ModelCard::new(&raw, Some("b:1".into())).unwrap().remote.as_deref(), Some("b:1"));
         assert_eq!(card.check_counts(1, 1), Err(CardError::Count { what: "ports", names: 2, nodes: 1 }));
         assert_eq!(card.check_counts(2, 0), Err(CardError::Count { what: "monitors", names: 1, nodes: 0 }));
     }
@@ -174,6 +180,8 @@ mod tests {
         assert_eq!(ModelCard::new(&RawCard::default(), None), Err(CardError::NoFile));
         let bad = RawCard { tol: Some(0.0), ..raw() };
         assert_eq!(ModelCard::new(&bad, None), Err(CardError::NotPositive { name: "tol", value: 0.0 }));
+        let bad = RawCard { remote: Some("unix:".into()), ..raw() };
+        assert_eq!(ModelCard::new(&bad, None), Err(CardError::Address));
         let bad = RawCard { set: vec!["w".into()], ..raw() };
         assert_eq!(ModelCard::new(&bad, None), Err(CardError::Set { word: "w".into() }));
     }

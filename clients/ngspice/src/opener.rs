@@ -1,10 +1,11 @@
 //! From a `.model` line to a device: find the netlist, compile it once, step it here or on a server.
 
 use crate::model_card::ModelCard;
+use crate::names;
 use bimorph::compile::{CompileError, CompileOptions, Compiled, compile};
 use bimorph::device::local::LocalDevice;
 use bimorph::device::{Device, DeviceError};
-use bimorph::netlist::Bundle;
+use bimorph::netlist::{self, Bundle};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use thiserror::Error;
@@ -34,12 +35,14 @@ pub enum OpenError {
     #[error(transparent)]
     Device(#[from] DeviceError),
     /// `remote` is asked for in a build that has no client.
+    #[cfg(not(feature = "remote"))]
     #[error("remote=\"{0}\": this build of the plug-in steps models in process only (it was built without \"remote\")")]
     NoRemote(String),
 }
 
-/// Makes a device from a line; `directory` is the deck's, where it is known.
-pub type Opener = fn(&ModelCard, Option<&Path>) -> Result<Box<dyn Device>, OpenError>;
+/// Makes a device from a line; `directory` is the deck's, where it is known. Names on the line are put into the spelling
+/// of the netlist.
+pub type Opener = fn(&mut ModelCard, Option<&Path>) -> Result<Box<dyn Device>, OpenError>;
 
 static OPENER: OnceLock<Opener> = OnceLock::new();
 
@@ -53,7 +56,7 @@ pub fn set_opener(opener: Opener) {
 ///
 /// # Errors
 /// [`OpenError`]
-pub(crate) fn open(card: &ModelCard, directory: Option<&Path>) -> Result<Box<dyn Device>, OpenError> {
+pub(crate) fn open(card: &mut ModelCard, directory: Option<&Path>) -> Result<Box<dyn Device>, OpenError> {
     OPENER.get().copied().unwrap_or(open_model)(card, directory)
 }
 
@@ -61,12 +64,30 @@ pub(crate) fn open(card: &ModelCard, directory: Option<&Path>) -> Result<Box<dyn
 ///
 /// # Errors
 /// [`OpenError`]
-pub fn open_model(card: &ModelCard, directory: Option<&Path>) -> Result<Box<dyn Device>, OpenError> {
+pub fn open_model(card: &mut ModelCard, directory: Option<&Path>) -> Result<Box<dyn Device>, OpenError> {
     let bundle = read(&card.file, directory)?;
+    if !card.options.set.is_empty()
+        && let Ok(plain) = netlist::load(&bundle, &[])
+    {
+        names::respell_settings(card, plain.parameters.iter().map(|(name, _)| name.as_str()));
+    }
+    // Also where a server compiles the model: a netlist with errors is refused here, with file and line.
+    let loaded = netlist::load(&bundle, &card.options.set)
+        .map_err(|e| OpenError::Compile { file: card.file.clone(), source: CompileError::Netlist(e) })?;
+    names::respell(card, &loaded.structure);
     match &card.remote {
         None => Ok(Box::new(LocalDevice::new(compiled(&card.file, bundle, &card.options)?))),
         Some(address) => connect(address, &bundle, card),
     }
+}
+
+#[cfg(feature = "remote")]
+fn connect(address: &str, bundle: &Bundle, card: &ModelCard) -> Result<Box<dyn Device>, OpenError> {
+    use bimorph::service::client::RemoteDevice;
+    let socket = address.strip_prefix("unix:").and_then(|p| names::existing(Path::new(p.trim_start_matches("//"))));
+    let respelled = socket.map(|path| format!("unix://{}", path.display()));
+    let address = respelled.as_deref().unwrap_or(address);
+    Ok(Box::new(RemoteDevice::connect(address, bundle, &card.options, card.deadline)?))
 }
 
 #[cfg(not(feature = "remote"))]
@@ -78,8 +99,8 @@ fn connect(address: &str, _: &Bundle, _: &ModelCard) -> Result<Box<dyn Device>, 
 fn read(file: &str, directory: Option<&Path>) -> Result<Bundle, OpenError> {
     let beside = directory.map(|d| d.join(file));
     let candidates: Vec<PathBuf> = beside.into_iter().chain([PathBuf::from(file)]).collect();
-    let path = candidates.iter().find(|p| p.is_file()).unwrap_or(&candidates[0]);
-    Bundle::read(path, &[]).map_err(|source| OpenError::File {
+    let path = candidates.iter().find_map(|p| names::existing(p)).unwrap_or_else(|| candidates[0].clone());
+    Bundle::read(&path, &[]).map_err(|source| OpenError::File {
         file: file.to_owned(),
         tried: candidates.iter().map(|p| format!("\"{}\"", p.display())).collect::<Vec<_>>().join(", "),
         source,

@@ -25,15 +25,15 @@ impl Monitor {
     }
 }
 
-/// Reads netlist parameters from words: `NAME=VALUE` in one word, or NAME and VALUE in two.
+/// Reads netlist parameters from words: `NAME=VALUE` or `NAME:VALUE` in one word, or NAME and VALUE in two.
 ///
 /// # Errors
 /// The word that has no partner.
 pub fn settings(words: &[String]) -> Result<Vec<(String, Setting)>, String> {
     let mut set = Vec::new();
-    let mut parts = words.iter().flat_map(|w| w.split(','));
+    let mut parts = words.iter().map(String::as_str);
     while let Some(part) = parts.next() {
-        let (name, value) = match part.split_once('=') {
+        let (name, value) = match part.split_once(['=', ':']) {
             Some(pair) => pair,
             None => (part, parts.next().ok_or_else(|| part.to_owned())?),
         };
@@ -41,7 +41,10 @@ pub fn settings(words: &[String]) -> Result<Vec<(String, Setting)>, String> {
         if name.is_empty() || value.is_empty() {
             return Err(part.to_owned());
         }
-        let setting = number(value).map_or_else(|| Setting::Text(value.to_owned()), Setting::Number);
+        // SPICE's word for mega, since a host that lower-cases the line turns SUGAR's M into m.
+        let mega = value.len().checked_sub(3).and_then(|at| value.get(at..)).filter(|s| s.eq_ignore_ascii_case("meg"));
+        let written = mega.map_or_else(|| value.to_owned(), |_| format!("{}M", &value[..value.len() - 3]));
+        let setting = number(&written).map_or_else(|| Setting::Text(value.to_owned()), Setting::Number);
         set.push((name.to_owned(), setting));
     }
     Ok(set)
@@ -94,9 +97,10 @@ mod tests {
     fn settings_in_both_forms() {
         let want = vec![("w".to_owned(), Setting::Number(2.1e-6)), ("mode".to_owned(), Setting::Text("fast".into()))];
         assert_eq!(settings(&words("w=2.1u mode=fast")), Ok(want.clone()));
-        assert_eq!(settings(&words("w=2.1u,mode=fast")), Ok(want.clone()));
+        assert_eq!(settings(&words("w:2.1u mode:fast")), Ok(want.clone()));
         assert_eq!(settings(&words("w 2.1u mode fast")), Ok(want));
         assert_eq!(settings(&words("w 2.1u mode")), Err("mode".to_owned()));
+        assert_eq!(settings(&words("f=2meg")), Ok(vec![("f".to_owned(), Setting::Number(2e6))]));
     }
 
     /// Names with indices survive the splitting at parentheses.

@@ -29,8 +29,8 @@ fn accepted_forms() {
     }
     for (parameters, instance) in [
         (r#"file="plate" ports=["drive" "sense"] monitors=["plate.x:1e6"]"#, PLAIN),
-        (r#"file="plate" monitors=["plate.x"] set=["w=2.1u" "F=0"] tol=1e-4 band=1e6 linear=true undamped=t"#, PLAIN),
-        (r#"file="plate" monitors=["plate.x"] set=["w=2.1u,F=0"] deadline=2"#, PLAIN),
+        (r#"file="plate" monitors=["plate.x"] set=["w=2.1u" "F=0"] tol=1e-4 band=1e6 linear=true undamped=true"#, PLAIN),
+        (r#"file="plate" monitors=["plate.x"] set=["w:2.1u" "mode:fast"] deadline=2"#, PLAIN),
         (r#"file="plate""#, "A1 %gd [d 0 s 0] null m\nR2 x d 1k"),
         (r#"file="plate""#, "A1 %g [d s] null m\nR2 x d 1k"),
         (r#"file="plate" monitors=["plate.x"]"#, "A1 %gd [d 0 s 0] %vd [x d] m"),
@@ -48,29 +48,39 @@ fn refusals() {
     let head = "instance a1 (model m): ";
     for (parameters, instance, want) in [
         (r#"monitors=["plate.x"]"#, PLAIN, "the .model line names no netlist; write file=\"NAME.net\""),
-        (r#"file="plate" monitors=["Plate.X"]"#, PLAIN, "\"plate\": no signal named \"Plate.X\"; there is plate.x"),
+        (r#"file="plate" monitors=["plate.y"]"#, PLAIN, "\"plate\": no signal named \"plate.y\"; there is plate.x"),
         (r#"file="plate" ports=["a"] monitors=["plate.x"]"#, PLAIN, "ports: the .model line names 1, but the instance connects 2"),
         (r#"file="plate""#, PLAIN, "monitors: the .model line names 0, but the instance connects 1"),
         (r#"file="plate" monitors=["plate.x"] tol=-1"#, PLAIN, "tol=-1 must be positive"),
-        (r#"file="plate" monitors=["plate.x"] set=["w"]"#, PLAIN, "set: \"w\" has no value; write set=[\"NAME=VALUE\" …] with quotes"),
+        (r#"file="plate" monitors=["plate.x"] set=["w"]"#, PLAIN, "set: \"w\" has no value; write set=[\"NAME=VALUE\" …]"),
     ] {
         assert_eq!(refused(parameters, instance), Some(format!("{head}{want}")), "{parameters}");
     }
 }
 
-/// A deck that is not there, and one that asks for nothing, are errors.
+/// A deck that is not there is an error.
 #[test]
-fn nothing_to_run() {
-    if skipped() {
-        return;
-    }
+fn no_deck() {
     let options = CosimOptions {
         deck: analytic_deck("none.cir"),
+        ngspice: Some("ngspice".into()),
         plugin: Some(analytic_plugin()),
         capture: true,
         ..CosimOptions::default()
     };
     assert!(matches!(cosim::run(&options), Err(CosimError::Deck { .. })));
-    let options = CosimOptions { deck: analytic_deck("two.cir"), ..options };
+}
+
+/// A deck whose analyses print nothing and whose raw file nobody asks for is not run by ngspice: an error, not silence.
+#[test]
+fn nothing_to_run() {
+    if skipped() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let deck = folder.path().join("deck.cir");
+    std::fs::write(&deck, "* silent\nV1 a 0 1\nR1 a 0 1\n.tran 1u 10u\n.end\n").unwrap();
+    let options =
+        CosimOptions { deck, plugin: Some(analytic_plugin()), capture: true, ..CosimOptions::default() };
     assert!(matches!(cosim::run(&options), Err(CosimError::NothingRun { .. })));
 }

@@ -1,0 +1,120 @@
+//! ngspice 39 lower-cases `.model` lines, also inside quotes. Names and paths are therefore looked up without regard to
+//! case where they are not found as spelled.
+
+use crate::model_card::ModelCard;
+use bimorph::structure::Structure;
+use std::path::{Component, Path, PathBuf};
+
+/// The one candidate that is `wanted`, or else the only one that differs from it in case alone.
+fn spelled<'a>(wanted: &str, candidates: impl Iterator<Item = &'a str> + Clone) -> Option<&'a str> {
+    if let Some(same) = candidates.clone().find(|c| *c == wanted) {
+        return Some(same);
+    }
+    let mut close = candidates.filter(|c| c.eq_ignore_ascii_case(wanted));
+    close.next().filter(|first| close.all(|other| other == *first))
+}
+
+/// Puts ports and monitors into the netlist's spelling. Names it does not know stay as they are, for the device to
+/// refuse.
+pub(crate) fn respell(card: &mut ModelCard, structure: &Structure) {
+    let ports = structure.ports.iter().map(|p| p.name.as_str());
+    for name in &mut card.ports {
+        if let Some(port) = spelled(name, ports.clone()) {
+            *name = port.to_owned();
+        }
+    }
+    let owners = (structure.nodes.iter().map(|n| n.name.as_str()))
+        .chain(structure.beams.iter().map(|b| b.name.as_str()))
+        .chain(structure.combs.iter().map(|c| c.name.as_str()))
+        .chain(structure.plate_gaps.iter().map(|g| g.name.as_str()))
+        .chain(structure.beam_gaps.iter().map(|g| g.name.as_str()));
+    for monitor in &mut card.monitors {
+        if let Some((owner, quantity)) = monitor.signal.rsplit_once('.') {
+            let owner = spelled(owner, owners.clone()).unwrap_or(owner);
+            // Temperature is the only quantity with a capital letter.
+            let quantity = if quantity == "t" { "T" } else { quantity };
+            monitor.signal = format!("{owner}.{quantity}");
+        }
+    }
+}
+
+/// Puts the names of settings into the spelling of the netlist's parameters.
+pub(crate) fn respell_settings<'a>(card: &mut ModelCard, parameters: impl Iterator<Item = &'a str> + Clone) {
+    for (name, _) in &mut card.options.set {
+        if let Some(parameter) = spelled(name, parameters.clone()) {
+            *name = parameter.to_owned();
+        }
+    }
+}
+
+/// What is at `path`, or else the only thing whose path differs from it in case alone.
+pub(crate) fn existing(path: &Path) -> Option<PathBuf> {
+    if path.exists() {
+        return Some(path.to_owned());
+    }
+    let mut found = PathBuf::new();
+    for part in path.components() {
+        let exact = found.join(part);
+        let Component::Normal(name) = part else {
+            found = exact;
+            continue;
+        };
+        found = if exact.exists() {
+            exact
+        } else {
+            let folder = if found.as_os_str().is_empty() { Path::new(".") } else { &found };
+            let mut close = std::fs::read_dir(folder)
+                .ok()?
+                .filter_map(|e| e.ok().map(|e| e.file_name()))
+                .filter(|n| n.eq_ignore_ascii_case(name));
+            let one = close.next().filter(|_| close.next().is_none())?;
+            found.join(one)
+        };
+    }
+    found.exists().then_some(found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model_card::RawCard;
+    use bimorph::netlist::{Bundle, load};
+
+    const NETLIST: &str = "param Width=2u, w=1u\nanchor * [F] [l=1u w=1u h=1u]\nmass2d * [Yoke] [m=1e-10]\n\
+        guide2d * [Yoke] []\nspring2d * [F Yoke] [kx=1]\nanchor * [e] [l=1u w=1u h=1u]\n\
+        Gap plategap2d * [Yoke e] [A=1e-8 gap=2u]\neground * [e] []\nDrive port * [Yoke e] []\n";
+
+    /// Lower-cased names find their netlist's spelling; unknown ones stay.
+    #[test]
+    fn respells_what_ngspice_lower_cased() {
+        let loaded = load(&Bundle::from_text("n", NETLIST), &[]).unwrap_or_else(|d| panic!("{d}"));
+        let words = |text: &str| text.split(' ').map(str::to_owned).collect();
+        let raw = RawCard {
+            file: Some("n".into()),
+            ports: words("drive other"),
+            monitors: words("yoke.x:1e6 gap.q yoke.t"),
+            set: words("width=3u w=4u"),
+            ..RawCard::default()
+        };
+        let mut card = ModelCard::new(&raw, None).unwrap();
+        respell(&mut card, &loaded.structure);
+        respell_settings(&mut card, loaded.parameters.iter().map(|(n, _)| n.as_str()));
+        assert_eq!(card.ports, ["Drive", "other"]);
+        let signals: Vec<_> = card.monitors.iter().map(|m| m.signal.as_str()).collect();
+        assert_eq!(signals, ["Yoke.x", "Gap.q", "Yoke.T"]);
+        let set: Vec<_> = card.options.set.iter().map(|(n, _)| n.as_str()).collect();
+        assert_eq!(set, ["Width", "w"]);
+    }
+
+    /// A lower-cased path finds its file, but not where two files differ in case alone.
+    #[test]
+    fn finds_lower_cased_files() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::create_dir(folder.path().join("Parts")).unwrap();
+        let bank = folder.path().join("Parts/Bank.net");
+        std::fs::write(&bank, "").unwrap();
+        assert_eq!(existing(&folder.path().join("parts/bank.net")), Some(bank));
+        std::fs::write(folder.path().join("Parts/BANK.net"), "").unwrap();
+        assert_eq!(existing(&folder.path().join("parts/bank.net")), None);
+    }
+}
