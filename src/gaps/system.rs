@@ -152,6 +152,22 @@ impl System {
         }
     }
 
+    /// Change of a gap's distance with a change `dq` of the configuration [m].
+    pub fn distance_slope(&self, gap: usize, q: &[Pose], dq: &[Pose]) -> f64 {
+        let along = |a: &Approach| {
+            let g = a.measure(q, self.model.linear).gradient;
+            g.fixed_rows::<3>(0).dot(&Model::pose(dq, a.a.body)) + g.fixed_rows::<3>(3).dot(&Model::pose(dq, a.b.body))
+        };
+        match &self.gaps[gap] {
+            Gap::Single { approach, capacitor: Capacitor::Comb { .. }, .. } => along(approach),
+            Gap::Single { approach, .. } => -along(approach),
+            Gap::Facing { ends, side, .. } => {
+                let z = self.ends(ends, *side, q);
+                along(&ends[usize::from(z[2] < z[0])])
+            }
+        }
+    }
+
     /// True when some gap is so far closed that its contact force acts.
     pub fn in_contact(&self, q: &[Pose]) -> bool {
         (0..self.gaps.len()).any(|g| {

@@ -11,6 +11,7 @@
 //! Anal. 35 (1998), for the fall.
 
 use super::SolveError;
+use super::path::LoadPath;
 use crate::gaps::{Drive, System};
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
@@ -45,14 +46,6 @@ pub struct Path {
     pub fold: Option<f64>,
     /// Share of the path that was reached: 1 unless it stopped at a fold.
     pub reached: f64,
-}
-
-/// A path of drives: fills in the drive, or its rate of change with s, at s.
-pub trait LoadPath {
-    /// The drive at `s` in 0…1.
-    fn at(&self, s: f64, drive: &mut Drive);
-    /// d(drive)/ds at `s`.
-    fn slope(&self, s: f64, slope: &mut Drive);
 }
 
 /// Solver with its storage. Nothing is allocated after [`Equilibrium::new`].

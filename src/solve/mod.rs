@@ -3,13 +3,17 @@
 //! | file | what it holds |
 //! |---|---|
 //! | [`equilibrium`] | static equilibrium along a path of loads: Newton, load stepping, folds and jumps |
+//! | [`path`] | source voltages and loads along which an equilibrium is followed |
 //! | [`rodas4`] | the default integrator: a Rosenbrock method with one factorization a step, and its sensitivities |
+//! | [`adaptive`] | error control of the integrator |
 //! | [`eigen`] | lowest natural frequencies: shift-invert Lanczos on the same factor |
 //! | [`harmonic`] | small-signal response at one frequency: the same factorization over complex numbers |
 
+pub mod adaptive;
 pub mod eigen;
 pub mod equilibrium;
 pub mod harmonic;
+pub mod path;
 pub mod rodas4;
 
 use crate::multibody::factor::ZeroPivot;
