@@ -1,5 +1,6 @@
 //! What one server allows.
 
+use super::proto;
 use std::time::Duration;
 
 /// Limits of a server. A request beyond one is answered with RESOURCE_EXHAUSTED and a message that names it.
@@ -30,6 +31,8 @@ pub struct Limits {
     pub modes: usize,
     /// Analyses computed at once, default the number of cores; others wait their turn.
     pub analyses: usize,
+    /// Most connections at once, default 512; further ones are closed as they come.
+    pub connections: usize,
     /// Most HTTP/2 streams of one connection, default 128.
     pub streams_per_connection: u32,
     /// Longest unary call [s], default 120 s; then DEADLINE_EXCEEDED.
@@ -56,10 +59,30 @@ impl Default for Limits {
             transient_values: 100_000_000,
             modes: 1_000,
             analyses: std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
+            connections: 512,
             streams_per_connection: 128,
             request_timeout: Duration::from_secs(120),
             idle: Duration::from_secs(600),
             drain: Duration::from_secs(5),
+        }
+    }
+}
+
+impl Limits {
+    /// The limits as Info tells them.
+    pub(super) fn to_wire(&self) -> proto::Limits {
+        proto::Limits {
+            message_bytes: self.message_bytes as u64,
+            netlist_bytes: self.netlist_bytes as u64,
+            unknowns: self.unknowns as u64,
+            models: self.models as u64,
+            sessions: self.sessions as u64,
+            states_per_session: self.states_per_session as u64,
+            sweep_points: self.sweep_points as u64,
+            sweeps: self.sweeps as u64,
+            transient_values: self.transient_values as u64,
+            request_timeout_s: self.request_timeout.as_secs_f64(),
+            idle_s: self.idle.as_secs_f64(),
         }
     }
 }

@@ -1,14 +1,40 @@
 //! The gRPC service (`bimorph.v1`) and its blocking clients.
 //!
 //! # Layout
-//! [`proto`] is what travels and `convert` the only place that knows both it and the library's own types. [`client`] is
-//! built with the feature `remote` alone; the rest is the feature `server`: [`server`] listens and stops, [`limits`]
-//! says what clients may ask for.
+//! [`proto`] is what travels and [`convert`] the only place that knows both it and the library's own types. [`client`]
+//! is built with the feature `remote` alone. The rest is the feature `server`: [`server`] listens and stops
+//! (`sockets`, `connection`, `shutdown`), `rpc` answers calls, `stream` is the Newton loop, `models`, `sessions` and
+//! `sweeps` keep what clients can name, `work` computes, `chunks` sends what is long, `status` says what went wrong,
+//! and [`limits`] is what clients may ask for.
 
 pub mod address;
 pub mod client;
+pub mod convert;
 pub mod proto;
 
+#[cfg(feature = "server")]
+mod chunks;
+#[cfg(feature = "server")]
+mod connection;
+#[cfg(feature = "server")]
 pub mod limits;
 #[cfg(feature = "server")]
+mod models;
+#[cfg(feature = "server")]
+mod rpc;
+#[cfg(feature = "server")]
 pub mod server;
+#[cfg(feature = "server")]
+mod sessions;
+#[cfg(feature = "server")]
+mod shutdown;
+#[cfg(feature = "server")]
+mod sockets;
+#[cfg(feature = "server")]
+mod status;
+#[cfg(feature = "server")]
+mod stream;
+#[cfg(feature = "server")]
+mod sweeps;
+#[cfg(feature = "server")]
+mod work;

@@ -2,8 +2,25 @@
 
 use super::address::Address;
 use super::limits::Limits;
+use super::models::Models;
+use super::proto::{DESCRIPTORS, bimorph_server::BimorphServer};
+use super::rpc::{Calls, Shared};
+use super::sessions::Sessions;
+use super::shutdown::{GRACE, Shutdown};
+use super::sockets::Listener;
+use super::sweeps::Sweeps;
+use super::work::Work;
+use crate::compile::Compiled;
+use crate::device::Device;
+use crate::device::local::LocalDevice;
 use std::future::Future;
+use std::hash::{BuildHasher, RandomState};
+use std::sync::Arc;
+use std::time::Duration;
 use thiserror::Error;
+use tokio::sync::{Semaphore, mpsc};
+use tokio_stream::wrappers::ReceiverStream;
+use tonic::transport::Server;
 
 /// What a server may be told.
 pub struct ServeOptions {
@@ -17,6 +34,15 @@ pub struct ServeOptions {
     pub ready: Box<dyn FnOnce(&[Address]) + Send>,
 }
 
+/// Makes the device of a session.
+pub type MakeDevice = fn(Arc<Compiled>) -> Box<dyn Device>;
+
+impl Default for ServeOptions {
+    fn default() -> Self {
+        Self { listen: Vec::new(), insecure: false, limits: Limits::default(), ready: Box::new(|_| {}) }
+    }
+}
+
 /// Why a server does not run.
 #[derive(Debug, Error)]
 #[non_exhaustive]
@@ -25,8 +51,10 @@ pub enum ServeError {
     #[error("no address to listen on; expected unix:///path or 127.0.0.1:50051")]
     NoAddress,
     /// A TCP address beyond this machine, without [`ServeOptions::insecure`].
-    #[error("{address} can be reached from other machines, and the service has no passwords and no encryption; listen \
-             on 127.0.0.1 or a Unix socket, or pass --insecure if the network is trusted")]
+    #[error(
+        "{address} can be reached from other machines, and the service has no passwords and no encryption; listen \
+             on 127.0.0.1 or a Unix socket, or pass --insecure if the network is trusted"
+    )]
     NotLoopback {
         /// The address.
         address: Address,
@@ -64,15 +92,142 @@ pub enum ServeError {
 /// # Errors
 /// [`ServeError`]; a clean stop is `Ok`.
 pub async fn run(options: ServeOptions, shutdown: impl Future<Output = ()> + Send) -> Result<(), ServeError> {
-    let _ = (options, shutdown);
-    Err(ServeError::NoAddress)
+    run_with(options, |compiled| Box::new(LocalDevice::new(compiled)), shutdown).await
 }
 
-/// [`run`] on threads of its own, until SIGINT or SIGTERM: what `bimorph serve` calls.
+/// [`run`] with devices of another make: a measuring or a faulty one, say.
+///
+/// # Errors
+/// [`ServeError`].
+pub async fn run_with(
+    options: ServeOptions,
+    make: MakeDevice,
+    shutdown: impl Future<Output = ()> + Send,
+) -> Result<(), ServeError> {
+    let ServeOptions { listen, insecure, limits, ready } = options;
+    if listen.is_empty() {
+        return Err(ServeError::NoAddress);
+    }
+    let mut listeners = Vec::with_capacity(listen.len());
+    for address in &listen {
+        listeners.push(Listener::bind(address, insecure).await?);
+    }
+    let bound: Vec<Address> = listeners.iter().map(Listener::address).collect();
+    let signals = Shutdown::default();
+    let (sender, incoming) = mpsc::channel(16);
+    let places = Arc::new(Semaphore::new(limits.connections));
+    let mut accepting = tokio::task::JoinSet::new();
+    for listener in listeners {
+        accepting.spawn(listener.accept(Arc::clone(&places), signals.clone(), sender.clone()));
+    }
+    drop(sender);
+
+    // Ids of one run mean nothing to the next.
+    let instance = RandomState::new().hash_one(std::process::id()) as u32;
+    let shared = Arc::new(Shared {
+        work: Work::new(limits.analyses, limits.request_timeout, signals.clone()),
+        limits,
+        make,
+        models: Models::default(),
+        sessions: Sessions::new(instance),
+        sweeps: Sweeps::new(instance),
+        shutdown: signals.clone(),
+    });
+    let calls = BimorphServer::new(Calls(Arc::clone(&shared)))
+        .max_decoding_message_size(shared.limits.message_bytes)
+        .max_encoding_message_size(shared.limits.message_bytes);
+    let (health, health_service) = tonic_health::server::health_reporter();
+    health.set_serving::<BimorphServer<Calls>>().await;
+    let reflection = || {
+        tonic_reflection::server::Builder::configure()
+            .register_encoded_file_descriptor_set(DESCRIPTORS)
+            .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
+    };
+    let transport = |error: &dyn std::error::Error| ServeError::Transport(with_sources(error));
+    let mut serving = std::pin::pin!(
+        Server::builder()
+            .max_concurrent_streams(shared.limits.streams_per_connection)
+            .add_service(calls)
+            .add_service(health_service)
+            .add_service(reflection().build_v1().map_err(|error| transport(&error))?)
+            .add_service(reflection().build_v1alpha().map_err(|error| transport(&error))?)
+            .serve_with_incoming_shutdown(ReceiverStream::new(incoming), signals.draining.clone().cancelled_owned())
+    );
+    let expiry = tokio::spawn(expire(Arc::clone(&shared)));
+    ready(&bound);
+
+    let served = tokio::select! {
+        served = &mut serving => Some(served),
+        () = shutdown => None,
+    };
+    health.set_not_serving::<BimorphServer<Calls>>().await;
+    signals.draining.cancel();
+    shared.sweeps.cancel_all();
+    while accepting.join_next().await.is_some() {}
+    let mut ended = served;
+    for (signal, wait) in [(&signals.ending, shared.limits.drain), (&signals.cutting, GRACE)] {
+        if ended.is_none() {
+            ended = tokio::time::timeout(wait, &mut serving).await.ok();
+        }
+        signal.cancel();
+    }
+    if ended.is_none() {
+        ended = tokio::time::timeout(GRACE, &mut serving).await.ok();
+    }
+    expiry.abort();
+    ended.unwrap_or(Ok(())).map_err(|error| transport(&error))
+}
+
+/// [`run`] on threads of its own, until SIGINT or SIGTERM: what `bimorph serve` calls. A second signal stops at once.
 ///
 /// # Errors
 /// [`ServeError`].
 pub fn run_until_signal(options: ServeOptions) -> Result<(), ServeError> {
-    let _ = options;
-    Err(ServeError::NoAddress)
+    let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build().map_err(ServeError::Runtime)?;
+    let outcome = runtime.block_on(async {
+        use tokio::signal::unix::{SignalKind, signal};
+        let mut interrupt = signal(SignalKind::interrupt()).map_err(ServeError::Runtime)?;
+        let mut terminate = signal(SignalKind::terminate()).map_err(ServeError::Runtime)?;
+        let (first, told) = tokio::sync::oneshot::channel();
+        let mut serving = std::pin::pin!(run(options, async {
+            let _ = told.await;
+        }));
+        tokio::select! {
+            outcome = &mut serving => return outcome,
+            _ = interrupt.recv() => {}
+            _ = terminate.recv() => {}
+        }
+        let _ = first.send(());
+        tokio::select! {
+            outcome = &mut serving => outcome,
+            _ = interrupt.recv() => Ok(()),
+            _ = terminate.recv() => Ok(()),
+        }
+    });
+    // A computation that nobody waits for any more must not hold the process.
+    runtime.shutdown_background();
+    outcome
+}
+
+/// Forgets what was not used for [`Limits::idle`], for as long as the server runs.
+async fn expire(shared: Arc<Shared>) {
+    let idle = shared.limits.idle;
+    let mut ticks = tokio::time::interval((idle / 4).clamp(Duration::from_millis(10), Duration::from_secs(30)));
+    loop {
+        ticks.tick().await;
+        let (sessions, sweeps) = (shared.sessions.expire(idle), shared.sweeps.expire(idle));
+        if sessions + sweeps > 0 {
+            tracing::info!(sessions, sweeps, open = shared.sessions.len(), "forgot what was idle");
+        }
+    }
+}
+
+fn with_sources(error: &dyn std::error::Error) -> String {
+    let mut text = error.to_string();
+    let mut source = error.source();
+    while let Some(inner) = source {
+        text = format!("{text}: {inner}");
+        source = inner.source();
+    }
+    text
 }

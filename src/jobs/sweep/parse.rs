@@ -11,7 +11,7 @@ impl FromStr for SweepParameter {
     type Err = SweepError;
 
     /// `NAME=low:high:count` is `count` equally spaced numbers, both ends included; `NAME=a,b,c` is a list. Numbers may
-    /// carry a netlist suffix (`2u`); a list entry that is no number is a string.
+    /// carry a netlist suffix (`2u`); list entries are read as [`Setting::parse`] reads them, words as strings.
     fn from_str(text: &str) -> Result<Self, SweepError> {
         let what = || format!("parameter \"{text}\"");
         let forms = "NAME=low:high:count or NAME=a,b,c";
@@ -22,7 +22,13 @@ impl FromStr for SweepParameter {
         }
         let parts: Vec<&str> = values.split(':').map(str::trim).collect();
         let values = match parts[..] {
-            [list] => list.split(',').map(|entry| setting(entry.trim())).collect(),
+            [list] => {
+                let entry = |text: &str| {
+                    let refused = |_| bad(what(), "numbers or words, separated by commas", text);
+                    Setting::parse(text).map_err(refused)
+                };
+                list.split(',').map(|text| entry(text.trim())).collect::<Result<_, _>>()?
+            }
             [low, high, count] => {
                 let low = number(low).ok_or_else(|| bad(what(), "a number as low end", low))?;
                 let high = number(high).ok_or_else(|| bad(what(), "a number as high end", high))?;
@@ -58,39 +64,12 @@ pub fn linear(low: f64, high: f64, count: usize) -> Vec<Setting> {
     (0..count).map(|i| Setting::Number(at(i))).collect()
 }
 
-fn setting(text: &str) -> Setting {
-    number(text).map_or_else(|| Setting::Text(text.trim_matches('"').to_owned()), Setting::Number)
-}
-
-/// A finite number with at most one netlist suffix: `2.1u`, `1e-3`, `3M` (mega). Anything else: none.
-pub fn number(text: &str) -> Option<f64> {
-    if !text.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c)) {
-        return None;
+/// A finite number as the netlist language writes it.
+fn number(text: &str) -> Option<f64> {
+    match Setting::parse(text) {
+        Ok(Setting::Number(value)) if value.is_finite() => Some(value),
+        _ => None,
     }
-    if let Ok(value) = text.parse::<f64>() {
-        return value.is_finite().then_some(value);
-    }
-    let suffix = text.chars().last()?;
-    let exponent = match suffix {
-        'a' => "e-18",
-        'f' => "e-15",
-        'p' => "e-12",
-        'n' => "e-9",
-        'u' => "e-6",
-        'm' => "e-3",
-        'c' => "e-2",
-        'd' => "e-1",
-        'h' => "e2",
-        'k' => "e3",
-        'M' => "e6",
-        'G' => "e9",
-        'T' => "e12",
-        'P' => "e15",
-        'E' => "e18",
-        _ => return None,
-    };
-    let mantissa = &text[..text.len() - suffix.len_utf8()];
-    format!("{mantissa}{exponent}").parse().ok().filter(|value: &f64| value.is_finite())
 }
 
 #[cfg(test)]
@@ -113,7 +92,7 @@ mod tests {
     #[test]
     fn lists_hold_numbers_with_suffixes_and_strings() {
         assert_eq!(numbers("w = 1.8u, 2u,-3M"), [1.8e-6, 2e-6, -3e6]);
-        let axis: SweepParameter = "layer=p1,\"p2\"".parse().expect("an axis");
+        let axis: SweepParameter = "layer=p1,'p2'".parse().expect("an axis");
         assert_eq!(axis.values, [Setting::Text("p1".into()), Setting::Text("p2".into())]);
     }
 

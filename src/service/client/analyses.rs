@@ -1,5 +1,6 @@
 //! Analyses and sweeps on a server.
 
+use super::link::{Link, reason};
 use crate::analysis::modes::ModesResult;
 use crate::analysis::pull_in::PullInResult;
 use crate::analysis::statics::StaticResult;
@@ -8,13 +9,21 @@ use crate::analysis::{PortVoltages, Watch};
 use crate::compile::CompileOptions;
 use crate::jobs::sweep::{SweepProgress, SweepSpec, SweepTable};
 use crate::netlist::Bundle;
+use crate::service::convert::model::{bundle_to_wire, options_to_wire};
+use crate::service::convert::{analysis as results, named, sweep as sweeps};
+use crate::service::proto;
+use proto::sweep_status::State;
+use proto::transient_event::Kind as EventKind;
+use std::future::Future;
 use std::time::Duration;
 use thiserror::Error;
+use tonic::{Response, Status, Streaming};
 
 /// A blocking client of one server, for whole analyses.
 #[derive(Debug)]
 pub struct Client {
     address: String,
+    link: Link,
 }
 
 /// What went wrong on the way, or on the server.
@@ -48,22 +57,31 @@ pub struct RemoteTransient {
 }
 
 impl Client {
-    /// Connects to `uri`. `deadline` bounds the connection and each unary call.
+    /// Connects to `uri` (`unix:///path`, `host:port`, `http://host:port`, `grpc://host:port`). `deadline` bounds the
+    /// connection, each unary call, and the silence between two messages of a stream.
     ///
     /// # Errors
     /// [`ClientError`].
     pub fn connect(uri: &str, deadline: Duration) -> Result<Self, ClientError> {
-        let _ = deadline;
-        Err(Self { address: uri.to_owned() }.lost())
+        let link = Link::connect(uri, deadline).map_err(|status| error(uri, &status))?;
+        Ok(Self { address: uri.to_owned(), link })
+    }
+
+    /// Version of the server.
+    ///
+    /// # Errors
+    /// [`ClientError`].
+    pub fn version(&mut self) -> Result<String, ClientError> {
+        let mut rpc = self.link.rpc.clone();
+        Ok(self.call(rpc.info(proto::InfoRequest {}))?.version)
     }
 
     /// Compiles a netlist there; returns the model's id.
     ///
     /// # Errors
-    /// [`ClientError`].
+    /// [`ClientError`]; for a netlist with errors the message is all of its diagnostics.
     pub fn compile(&mut self, bundle: &Bundle, options: &CompileOptions) -> Result<String, ClientError> {
-        let _ = (bundle, options);
-        Err(self.lost())
+        self.link.compile(bundle, options).map(|model| model.id).map_err(|status| error(&self.address, &status))
     }
 
     /// Static equilibrium.
@@ -71,17 +89,20 @@ impl Client {
     /// # Errors
     /// [`ClientError`].
     pub fn statics(&mut self, model: &str, voltages: &PortVoltages) -> Result<StaticResult, ClientError> {
-        let _ = (model, voltages);
-        Err(self.lost())
+        let request = proto::StaticRequest { model: model.to_owned(), voltages: named(voltages) };
+        let mut rpc = self.link.rpc.clone();
+        self.call(rpc.r#static(request)).map(results::static_from_wire)
     }
 
-    /// Natural frequencies.
+    /// Natural frequencies; `count` 0: six.
     ///
     /// # Errors
     /// [`ClientError`].
     pub fn modes(&mut self, model: &str, count: usize, voltages: &PortVoltages) -> Result<ModesResult, ClientError> {
-        let _ = (model, count, voltages);
-        Err(self.lost())
+        let count = u32::try_from(count).unwrap_or(u32::MAX);
+        let request = proto::ModesRequest { model: model.to_owned(), count, voltages: named(voltages) };
+        let mut rpc = self.link.rpc.clone();
+        self.call(rpc.modes(request)).map(results::modes_from_wire)
     }
 
     /// Pull-in and release.
@@ -89,28 +110,58 @@ impl Client {
     /// # Errors
     /// [`ClientError`].
     pub fn pull_in(&mut self, model: &str, port: Option<&str>, max: f64) -> Result<PullInResult, ClientError> {
-        let _ = (model, port, max);
-        Err(self.lost())
+        let port = port.unwrap_or_default().to_owned();
+        let request = proto::PullInRequest { model: model.to_owned(), port, max_v: max };
+        let mut rpc = self.link.rpc.clone();
+        self.call(rpc.pull_in(request)).map(results::pull_in_from_wire)
     }
 
     /// Motion in time; `watch` is told how far it has come and may stop it.
     ///
     /// # Errors
-    /// [`ClientError`].
+    /// [`ClientError`]; code "Cancelled" when `watch` said stop.
     pub fn transient(
         &mut self,
         model: &str,
         options: &RemoteTransient,
         watch: Watch<'_>,
     ) -> Result<TransientResult, ClientError> {
-        let _ = (model, options, watch);
-        Err(self.lost())
+        let request = proto::TransientRequest {
+            model: model.to_owned(),
+            stop_s: options.stop,
+            signals: options.signals.clone(),
+            points: u32::try_from(options.points).unwrap_or(u32::MAX),
+            tol: options.tol,
+            voltages: named(&options.voltages),
+            release_model: options.release.clone().unwrap_or_default(),
+        };
+        let mut rpc = self.link.rpc.clone();
+        let mut events = self.call(rpc.transient(request))?;
+        let (mut t, mut columns) = (Vec::new(), vec![Vec::new(); options.signals.len()]);
+        while let Some(event) = self.next(&mut events)? {
+            match event.kind {
+                Some(EventKind::Samples(samples)) => {
+                    t.extend(samples.t);
+                    for (column, more) in columns.iter_mut().zip(samples.signals) {
+                        column.extend(more.values);
+                    }
+                }
+                Some(EventKind::Finished(summary)) => {
+                    return Ok(results::transient_from_wire(&options.signals, t, columns, summary));
+                }
+                None => {}
+            }
+            if !watch(event.progress) {
+                return Err(self.error(&Status::cancelled("stopped here")));
+            }
+        }
+        Err(self.error(&Status::unavailable("the stream ended before the run did")))
     }
 
     /// A sweep; `progress` is told how far it has come and may stop it.
     ///
     /// # Errors
-    /// [`ClientError`].
+    /// [`ClientError`]; code "Cancelled" when `progress` said stop.
     pub fn sweep(
         &mut self,
         spec: &SweepSpec,
@@ -118,11 +169,65 @@ impl Client {
         options: &CompileOptions,
         progress: &mut dyn FnMut(SweepProgress) -> bool,
     ) -> Result<SweepTable, ClientError> {
-        let _ = (spec, bundle, options, progress);
-        Err(self.lost())
+        let request = proto::SubmitSweepRequest {
+            bundle: Some(bundle_to_wire(bundle)),
+            options: Some(options_to_wire(options)),
+            spec: Some(sweeps::spec_to_wire(spec)),
+        };
+        let mut rpc = self.link.rpc.clone();
+        let id = self.call(rpc.submit_sweep(request))?.sweep;
+        let outcome = self.follow(&id, progress).and_then(|()| self.fetch(&id));
+        // Done with it, whatever came: the server need not keep it. That it is gone already is no error.
+        let _ = self.call(rpc.cancel_sweep(proto::CancelSweepRequest { sweep: id }));
+        outcome
     }
 
-    fn lost(&self) -> ClientError {
-        ClientError { address: self.address.clone(), code: "Unavailable".into(), message: "not connected".into() }
+    fn follow(&self, id: &str, progress: &mut dyn FnMut(SweepProgress) -> bool) -> Result<(), ClientError> {
+        let mut rpc = self.link.rpc.clone();
+        let mut states = self.call(rpc.watch_sweep(proto::WatchSweepRequest { sweep: id.to_owned() }))?;
+        while let Some(status) = self.next(&mut states)? {
+            let proto::SweepStatus { done, points, failed, ref message, .. } = status;
+            match status.state() {
+                State::Done => {
+                    progress(SweepProgress { done, points, failed });
+                    return Ok(());
+                }
+                State::Cancelled => return Err(self.error(&Status::cancelled(message))),
+                State::Failed => return Err(self.error(&Status::failed_precondition(message))),
+                State::Running | State::Unspecified => {
+                    if !progress(SweepProgress { done, points, failed }) {
+                        return Err(self.error(&Status::cancelled(format!("after {done} of {points} points"))));
+                    }
+                }
+            }
+        }
+        Err(self.error(&Status::unavailable("the stream ended before the sweep did")))
     }
+
+    fn fetch(&self, id: &str) -> Result<SweepTable, ClientError> {
+        let mut rpc = self.link.rpc.clone();
+        let mut chunks = self.call(rpc.fetch_sweep(proto::FetchSweepRequest { sweep: id.to_owned() }))?;
+        let mut table = SweepTable::default();
+        while let Some(chunk) = self.next(&mut chunks)? {
+            sweeps::chunk_from_wire(chunk, &mut table)
+                .map_err(|v| self.error(&Status::internal(format!("{}: {}", v.field, v.description))))?;
+        }
+        Ok(table)
+    }
+
+    fn call<T>(&self, call: impl Future<Output = Result<Response<T>, Status>>) -> Result<T, ClientError> {
+        self.link.call(call).map(Response::into_inner).map_err(|status| self.error(&status))
+    }
+
+    fn next<T>(&self, stream: &mut Streaming<T>) -> Result<Option<T>, ClientError> {
+        self.link.call(stream.message()).map_err(|status| self.error(&status))
+    }
+
+    fn error(&self, status: &Status) -> ClientError {
+        error(&self.address, status)
+    }
+}
+
+fn error(address: &str, status: &Status) -> ClientError {
+    ClientError { address: address.to_owned(), code: format!("{:?}", status.code()), message: reason(status) }
 }

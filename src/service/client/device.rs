@@ -1,18 +1,49 @@
 //! A device on a server, over one bidirectional stream.
 
+use super::link::{Link, reason};
 use crate::compile::CompileOptions;
 use crate::device::{Description, Device, DeviceError, OpenRequest, SmallSignal, Token, Trial, TrialReply};
 use crate::netlist::Bundle;
+use crate::service::convert::device as wire;
+use crate::service::proto;
+use proto::device_reply::Kind as ReplyKind;
+use proto::device_request::Kind as RequestKind;
 use std::time::Duration;
+use tokio::sync::mpsc;
+use tokio_stream::wrappers::ReceiverStream;
+use tonic::{Code, Status, Streaming};
+
+/// Requests that may wait for the next call to carry them: accepts, which nobody waits for.
+const QUEUE: usize = 64;
 
 /// A [`Device`] whose model is held by a server. Every call returns within the deadline.
+///
+/// After a lost connection or a late answer the device is closed (states live on the server); [`Device::open`] connects
+/// again and starts a new epoch.
 #[derive(Debug)]
 pub struct RemoteDevice {
     address: String,
+    bundle: Bundle,
+    options: CompileOptions,
+    deadline: Duration,
+    model: String,
+    /// Declared before `link`: a stream is let go before the runtime that drives it.
+    stream: Option<Stream>,
+    link: Option<Link>,
+    /// Why the link was lost, for calls that come after.
+    lost: Option<String>,
+}
+
+#[derive(Debug)]
+struct Stream {
+    requests: mpsc::Sender<proto::DeviceRequest>,
+    replies: Streaming<proto::DeviceReply>,
+    opened: bool,
 }
 
 impl RemoteDevice {
-    /// Connects to `uri` (`unix:///path` or `http://host:port`), sends the netlist and compiles it there.
+    /// Connects to `uri` (`unix:///path` or `http://host:port`), sends the netlist and compiles it there. `deadline`
+    /// bounds this and every later call.
     ///
     /// # Errors
     /// [`DeviceError::Remote`], naming the address and what happened: no server, a netlist with errors, a limit.
@@ -22,24 +53,175 @@ impl RemoteDevice {
         options: &CompileOptions,
         deadline: Duration,
     ) -> Result<Self, DeviceError> {
-        let _ = (bundle, options, deadline);
-        Err(DeviceError::Remote { address: uri.to_owned(), reason: "not connected".to_owned() })
+        let mut device = Self {
+            address: uri.to_owned(),
+            bundle: bundle.clone(),
+            options: options.clone(),
+            deadline,
+            model: String::new(),
+            stream: None,
+            link: None,
+            lost: None,
+        };
+        device.reach().map_err(|status| device.lose(&status))?;
+        Ok(device)
     }
 
-    fn lost(&self) -> DeviceError {
-        DeviceError::Remote { address: self.address.clone(), reason: "not connected".to_owned() }
+    /// The server's address, as given.
+    pub fn address(&self) -> &str {
+        &self.address
+    }
+
+    /// Connects and compiles.
+    fn reach(&mut self) -> Result<(), Status> {
+        let link = Link::connect(&self.address, self.deadline)?;
+        self.model = link.compile(&self.bundle, &self.options)?.id;
+        self.link = Some(link);
+        Ok(())
+    }
+
+    /// Starts the stream.
+    fn start(&mut self) -> Result<(), Status> {
+        if self.link.is_none() {
+            self.reach()?;
+        }
+        let Some(link) = &self.link else { return Err(Status::unavailable("not connected")) };
+        let (requests, queue) = mpsc::channel(QUEUE);
+        let mut rpc = link.rpc.clone();
+        let replies = link.call(rpc.trial(ReceiverStream::new(queue)))?.into_inner();
+        self.stream = Some(Stream { requests, replies, opened: false });
+        Ok(())
+    }
+
+    /// One request and its reply.
+    fn ask(&mut self, request: RequestKind) -> Result<ReplyKind, DeviceError> {
+        let Self { link: Some(link), stream: Some(stream), .. } = self else { return Err(self.closed()) };
+        let Stream { requests, replies, .. } = stream;
+        let answer = link.call(async {
+            let request = proto::DeviceRequest { kind: Some(request) };
+            if requests.send(request).await.is_err() {
+                // The stream has ended: its status says why.
+                return Err(replies.message().await.err().unwrap_or_else(ended));
+            }
+            replies.message().await?.and_then(|reply| reply.kind).ok_or_else(ended)
+        });
+        answer.map_err(|status| self.lose(&status))
+    }
+
+    fn opened(&self) -> bool {
+        self.stream.as_ref().is_some_and(|stream| stream.opened)
+    }
+
+    /// The error of a device that is not open: never opened, or lost since.
+    fn closed(&self) -> DeviceError {
+        match &self.lost {
+            Some(reason) => self.remote(format!("{reason} (the device must be opened again)")),
+            None => DeviceError::NotOpen,
+        }
+    }
+
+    /// Lets go of a link whose replies can no longer be matched with requests.
+    fn lose(&mut self, status: &Status) -> DeviceError {
+        self.stream = None;
+        self.link = None;
+        let reason = reason(status);
+        self.lost = Some(reason.clone());
+        self.remote(reason)
+    }
+
+    fn remote(&self, reason: String) -> DeviceError {
+        DeviceError::Remote { address: self.address.clone(), reason }
+    }
+
+    fn unexpected(&mut self) -> DeviceError {
+        self.lose(&Status::internal("a reply of another kind than the request; is the server of another version?"))
+    }
+
+    fn fault(&mut self, fault: proto::Fault) -> DeviceError {
+        wire::fault_from_wire(fault, &self.address)
+    }
+
+    /// Opens on the stream there is.
+    fn open_here(&mut self, request: &OpenRequest) -> Result<ReplyKind, DeviceError> {
+        self.ask(RequestKind::Open(proto::OpenRequest {
+            model: self.model.clone(),
+            ports: request.ports.clone(),
+            signals: request.signals.clone(),
+        }))
     }
 }
 
+fn ended() -> Status {
+    Status::unavailable("the server ended the stream")
+}
+
+fn is_not_found(reply: &ReplyKind) -> bool {
+    let ReplyKind::Fault(proto::Fault { kind: Some(proto::fault::Kind::Refused(refused)), .. }) = reply else {
+        return false;
+    };
+    refused.code == Code::NotFound as i32
+}
+
 impl Device for RemoteDevice {
-    fn open(&mut self, _request: &OpenRequest) -> Result<Description, DeviceError> {
-        Err(self.lost())
+    fn open(&mut self, request: &OpenRequest) -> Result<Description, DeviceError> {
+        let fresh = self.stream.is_none();
+        if fresh {
+            self.start().map_err(|status| self.lose(&status))?;
+        }
+        let mut reply = self.open_here(request);
+        // A stream left from an earlier run may have died meanwhile, and a server forgets models: once more, anew.
+        let stale = match &reply {
+            Ok(reply) => is_not_found(reply),
+            Err(_) => !fresh,
+        };
+        if stale {
+            (self.stream, self.link) = (None, None);
+            self.start().map_err(|status| self.lose(&status))?;
+            reply = self.open_here(request);
+        }
+        match reply? {
+            ReplyKind::Opened(opened) => {
+                self.lost = None;
+                if let Some(stream) = &mut self.stream {
+                    stream.opened = true;
+                }
+                Ok(wire::description_from_wire(opened.device.unwrap_or_default()))
+            }
+            ReplyKind::Fault(fault) => Err(self.fault(fault)),
+            _ => Err(self.unexpected()),
+        }
     }
-    fn trial(&mut self, _request: &Trial<'_>, _reply: &mut TrialReply) -> Result<(), DeviceError> {
-        Err(self.lost())
+
+    fn trial(&mut self, request: &Trial<'_>, reply: &mut TrialReply) -> Result<(), DeviceError> {
+        if !self.opened() {
+            return Err(self.closed());
+        }
+        match self.ask(RequestKind::Trial(wire::trial_to_wire(request)))? {
+            ReplyKind::Trial(answer) => wire::reply_from_wire(answer, reply).map_err(|text| self.remote(text)),
+            ReplyKind::Fault(fault) => Err(self.fault(fault)),
+            _ => Err(self.unexpected()),
+        }
     }
-    fn accept(&mut self, _token: Token) {}
-    fn linearize(&mut self, _token: Token, _omega: f64, _reply: &mut SmallSignal) -> Result<(), DeviceError> {
-        Err(self.lost())
+
+    fn accept(&mut self, token: Token) {
+        if let Some(stream) = &self.stream {
+            let accept = proto::Accept { token: token.0 };
+            // Advisory: when the queue is full, the next one says as much.
+            let _ = stream.requests.try_send(proto::DeviceRequest { kind: Some(RequestKind::Accept(accept)) });
+        }
+    }
+
+    fn linearize(&mut self, token: Token, omega: f64, reply: &mut SmallSignal) -> Result<(), DeviceError> {
+        if !self.opened() {
+            return Err(self.closed());
+        }
+        match self.ask(RequestKind::Linearize(proto::SmallSignalRequest { token: token.0, omega }))? {
+            ReplyKind::Linearized(answer) => {
+                wire::small_signal_from_wire(&answer, reply);
+                Ok(())
+            }
+            ReplyKind::Fault(fault) => Err(self.fault(fault)),
+            _ => Err(self.unexpected()),
+        }
     }
 }

@@ -1,7 +1,11 @@
 //! Blocking clients: a [`RemoteDevice`] for circuits and a [`Client`] for analyses.
+//!
+//! Both drive a single-threaded runtime of their own, only while a call runs: no thread is started in the host, and a
+//! round trip never waits for another thread to be woken.
 
 mod analyses;
 mod device;
+mod link;
 
 pub use analyses::{Client, ClientError, RemoteTransient};
 pub use device::RemoteDevice;

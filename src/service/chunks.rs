@@ -1,0 +1,164 @@
+//! Long answers in messages of at most 1 MiB.
+
+use super::convert::analysis::summary_to_wire;
+use super::convert::sweep::row_to_wire;
+use super::rpc::Shared;
+use super::{proto, status};
+use crate::analysis::AnalysisError;
+use crate::analysis::transient::{TransientOptions, TransientResult, transient};
+use crate::compile::Compiled;
+use crate::jobs::sweep::SweepTable;
+use prost::Message;
+use proto::transient_event::Kind;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+use tokio::runtime::Handle;
+use tokio::sync::mpsc;
+use tonic::Status;
+
+/// Most bytes of one message of a stream.
+pub(super) const CHUNK_BYTES: usize = 1 << 20;
+/// Samples are sent at least this often, so that a slow run is seen to move.
+const LIVELINESS: Duration = Duration::from_millis(200);
+/// A run without samples to send says at least this often how far it has come, so that clients can tell slow from dead.
+pub(super) const HEARTBEAT: Duration = Duration::from_secs(1);
+
+/// Where the messages of a stream go: one at a time, never waiting for a silent client longer than the idle limit.
+pub(super) struct Outlet<T> {
+    sender: mpsc::Sender<Result<T, Status>>,
+    shared: Arc<Shared>,
+    runtime: Handle,
+    pub(super) open: bool,
+}
+
+impl<T> Outlet<T> {
+    /// An outlet, used from a blocking thread, and what the client reads.
+    pub(super) fn new(shared: Arc<Shared>) -> (Self, mpsc::Receiver<Result<T, Status>>) {
+        let (sender, receiver) = mpsc::channel(2);
+        (Self { sender, shared, runtime: Handle::current(), open: true }, receiver)
+    }
+
+    /// Sends, or notices that nobody reads any more.
+    pub(super) fn send(&mut self, item: Result<T, Status>) {
+        let (sender, shared) = (&self.sender, &self.shared);
+        self.open = self.open
+            && self.runtime.block_on(async {
+                tokio::select! {
+                    sent = sender.send_timeout(item, shared.limits.idle) => sent.is_ok(),
+                    () = shared.shutdown.ending.cancelled() => false,
+                }
+            });
+        if shared.shutdown.ending.is_cancelled() {
+            let _ = sender.try_send(Err(status::stopping()));
+        }
+    }
+
+    /// A second way to the same reader, for what must be said after the first is gone.
+    pub(super) fn also(&self) -> Self {
+        Self {
+            sender: self.sender.clone(),
+            shared: Arc::clone(&self.shared),
+            runtime: self.runtime.clone(),
+            open: true,
+        }
+    }
+
+    /// Whether anyone still reads.
+    pub(super) fn wanted(&self) -> bool {
+        self.open && !self.sender.is_closed() && !self.shared.shutdown.ending.is_cancelled()
+    }
+}
+
+/// Runs a transient and sends its samples as they come.
+pub(super) fn send_transient(
+    compiled: &Compiled,
+    options: &TransientOptions<'_>,
+    outlet: Outlet<proto::TransientEvent>,
+) {
+    let width = options.signals.len();
+    let rows = (CHUNK_BYTES / 2 / (8 * (width + 1))).max(1);
+    let outlet = std::cell::RefCell::new(outlet);
+    let progress = std::cell::Cell::new(0.0);
+    let quiet = std::cell::Cell::new(Instant::now());
+    let mut pending = Pending { t: Vec::new(), columns: vec![Vec::new(); width], since: Instant::now() };
+    let mut sample = |t: f64, values: &[f64]| {
+        pending.push(t, values);
+        if pending.t.len() >= rows || pending.since.elapsed() >= LIVELINESS {
+            quiet.set(Instant::now());
+            outlet.borrow_mut().send(Ok(pending.take(progress.get())));
+        }
+    };
+    let mut watch = |fraction: f64| {
+        progress.set(fraction);
+        if quiet.get().elapsed() >= HEARTBEAT {
+            quiet.set(Instant::now());
+            outlet.borrow_mut().send(Ok(proto::TransientEvent { kind: None, progress: fraction }));
+        }
+        outlet.borrow().wanted()
+    };
+    let result = transient(compiled, options, &mut sample, &mut watch);
+    let mut outlet = outlet.into_inner();
+    if !pending.t.is_empty() {
+        outlet.send(Ok(pending.take(progress.get())));
+    }
+    outlet.send(finish(result, &outlet));
+}
+
+fn finish(
+    result: Result<TransientResult, AnalysisError>,
+    outlet: &Outlet<proto::TransientEvent>,
+) -> Result<proto::TransientEvent, Status> {
+    match result {
+        Ok(result) => Ok(proto::TransientEvent { kind: Some(Kind::Finished(summary_to_wire(&result))), progress: 1.0 }),
+        Err(AnalysisError::Cancelled) if outlet.shared.shutdown.ending.is_cancelled() => Err(status::stopping()),
+        Err(error) => Err(status::analysis(error)),
+    }
+}
+
+/// Samples not yet sent.
+struct Pending {
+    t: Vec<f64>,
+    columns: Vec<Vec<f64>>,
+    since: Instant,
+}
+
+impl Pending {
+    fn push(&mut self, t: f64, values: &[f64]) {
+        self.t.push(t);
+        for (column, value) in self.columns.iter_mut().zip(values) {
+            column.push(*value);
+        }
+    }
+
+    fn take(&mut self, progress: f64) -> proto::TransientEvent {
+        self.since = Instant::now();
+        let t = std::mem::take(&mut self.t);
+        let signals = self.columns.iter_mut().map(|column| proto::Column { values: std::mem::take(column) }).collect();
+        proto::TransientEvent { kind: Some(Kind::Samples(proto::Samples { t, signals })), progress }
+    }
+}
+
+/// Sends a table: columns first, then rows in as few messages as fit.
+pub(super) fn send_table(table: &SweepTable, outlet: &mut Outlet<proto::SweepChunk>) {
+    let mut chunk = proto::SweepChunk {
+        parameters: table.parameters.clone(),
+        results: table.results.clone(),
+        units: table.units.clone(),
+        rows: Vec::new(),
+    };
+    let mut bytes = chunk.encoded_len();
+    for row in &table.rows {
+        let row = row_to_wire(row);
+        let more = row.encoded_len() + 8;
+        if bytes + more > CHUNK_BYTES && !chunk.rows.is_empty() {
+            outlet.send(Ok(std::mem::take(&mut chunk)));
+            bytes = 0;
+        }
+        if !outlet.wanted() {
+            return;
+        }
+        bytes += more;
+        chunk.rows.push(row);
+    }
+    outlet.send(Ok(chunk));
+}

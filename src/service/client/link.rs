@@ -1,0 +1,107 @@
+//! A connection and the runtime that drives it while a call runs.
+
+use crate::compile::CompileOptions;
+use crate::netlist::Bundle;
+use crate::service::address::Address;
+use crate::service::convert::model::{bundle_to_wire, options_to_wire};
+use crate::service::proto::{self, bimorph_client::BimorphClient};
+use std::error::Error as _;
+use std::future::Future;
+use std::time::Duration;
+use tokio::runtime::Runtime;
+use tonic::transport::{Channel, Endpoint};
+use tonic::{Code, Status};
+
+/// Largest reply accepted [byte], as the server's default limit.
+const MESSAGE_BYTES: usize = 64 << 20;
+
+/// A connected server.
+#[derive(Debug)]
+pub(super) struct Link {
+    runtime: Runtime,
+    pub(super) rpc: BimorphClient<Channel>,
+    pub(super) deadline: Duration,
+}
+
+impl Link {
+    /// Connects within the deadline.
+    pub(super) fn connect(uri: &str, deadline: Duration) -> Result<Self, Status> {
+        if tokio::runtime::Handle::try_current().is_ok() {
+            let text = "a blocking client was used from asynchronous code; call it on a thread of its own";
+            return Err(Status::failed_precondition(text));
+        }
+        let address: Address = uri.parse().map_err(|error| Status::invalid_argument(format!("{error}")))?;
+        let endpoint = Endpoint::from_shared(address.uri())
+            .map_err(|error| Status::invalid_argument(error.to_string()))?
+            .connect_timeout(deadline)
+            .tcp_nodelay(true);
+        let runtime = tokio::runtime::Builder::new_current_thread()
+            .enable_all()
+            .build()
+            .map_err(|error| Status::internal(format!("no asynchronous runtime: {error}")))?;
+        let channel = within(&runtime, deadline, async {
+            endpoint.connect().await.map_err(|error| {
+                let mut text = "no connection".to_owned();
+                let mut source = error.source();
+                while let Some(inner) = source {
+                    text = format!("{text}: {inner}");
+                    source = inner.source();
+                }
+                Status::unavailable(text)
+            })
+        })?;
+        let rpc = BimorphClient::new(channel)
+            .max_decoding_message_size(MESSAGE_BYTES)
+            .max_encoding_message_size(MESSAGE_BYTES);
+        Ok(Self { runtime, rpc, deadline })
+    }
+
+    /// Runs one call to its end or to the deadline.
+    pub(super) fn call<T>(&self, call: impl Future<Output = Result<T, Status>>) -> Result<T, Status> {
+        within(&self.runtime, self.deadline, call)
+    }
+
+    /// Compiles a netlist on the server. A netlist with errors comes back with all of them: a status has no room for
+    /// that, so they are asked for.
+    pub(super) fn compile(&self, bundle: &Bundle, options: &CompileOptions) -> Result<proto::ModelDescription, Status> {
+        let (wire_bundle, wire_options) = (Some(bundle_to_wire(bundle)), Some(options_to_wire(options)));
+        let request = proto::CompileRequest { bundle: wire_bundle.clone(), options: wire_options.clone() };
+        let mut rpc = self.rpc.clone();
+        match self.call(rpc.compile(request)) {
+            Ok(response) => {
+                let model = response.into_inner().model;
+                model.ok_or_else(|| Status::internal("the server compiled, but described no model"))
+            }
+            Err(status) if status.code() == Code::InvalidArgument => {
+                let request = proto::CheckRequest { bundle: wire_bundle, options: wire_options };
+                match self.call(rpc.check(request)).map(tonic::Response::into_inner) {
+                    Ok(checked) if !checked.ok => Err(Status::invalid_argument(checked.rendered)),
+                    _ => Err(status),
+                }
+            }
+            Err(status) => Err(status),
+        }
+    }
+}
+
+fn within<T>(
+    runtime: &Runtime,
+    deadline: Duration,
+    call: impl Future<Output = Result<T, Status>>,
+) -> Result<T, Status> {
+    runtime.block_on(async {
+        tokio::time::timeout(deadline, call).await.unwrap_or_else(|_| {
+            Err(Status::deadline_exceeded(format!("no answer within {} s", deadline.as_secs_f64())))
+        })
+    })
+}
+
+/// What happened, in words: a netlist's diagnostics as they are, anything else with its kind.
+pub(super) fn reason(status: &Status) -> String {
+    match status.code() {
+        Code::InvalidArgument | Code::FailedPrecondition | Code::DeadlineExceeded | Code::ResourceExhausted => {
+            status.message().trim_end().to_owned()
+        }
+        code => format!("{}: {}", code.description().to_lowercase(), status.message()),
+    }
+}

@@ -1,0 +1,102 @@
+//! Results of analyses.
+
+use super::{named, pairs};
+use crate::analysis::modes::ModesResult;
+use crate::analysis::pull_in::PullInResult;
+use crate::analysis::statics::{NodeMotion, StaticResult};
+use crate::analysis::transient::{Counters, TransientResult};
+use crate::service::proto;
+
+fn size(n: u64) -> usize {
+    usize::try_from(n).unwrap_or(usize::MAX)
+}
+
+/// A static equilibrium as it travels.
+pub fn static_to_wire(result: &StaticResult) -> proto::StaticResponse {
+    let node = |(name, m): &(String, NodeMotion)| proto::NodeMotion { name: name.clone(), x: m.x, y: m.y, rz: m.rz };
+    proto::StaticResponse {
+        nodes: result.nodes.iter().map(node).collect(),
+        temperatures_k: named(&result.temperatures_k),
+        currents_a: named(&result.currents_a),
+        charges_c: named(&result.charges_c),
+        pulled_in: result.pulled_in,
+        unknowns: result.unknowns as u64,
+        iterations: result.iterations as u64,
+    }
+}
+
+/// A static equilibrium back.
+pub fn static_from_wire(wire: proto::StaticResponse) -> StaticResult {
+    let node = |n: proto::NodeMotion| (n.name, NodeMotion { x: n.x, y: n.y, rz: n.rz });
+    StaticResult {
+        nodes: wire.nodes.into_iter().map(node).collect(),
+        temperatures_k: pairs(wire.temperatures_k),
+        currents_a: pairs(wire.currents_a),
+        charges_c: pairs(wire.charges_c),
+        pulled_in: wire.pulled_in,
+        unknowns: size(wire.unknowns),
+        iterations: size(wire.iterations),
+    }
+}
+
+/// Modes as they travel: node names once, shapes as columns.
+pub fn modes_to_wire(result: &ModesResult) -> proto::ModesResponse {
+    let nodes = result.shapes.first().map_or_else(Vec::new, |shape| shape.iter().map(|(n, _)| n.clone()).collect());
+    let shape = |shape: &Vec<(String, NodeMotion)>| proto::Shape {
+        x: shape.iter().map(|(_, m)| m.x).collect(),
+        y: shape.iter().map(|(_, m)| m.y).collect(),
+        rz: shape.iter().map(|(_, m)| m.rz).collect(),
+    };
+    proto::ModesResponse {
+        frequencies_hz: result.frequencies_hz.clone(),
+        residuals: result.residuals.clone(),
+        nodes,
+        shapes: result.shapes.iter().map(shape).collect(),
+        unknowns: result.unknowns as u64,
+    }
+}
+
+/// Modes back.
+pub fn modes_from_wire(wire: proto::ModesResponse) -> ModesResult {
+    let proto::ModesResponse { frequencies_hz, residuals, nodes, shapes, unknowns } = wire;
+    let shape = |s: proto::Shape| {
+        let motions = s.x.iter().zip(&s.y).zip(&s.rz).map(|((&x, &y), &rz)| NodeMotion { x, y, rz });
+        nodes.iter().cloned().zip(motions).collect()
+    };
+    let shapes = shapes.into_iter().map(shape).collect();
+    ModesResult { frequencies_hz, shapes, residuals, unknowns: size(unknowns) }
+}
+
+/// Pull-in as it travels.
+pub fn pull_in_to_wire(result: &PullInResult) -> proto::PullInResponse {
+    proto::PullInResponse { port: result.port.clone(), pull_in_v: result.pull_in_v, release_v: result.release_v }
+}
+
+/// Pull-in back.
+pub fn pull_in_from_wire(wire: proto::PullInResponse) -> PullInResult {
+    PullInResult { port: wire.port, pull_in_v: wire.pull_in_v, release_v: wire.release_v }
+}
+
+/// The end of a transient as it travels.
+pub fn summary_to_wire(result: &TransientResult) -> proto::TransientSummary {
+    let Counters { steps, rejected, factorizations, solves } = result.counters;
+    let units = result.signals.iter().map(|(_, unit, _)| unit.clone()).collect();
+    proto::TransientSummary { units, steps, rejected, factorizations, solves, unknowns: result.unknowns as u64 }
+}
+
+/// A transient put together from its samples and its end.
+pub fn transient_from_wire(
+    names: &[String],
+    t: Vec<f64>,
+    columns: Vec<Vec<f64>>,
+    summary: proto::TransientSummary,
+) -> TransientResult {
+    let proto::TransientSummary { units, steps, rejected, factorizations, solves, unknowns } = summary;
+    let signals = names.iter().cloned().zip(units).zip(columns).map(|((name, unit), values)| (name, unit, values));
+    TransientResult {
+        t,
+        signals: signals.collect(),
+        counters: Counters { steps, rejected, factorizations, solves },
+        unknowns: size(unknowns),
+    }
+}

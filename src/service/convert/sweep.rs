@@ -1,0 +1,144 @@
+//! Sweeps: what to run, and the table.
+
+use super::model::{setting_from_wire, setting_to_wire};
+use super::{Violation, named, number, required, voltages};
+use crate::jobs::sweep::parse::linear;
+use crate::jobs::sweep::{Shard, SweepAnalysis, SweepParameter, SweepRow, SweepSpec, SweepTable};
+use crate::service::proto;
+use proto::sweep_parameter::Values;
+use proto::sweep_spec::Analysis;
+
+/// Modes per point when a request leaves it open, as in `ModesRequest`.
+pub(crate) const DEFAULT_MODES: usize = 6;
+
+/// A specification as it travels.
+pub fn spec_to_wire(spec: &SweepSpec) -> proto::SweepSpec {
+    let analysis = match &spec.analysis {
+        SweepAnalysis::Static { outputs, voltages } => {
+            Analysis::Static(proto::SweepStatic { outputs: outputs.clone(), voltages: named(voltages) })
+        }
+        SweepAnalysis::Modes { count, voltages } => {
+            let count = u32::try_from(*count).unwrap_or(u32::MAX);
+            Analysis::Modes(proto::SweepModes { count, voltages: named(voltages) })
+        }
+        SweepAnalysis::PullIn { port, max } => {
+            Analysis::PullIn(proto::SweepPullIn { port: port.clone().unwrap_or_default(), max_v: *max })
+        }
+    };
+    let axis = |axis: &SweepParameter| proto::SweepParameter {
+        name: axis.name.clone(),
+        values: Some(Values::List(proto::SettingList {
+            values: axis.values.iter().map(|value| setting_to_wire("", value)).collect(),
+        })),
+    };
+    proto::SweepSpec {
+        parameters: spec.parameters.iter().map(axis).collect(),
+        analysis: Some(analysis),
+        shard: u32::try_from(spec.shard.index).unwrap_or(u32::MAX),
+        shards: u32::try_from(spec.shard.count).unwrap_or(u32::MAX),
+    }
+}
+
+/// A checked specification. `most` bounds the values of an axis before they are laid out in memory.
+///
+/// # Errors
+/// Anything missing, empty, or not finite.
+pub fn spec_from_wire(spec: Option<proto::SweepSpec>, most: usize) -> Result<SweepSpec, Violation> {
+    let spec = required("spec", spec)?;
+    let mut parameters = Vec::with_capacity(spec.parameters.len());
+    for (i, axis) in spec.parameters.into_iter().enumerate() {
+        parameters.push(axis_from_wire(&format!("spec.parameters[{i}]"), axis, most)?);
+    }
+    let analysis = match required("spec.analysis", spec.analysis)? {
+        Analysis::Static(s) => {
+            SweepAnalysis::Static { outputs: s.outputs, voltages: voltages("spec.static.voltages", s.voltages)? }
+        }
+        Analysis::Modes(m) => {
+            let count = if m.count == 0 { DEFAULT_MODES } else { m.count as usize };
+            SweepAnalysis::Modes { count, voltages: voltages("spec.modes.voltages", m.voltages)? }
+        }
+        Analysis::PullIn(p) => SweepAnalysis::PullIn {
+            port: (!p.port.is_empty()).then_some(p.port),
+            max: number("spec.pull_in.max_v", p.max_v, true)?,
+        },
+    };
+    let shard = Shard { index: spec.shard as usize, count: spec.shards.max(1) as usize };
+    Ok(SweepSpec { parameters, analysis, shard, threads: None })
+}
+
+fn axis_from_wire(field: &str, axis: proto::SweepParameter, most: usize) -> Result<SweepParameter, Violation> {
+    let values = match required(&format!("{field}.values"), axis.values)? {
+        Values::Linear(l) => {
+            let low = number(&format!("{field}.linear.low"), l.low, false)?;
+            let high = number(&format!("{field}.linear.high"), l.high, false)?;
+            // One more than the limit is enough to be refused, and is not laid out for nothing.
+            linear(low, high, (l.count as usize).min(most.saturating_add(1)))
+        }
+        Values::List(list) => {
+            let convert = |(i, value)| setting_from_wire(&format!("{field}.list.values[{i}]"), value);
+            list.values.into_iter().enumerate().map(convert).collect::<Result<_, _>>()?
+        }
+    };
+    if axis.name.is_empty() {
+        return Err(Violation::new(format!("{field}.name"), "the parameter has no name"));
+    }
+    Ok(SweepParameter { name: axis.name, values })
+}
+
+/// A row as it travels.
+pub fn row_to_wire(row: &SweepRow) -> proto::SweepRow {
+    let (results, error) = match &row.values {
+        Ok(values) => (values.iter().map(|value| value.unwrap_or(f64::NAN)).collect(), String::new()),
+        Err(error) => (Vec::new(), error.clone()),
+    };
+    let parameters = row.parameters.iter().map(|value| setting_to_wire("", value)).collect();
+    proto::SweepRow { point: row.point as u64, parameters, results, error }
+}
+
+/// Adds a chunk to a table.
+///
+/// # Errors
+/// A row without a value where one belongs.
+pub fn chunk_from_wire(chunk: proto::SweepChunk, table: &mut SweepTable) -> Result<(), Violation> {
+    if !chunk.parameters.is_empty() || !chunk.results.is_empty() {
+        table.parameters = chunk.parameters;
+        table.results = chunk.results;
+        table.units = chunk.units;
+    }
+    for row in chunk.rows {
+        let convert = |value| setting_from_wire("rows.parameters", value);
+        let parameters = row.parameters.into_iter().map(convert).collect::<Result<_, _>>()?;
+        let values = if row.error.is_empty() {
+            Ok(row.results.into_iter().map(|x| (!x.is_nan()).then_some(x)).collect())
+        } else {
+            Err(row.error)
+        };
+        table.rows.push(SweepRow { point: usize::try_from(row.point).unwrap_or(usize::MAX), parameters, values });
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    //! A specification and a row come back as they were sent.
+    use super::*;
+    use crate::netlist::Setting;
+
+    #[test]
+    fn specifications_and_rows_survive_the_wire() {
+        let spec = SweepSpec {
+            parameters: vec!["w=1u:2u:3".parse().expect("an axis"), "layer=p1,p2".parse().expect("an axis")],
+            analysis: SweepAnalysis::PullIn { port: None, max: 30.0 },
+            shard: Shard { index: 1, count: 4 },
+            threads: None,
+        };
+        assert_eq!(spec_from_wire(Some(spec_to_wire(&spec)), 10), Ok(spec));
+        for values in [Ok(vec![Some(1.0), None]), Err("no equilibrium".to_owned())] {
+            let row = SweepRow { point: 5, parameters: vec![Setting::Number(1e-6)], values };
+            let mut table = SweepTable::default();
+            let chunk = proto::SweepChunk { rows: vec![row_to_wire(&row)], ..Default::default() };
+            chunk_from_wire(chunk, &mut table).expect("our own row");
+            assert_eq!(table.rows, [row]);
+        }
+    }
+}

@@ -1,0 +1,185 @@
+//! Compiled models by the hash of their text.
+
+use super::convert::model::{bundle_bytes, diagnostics_to_wire, setting_to_wire};
+use super::limits::Limits;
+use super::server::MakeDevice;
+use super::{proto, status};
+use crate::compile::{CompileOptions, Compiled, compile};
+use crate::device::OpenRequest;
+use crate::netlist::{Bundle, Setting};
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, PoisonError};
+use tonic::Status;
+
+/// A model that clients can name.
+pub(super) struct Model {
+    pub(super) compiled: Arc<Compiled>,
+    pub(super) description: proto::ModelDescription,
+    bundle: Bundle,
+    options: CompileOptions,
+}
+
+impl Model {
+    pub(super) fn id(&self) -> &str {
+        &self.description.id
+    }
+
+    pub(super) fn unknowns(&self) -> usize {
+        usize::try_from(self.description.unknowns).unwrap_or(usize::MAX)
+    }
+}
+
+/// The models kept, at most [`Limits::models`].
+#[derive(Default)]
+pub(super) struct Models {
+    kept: Mutex<Kept>,
+}
+
+#[derive(Default)]
+struct Kept {
+    /// By id: the model, and when it was last asked for (a count of requests).
+    models: BTreeMap<String, (Arc<Model>, u64)>,
+    requests: u64,
+}
+
+impl Models {
+    /// The model of that id.
+    pub(super) fn get(&self, id: &str) -> Result<Arc<Model>, Status> {
+        self.find(id).ok_or_else(|| status::not_found("model", id))
+    }
+
+    fn find(&self, id: &str) -> Option<Arc<Model>> {
+        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        kept.requests += 1;
+        let now = kept.requests;
+        let (model, used) = kept.models.get_mut(id)?;
+        *used = now;
+        Some(Arc::clone(model))
+    }
+
+    /// The model of a bundle: the one kept, or a new one. Takes as long as a compilation.
+    pub(super) fn compile(
+        &self,
+        bundle: Bundle,
+        options: CompileOptions,
+        limits: &Limits,
+        make: MakeDevice,
+    ) -> Result<Arc<Model>, Status> {
+        let mut key = hash(&bundle, &options);
+        // The hash is not cryptographic, so a hit is compared in full, and a collision takes the next free id.
+        while let Some(model) = self.find(&format!("{key:032x}")) {
+            if model.bundle == bundle && model.options == options {
+                return Ok(model);
+            }
+            key = key.wrapping_add(1);
+        }
+        let compiled = compile(&bundle, &options).map_err(|error| status::compile(&error))?;
+        let compiled = Arc::new(compiled);
+        let description = describe(format!("{key:032x}"), &compiled, make)?;
+        let unknowns = usize::try_from(description.unknowns).unwrap_or(usize::MAX);
+        if unknowns > limits.unknowns {
+            return Err(status::limit("unknowns", limits.unknowns, unknowns));
+        }
+        let model = Arc::new(Model { compiled, description, bundle, options });
+        self.keep(Arc::clone(&model), limits.models);
+        Ok(model)
+    }
+
+    fn keep(&self, model: Arc<Model>, most: usize) {
+        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        kept.requests += 1;
+        let now = kept.requests;
+        kept.models.insert(model.id().to_owned(), (model, now));
+        while kept.models.len() > most.max(1) {
+            let oldest = kept.models.iter().min_by_key(|(_, (_, used))| *used).map(|(id, _)| id.clone());
+            if let Some(id) = oldest {
+                kept.models.remove(&id);
+            }
+        }
+    }
+}
+
+/// Refuses a netlist that is too large before anything looks at it.
+pub(super) fn check_size(bundle: &Bundle, limits: &Limits) -> Result<(), Status> {
+    let bytes = bundle_bytes(bundle);
+    if bytes > limits.netlist_bytes {
+        return Err(status::limit("netlist_bytes", limits.netlist_bytes, bytes));
+    }
+    Ok(())
+}
+
+fn describe(id: String, compiled: &Arc<Compiled>, make: MakeDevice) -> Result<proto::ModelDescription, Status> {
+    let opened = make(Arc::clone(compiled)).open(&OpenRequest::default()).map_err(|error| status::device(&error))?;
+    let nodes = compiled.structure.nodes.iter().filter(|node| node.mechanical);
+    Ok(proto::ModelDescription {
+        id,
+        ports: opened.ports.into_iter().map(|port| port.name).collect(),
+        nodes: nodes.map(|node| node.name.clone()).collect(),
+        unknowns: opened.unknowns as u64,
+        parameters: compiled.parameters.iter().map(|(name, value)| setting_to_wire(name, value)).collect(),
+        warnings: diagnostics_to_wire(&compiled.warnings),
+        rendered_warnings: compiled.warnings.render(false),
+    })
+}
+
+/// FNV-1a, 128 bits (Fowler, Noll, Vo), over lengths and contents.
+fn hash(bundle: &Bundle, options: &CompileOptions) -> u128 {
+    let mut state = Fnv(0x6c62_272e_07bb_0142_62b8_2175_6295_c58d);
+    state.text(&bundle.root);
+    for (name, text) in &bundle.files {
+        state.text(name);
+        state.text(text);
+    }
+    for (name, value) in &options.set {
+        state.text(name);
+        match value {
+            Setting::Number(x) => state.bytes(&x.to_bits().to_le_bytes()),
+            Setting::Text(text) => state.text(text),
+        }
+    }
+    // Debug output of plain numbers and flags is exact (shortest text that reads back).
+    state.text(&format!("{:?}", CompileOptions { set: Vec::new(), ..options.clone() }));
+    state.0
+}
+
+struct Fnv(u128);
+
+impl Fnv {
+    fn bytes(&mut self, bytes: &[u8]) {
+        for byte in bytes {
+            self.0 = (self.0 ^ u128::from(*byte)).wrapping_mul(0x0000_0000_0100_0000_0000_0000_0000_013b);
+        }
+    }
+
+    fn text(&mut self, text: &str) {
+        self.bytes(&(text.len() as u64).to_le_bytes());
+        self.bytes(text.as_bytes());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! Ids depend on every part of what is compiled, and on nothing else.
+    use super::*;
+
+    #[test]
+    fn ids_are_content() {
+        let bundle = Bundle::from_text("a.net", "anchor * [f] []");
+        let options = CompileOptions::default();
+        let id = hash(&bundle, &options);
+        assert_eq!(id, hash(&bundle.clone(), &options.clone()));
+        assert_ne!(id, hash(&Bundle::from_text("b.net", "anchor * [f] []"), &options));
+        assert_ne!(id, hash(&Bundle::from_text("a.net", "anchor * [g] []"), &options));
+        assert_ne!(id, hash(&bundle, &CompileOptions { tol: 1e-4, ..options.clone() }));
+        let set = |value| CompileOptions { set: vec![("w".into(), Setting::Number(value))], ..options.clone() };
+        assert_ne!(hash(&bundle, &set(1.0)), hash(&bundle, &set(2.0)));
+    }
+
+    #[test]
+    fn the_hash_is_fnv1a_128() {
+        // Reference: FNV-1a 128 of "a", d228cb696f1a8caf78912b704e4a8964 (Landon Noll's test vectors).
+        let mut state = Fnv(0x6c62_272e_07bb_0142_62b8_2175_6295_c58d);
+        state.bytes(b"a");
+        assert_eq!(format!("{:032x}", state.0), "d228cb696f1a8caf78912b704e4a8964");
+    }
+}

@@ -1,0 +1,303 @@
+//! The calls of `service.proto`: check, look up, compute, convert.
+
+use super::chunks::{HEARTBEAT, Outlet, send_table, send_transient};
+use super::convert::{self, Violation, analysis as results, model as text, sweep as sweeps_wire};
+use super::limits::Limits;
+use super::models::{Model, Models, check_size};
+use super::server::MakeDevice;
+use super::sessions::{Question, Sessions};
+use super::shutdown::Shutdown;
+use super::stream::TrialStream;
+use super::sweeps::Sweeps;
+use super::work::{Work, guarded};
+use super::{proto, status};
+use crate::analysis::transient::TransientOptions;
+use crate::analysis::{modes, pull_in, statics};
+use crate::compile::{CompileError, CompileOptions, compile};
+use crate::device::Token;
+use crate::netlist::Bundle;
+use proto::device_reply::Kind as ReplyKind;
+use proto::sweep_status::State;
+use std::pin::Pin;
+use std::sync::Arc;
+use std::time::Duration;
+use tokio_stream::wrappers::ReceiverStream;
+use tonic::{Request, Response, Status, Streaming};
+
+/// What all calls of a server share.
+pub(super) struct Shared {
+    pub(super) limits: Limits,
+    pub(super) make: MakeDevice,
+    pub(super) models: Models,
+    pub(super) sessions: Sessions,
+    pub(super) sweeps: Sweeps,
+    pub(super) work: Work,
+    pub(super) shutdown: Shutdown,
+}
+
+/// The service.
+#[derive(Clone)]
+pub(super) struct Calls(pub(super) Arc<Shared>);
+
+/// Time between two messages of WatchSweep.
+const WATCH_INTERVAL: Duration = Duration::from_millis(100);
+/// Output times of a transient that names none.
+const DEFAULT_POINTS: usize = 201;
+
+type Reply<T> = Result<Response<T>, Status>;
+
+impl Calls {
+    /// Bundle and options of a request, within limits.
+    fn netlist(
+        &self,
+        bundle: Option<proto::Bundle>,
+        options: Option<proto::CompileOptions>,
+    ) -> Result<(Bundle, CompileOptions), Status> {
+        let bundle = text::bundle_from_wire(bundle).map_err(status::violation)?;
+        check_size(&bundle, &self.0.limits)?;
+        Ok((bundle, text::options_from_wire(options).map_err(status::violation)?))
+    }
+
+    /// Looks up a model, then computes on it.
+    async fn analyse<T: Send + 'static>(
+        &self,
+        id: &str,
+        job: impl FnOnce(&Model) -> Result<T, Status> + Send + 'static,
+    ) -> Reply<T> {
+        let model = self.0.models.get(id)?;
+        self.0.work.run(move || job(&model)).await.map(Response::new)
+    }
+}
+
+fn voltages(values: Vec<proto::Named>) -> Result<Vec<(String, f64)>, Status> {
+    convert::voltages("voltages", values).map_err(status::violation)
+}
+
+#[tonic::async_trait]
+impl proto::bimorph_server::Bimorph for Calls {
+    async fn info(&self, _: Request<proto::InfoRequest>) -> Reply<proto::InfoResponse> {
+        let limits = &self.0.limits;
+        Ok(Response::new(proto::InfoResponse {
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            protocols: vec!["bimorph.v1".to_owned()],
+            limits: Some(limits.to_wire()),
+        }))
+    }
+
+    async fn check(&self, request: Request<proto::CheckRequest>) -> Reply<proto::CheckResponse> {
+        let request = request.into_inner();
+        let (bundle, options) = self.netlist(request.bundle, request.options)?;
+        let answer = self.0.work.run(move || Ok(check(&bundle, &options))).await?;
+        Ok(Response::new(answer))
+    }
+
+    async fn compile(&self, request: Request<proto::CompileRequest>) -> Reply<proto::CompileResponse> {
+        let request = request.into_inner();
+        let (bundle, options) = self.netlist(request.bundle, request.options)?;
+        let shared = Arc::clone(&self.0);
+        let job = move || shared.models.compile(bundle, options, &shared.limits, shared.make);
+        let model = self.0.work.run(job).await?;
+        Ok(Response::new(proto::CompileResponse { model: Some(model.description.clone()) }))
+    }
+
+    async fn describe(&self, request: Request<proto::DescribeRequest>) -> Reply<proto::DescribeResponse> {
+        let model = self.0.models.get(&request.get_ref().model)?;
+        Ok(Response::new(proto::DescribeResponse { model: Some(model.description.clone()) }))
+    }
+
+    async fn open(&self, request: Request<proto::OpenRequest>) -> Reply<proto::OpenResponse> {
+        let (shared, request) = (Arc::clone(&self.0), request.into_inner());
+        let model = shared.models.get(&request.model)?;
+        let job = move || {
+            let session = shared.sessions.create(&model, shared.make, &shared.limits)?;
+            match session.answer(Question::Open(request)) {
+                Some(ReplyKind::Opened(opened)) => Ok(opened),
+                Some(ReplyKind::Fault(fault)) => {
+                    shared.sessions.close(session.id());
+                    Err(status::device(&convert::device::fault_from_wire(fault, "here")))
+                }
+                _ => Err(status::fault()),
+            }
+        };
+        self.0.work.run(job).await.map(Response::new)
+    }
+
+    type TrialStream = TrialStream;
+
+    async fn trial(&self, request: Request<Streaming<proto::DeviceRequest>>) -> Reply<TrialStream> {
+        Ok(Response::new(TrialStream::new(Arc::clone(&self.0), request.into_inner())))
+    }
+
+    async fn linearize(&self, request: Request<proto::LinearizeRequest>) -> Reply<proto::LinearizeResponse> {
+        let request = request.into_inner();
+        let session = self.0.sessions.get(&request.session)?;
+        let job = move || session.linearize(Token(request.token), &request.omega);
+        let points = self.0.work.run(job).await?;
+        Ok(Response::new(proto::LinearizeResponse { points }))
+    }
+
+    async fn close(&self, request: Request<proto::CloseRequest>) -> Reply<proto::CloseResponse> {
+        let id = &request.get_ref().session;
+        if self.0.sessions.close(id) { Ok(Response::new(proto::CloseResponse {})) } else { Err(gone(id)) }
+    }
+
+    async fn r#static(&self, request: Request<proto::StaticRequest>) -> Reply<proto::StaticResponse> {
+        let request = request.into_inner();
+        let voltages = voltages(request.voltages)?;
+        let job = move |model: &Model| {
+            let result = statics::static_equilibrium(&model.compiled, &voltages).map_err(status::analysis)?;
+            Ok(results::static_to_wire(&result))
+        };
+        self.analyse(&request.model, job).await
+    }
+
+    async fn modes(&self, request: Request<proto::ModesRequest>) -> Reply<proto::ModesResponse> {
+        let request = request.into_inner();
+        let voltages = voltages(request.voltages)?;
+        let count = if request.count == 0 { sweeps_wire::DEFAULT_MODES } else { request.count as usize };
+        if count > self.0.limits.modes {
+            return Err(status::limit("modes", self.0.limits.modes, count));
+        }
+        let job = move |model: &Model| {
+            let result = modes::modes(&model.compiled, count, &voltages).map_err(status::analysis)?;
+            Ok(results::modes_to_wire(&result))
+        };
+        self.analyse(&request.model, job).await
+    }
+
+    async fn pull_in(&self, request: Request<proto::PullInRequest>) -> Reply<proto::PullInResponse> {
+        let request = request.into_inner();
+        let max = convert::number("max_v", request.max_v, true).map_err(status::violation)?;
+        let port = (!request.port.is_empty()).then_some(request.port);
+        let job = move |model: &Model| {
+            let result = pull_in::pull_in(&model.compiled, port.as_deref(), max).map_err(status::analysis)?;
+            Ok(results::pull_in_to_wire(&result))
+        };
+        self.analyse(&request.model, job).await
+    }
+
+    type TransientStream = ReceiverStream<Result<proto::TransientEvent, Status>>;
+
+    async fn transient(&self, request: Request<proto::TransientRequest>) -> Reply<Self::TransientStream> {
+        let request = request.into_inner();
+        let model = self.0.models.get(&request.model)?;
+        let release = match request.release_model.as_str() {
+            "" => None,
+            id => Some(self.0.models.get(id)?),
+        };
+        let stop = convert::number("stop_s", request.stop_s, true).map_err(status::violation)?;
+        let tol = match request.tol {
+            0.0 => model.compiled.options.tol,
+            tol => convert::number("tol", tol, true).map_err(status::violation)?,
+        };
+        let points = if request.points == 0 { DEFAULT_POINTS } else { request.points as usize };
+        if points < 2 {
+            return Err(status::violation(Violation::new("points", "expected at least 2, both ends, got 1")));
+        }
+        let values = points.saturating_mul(request.signals.len() + 1);
+        if values > self.0.limits.transient_values {
+            return Err(status::limit("transient_values", self.0.limits.transient_values, values));
+        }
+        let (signals, voltages) = (request.signals, voltages(request.voltages)?);
+        let place = self.0.work.place().await?;
+        let (outlet, receiver) = Outlet::new(Arc::clone(&self.0));
+        let mut failed = outlet.also();
+        tokio::task::spawn_blocking(move || {
+            let _place = place;
+            let job = || {
+                let release = release.as_ref().map(|model| &*model.compiled);
+                let options = TransientOptions { stop, signals, points, tol, voltages, release };
+                send_transient(&model.compiled, &options, outlet);
+                Ok(())
+            };
+            if let Err(status) = guarded(job) {
+                failed.send(Err(status));
+            }
+        });
+        Ok(Response::new(ReceiverStream::new(receiver)))
+    }
+
+    async fn submit_sweep(&self, request: Request<proto::SubmitSweepRequest>) -> Reply<proto::SubmitSweepResponse> {
+        if self.0.shutdown.draining.is_cancelled() {
+            return Err(status::stopping());
+        }
+        let request = request.into_inner();
+        let (bundle, options) = self.netlist(request.bundle, request.options)?;
+        let limits = &self.0.limits;
+        let spec = sweeps_wire::spec_from_wire(request.spec, limits.sweep_points).map_err(status::violation)?;
+        let (sweep, points) = self.0.sweeps.submit(spec, bundle, options, limits)?;
+        Ok(Response::new(proto::SubmitSweepResponse { sweep, points }))
+    }
+
+    type WatchSweepStream = Pin<Box<ReceiverStream<Result<proto::SweepStatus, Status>>>>;
+
+    async fn watch_sweep(&self, request: Request<proto::WatchSweepRequest>) -> Reply<Self::WatchSweepStream> {
+        let mut progress = self.0.sweeps.get(&request.get_ref().sweep)?.watch();
+        let shutdown = self.0.shutdown.clone();
+        let (sender, receiver) = tokio::sync::mpsc::channel(1);
+        tokio::spawn(async move {
+            loop {
+                let now = progress.borrow_and_update().clone();
+                let last = now.state() != State::Running;
+                if sender.send(Ok(now)).await.is_err() || last {
+                    return;
+                }
+                tokio::select! {
+                    changed = progress.changed() => if changed.is_err() { return },
+                    () = tokio::time::sleep(HEARTBEAT) => {}
+                    () = sender.closed() => return,
+                    () = shutdown.ending.cancelled() => {
+                        let _ = sender.try_send(Err(status::stopping()));
+                        return;
+                    }
+                }
+                tokio::time::sleep(WATCH_INTERVAL).await;
+            }
+        });
+        Ok(Response::new(Box::pin(ReceiverStream::new(receiver))))
+    }
+
+    type FetchSweepStream = ReceiverStream<Result<proto::SweepChunk, Status>>;
+
+    async fn fetch_sweep(&self, request: Request<proto::FetchSweepRequest>) -> Reply<Self::FetchSweepStream> {
+        let sweep = self.0.sweeps.get(&request.get_ref().sweep)?;
+        if sweep.table().is_none() {
+            let proto::SweepStatus { done, points, message, .. } = sweep.status();
+            let text = format!("the sweep has no table: {done} of {points} points done {message}");
+            return Err(Status::failed_precondition(text.trim_end()));
+        }
+        let (mut outlet, receiver) = Outlet::new(Arc::clone(&self.0));
+        tokio::task::spawn_blocking(move || sweep.table().map(|table| send_table(table, &mut outlet)));
+        Ok(Response::new(ReceiverStream::new(receiver)))
+    }
+
+    async fn cancel_sweep(&self, request: Request<proto::CancelSweepRequest>) -> Reply<proto::CancelSweepResponse> {
+        self.0.sweeps.cancel(&request.get_ref().sweep)?;
+        Ok(Response::new(proto::CancelSweepResponse {}))
+    }
+}
+
+fn gone(session: &str) -> Status {
+    status::not_found("session", session)
+}
+
+fn check(bundle: &Bundle, options: &CompileOptions) -> proto::CheckResponse {
+    match compile(bundle, options) {
+        Ok(compiled) => proto::CheckResponse {
+            ok: true,
+            diagnostics: text::diagnostics_to_wire(&compiled.warnings),
+            rendered: compiled.warnings.render(false),
+        },
+        Err(CompileError::Netlist(diagnostics)) => proto::CheckResponse {
+            ok: false,
+            diagnostics: text::diagnostics_to_wire(&diagnostics),
+            rendered: diagnostics.render(false),
+        },
+        Err(other) => {
+            let message = other.to_string();
+            let severity = proto::diagnostic::Severity::Error.into();
+            let diagnostic = proto::Diagnostic { severity, message: message.clone(), ..Default::default() };
+            proto::CheckResponse { ok: false, diagnostics: vec![diagnostic], rendered: message }
+        }
+    }
+}

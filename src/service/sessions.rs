@@ -1,0 +1,226 @@
+//! Open devices: who may ask them, how many there are, and when one is forgotten.
+
+use super::convert::device as wire;
+use super::limits::Limits;
+use super::models::Model;
+use super::server::MakeDevice;
+use super::{proto, status};
+use crate::device::{Device, DeviceError, OpenRequest, SmallSignal, Token, TrialReply};
+use proto::device_reply::Kind as ReplyKind;
+use std::collections::BTreeMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+use tonic::Status;
+
+/// One device with its states.
+pub(super) struct Session {
+    id: String,
+    model: String,
+    device: Mutex<Box<dyn Device>>,
+    description: Mutex<proto::DeviceDescription>,
+    /// Whether a trial is short enough to run where its request arrives.
+    pub(super) inline: bool,
+    started: Instant,
+    used_ms: AtomicU64,
+    closed: AtomicBool,
+    trials: AtomicUsize,
+    most_trials: usize,
+}
+
+/// What a stream asks of its session.
+pub(super) enum Question {
+    Open(proto::OpenRequest),
+    Trial(proto::TrialRequest),
+    Accept(Token),
+    Linearize(proto::SmallSignalRequest),
+}
+
+impl Session {
+    pub(super) fn id(&self) -> &str {
+        &self.id
+    }
+
+    pub(super) fn model(&self) -> &str {
+        &self.model
+    }
+
+    /// Answers one question; none for an accept. A fault inside closes this session and no other.
+    pub(super) fn answer(&self, question: Question) -> Option<ReplyKind> {
+        if self.is_closed() {
+            return Some(refused(&status::not_found("session", &self.id)));
+        }
+        self.touch();
+        let outcome = catch_unwind(AssertUnwindSafe(|| {
+            let mut device = self.device.lock().unwrap_or_else(PoisonError::into_inner);
+            self.ask(device.as_mut(), question)
+        }));
+        outcome.unwrap_or_else(|_| {
+            self.close();
+            Some(refused(&status::fault()))
+        })
+    }
+
+    fn ask(&self, device: &mut dyn Device, question: Question) -> Option<ReplyKind> {
+        let answer = match question {
+            Question::Open(request) => {
+                self.trials.store(0, Ordering::Relaxed);
+                let request = OpenRequest { ports: request.ports, signals: request.signals };
+                device.open(&request).map(|description| {
+                    let description = wire::description_to_wire(&description);
+                    *self.description.lock().unwrap_or_else(PoisonError::into_inner) = description;
+                    ReplyKind::Opened(self.opened())
+                })
+            }
+            Question::Trial(request) => {
+                if self.trials.fetch_add(1, Ordering::Relaxed) >= self.most_trials {
+                    let got = "one more; accept a state now and then, or open again";
+                    return Some(refused(&status::limit("states_per_session", self.most_trials, got)));
+                }
+                let mut reply = TrialReply::default();
+                wire::trial_from_wire(&request)
+                    .and_then(|trial| device.trial(&trial, &mut reply))
+                    .map(|()| ReplyKind::Trial(wire::reply_to_wire(&mut reply)))
+            }
+            Question::Accept(token) => {
+                self.trials.store(0, Ordering::Relaxed);
+                device.accept(token);
+                return None;
+            }
+            Question::Linearize(request) => {
+                small_signal(device, Token(request.token), request.omega).map(ReplyKind::Linearized)
+            }
+        };
+        Some(answer.unwrap_or_else(|error| ReplyKind::Fault(wire::fault_to_wire(&error))))
+    }
+
+    /// Small-signal answers at several frequencies, for the unary call.
+    pub(super) fn linearize(&self, token: Token, omega: &[f64]) -> Result<Vec<proto::SmallSignal>, Status> {
+        self.touch();
+        let outcome = catch_unwind(AssertUnwindSafe(|| {
+            let mut device = self.device.lock().unwrap_or_else(PoisonError::into_inner);
+            omega.iter().map(|&omega| small_signal(device.as_mut(), token, omega)).collect::<Result<_, _>>()
+        }));
+        match outcome {
+            Ok(answer) => answer.map_err(|error| status::device(&error)),
+            Err(_) => {
+                self.close();
+                Err(status::fault())
+            }
+        }
+    }
+
+    /// What the last open said; an empty description before any.
+    pub(super) fn opened(&self) -> proto::OpenResponse {
+        let device = self.description.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        proto::OpenResponse { session: self.id.clone(), device: Some(device) }
+    }
+
+    pub(super) fn is_closed(&self) -> bool {
+        self.closed.load(Ordering::Relaxed)
+    }
+
+    fn close(&self) {
+        self.closed.store(true, Ordering::Relaxed);
+    }
+
+    fn touch(&self) {
+        self.used_ms.store(self.age_ms(), Ordering::Relaxed);
+    }
+
+    fn age_ms(&self) -> u64 {
+        u64::try_from(self.started.elapsed().as_millis()).unwrap_or(u64::MAX)
+    }
+
+    fn idle(&self) -> Duration {
+        Duration::from_millis(self.age_ms().saturating_sub(self.used_ms.load(Ordering::Relaxed)))
+    }
+}
+
+fn small_signal(device: &mut dyn Device, token: Token, omega: f64) -> Result<proto::SmallSignal, DeviceError> {
+    if !omega.is_finite() {
+        let (expected, got) = ("a finite angular frequency [rad/s]".to_owned(), omega.to_string());
+        return Err(DeviceError::BadRequest { what: "omega", expected, got });
+    }
+    let mut answer = SmallSignal::default();
+    device.linearize(token, omega, &mut answer)?;
+    Ok(wire::small_signal_to_wire(&answer))
+}
+
+/// A status as a fault on a stream that goes on.
+pub(super) fn refused(status: &Status) -> ReplyKind {
+    let kind = proto::fault::Kind::Refused(proto::Refused { code: status.code() as i32 });
+    ReplyKind::Fault(proto::Fault { kind: Some(kind), message: status.message().to_owned() })
+}
+
+/// The sessions of a server.
+pub(super) struct Sessions {
+    open: Mutex<BTreeMap<String, Arc<Session>>>,
+    instance: u32,
+    opened: AtomicU64,
+}
+
+impl Sessions {
+    /// No sessions yet; `instance` keeps ids of one server run from being taken for another's.
+    pub(super) fn new(instance: u32) -> Self {
+        Self { open: Mutex::default(), instance, opened: AtomicU64::new(0) }
+    }
+
+    /// Makes a session with a device that is not open yet.
+    pub(super) fn create(&self, model: &Model, make: MakeDevice, limits: &Limits) -> Result<Arc<Session>, Status> {
+        let device = catch_unwind(|| make(Arc::clone(&model.compiled))).map_err(|_| status::fault())?;
+        let number = self.opened.fetch_add(1, Ordering::Relaxed) + 1;
+        let session = Arc::new(Session {
+            id: format!("{:08x}-{number}", self.instance),
+            model: model.id().to_owned(),
+            device: Mutex::new(device),
+            description: Mutex::default(),
+            inline: model.unknowns() <= limits.inline_unknowns,
+            started: Instant::now(),
+            used_ms: AtomicU64::new(0),
+            closed: AtomicBool::new(false),
+            trials: AtomicUsize::new(0),
+            most_trials: limits.states_per_session,
+        });
+        let mut open = self.open.lock().unwrap_or_else(PoisonError::into_inner);
+        open.retain(|_, session| !session.is_closed());
+        if open.len() >= limits.sessions {
+            return Err(status::limit("sessions", limits.sessions, "one more; close one"));
+        }
+        open.insert(session.id.clone(), Arc::clone(&session));
+        Ok(session)
+    }
+
+    /// The session of that id.
+    pub(super) fn get(&self, id: &str) -> Result<Arc<Session>, Status> {
+        let open = self.open.lock().unwrap_or_else(PoisonError::into_inner);
+        let found = open.get(id).filter(|session| !session.is_closed());
+        found.cloned().ok_or_else(|| status::not_found("session", id))
+    }
+
+    /// Forgets a session; whether there was one.
+    pub(super) fn close(&self, id: &str) -> bool {
+        let session = self.open.lock().unwrap_or_else(PoisonError::into_inner).remove(id);
+        session.inspect(|session| session.close()).is_some()
+    }
+
+    /// Forgets sessions that were not used for `idle`; how many.
+    pub(super) fn expire(&self, idle: Duration) -> usize {
+        let mut open = self.open.lock().unwrap_or_else(PoisonError::into_inner);
+        let before = open.len();
+        open.retain(|_, session| {
+            let keep = session.idle() < idle;
+            if !keep {
+                session.close();
+            }
+            keep
+        });
+        before - open.len()
+    }
+
+    /// Sessions open now.
+    pub(super) fn len(&self) -> usize {
+        self.open.lock().unwrap_or_else(PoisonError::into_inner).len()
+    }
+}

@@ -1,0 +1,153 @@
+//! Opening the addresses of a server, and leaving no socket file behind.
+
+use super::address::Address;
+use super::connection::Connection;
+use super::server::ServeError;
+use super::shutdown::Shutdown;
+use std::fs;
+use std::io;
+use std::os::unix::fs::{DirBuilderExt, FileTypeExt, MetadataExt, PermissionsExt};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
+use tokio::net::{TcpListener, UnixListener};
+use tokio::sync::{Semaphore, mpsc};
+
+/// Pause after a failed accept (no file descriptors left, say), so that it does not spin.
+const ACCEPT_PAUSE: Duration = Duration::from_millis(50);
+
+/// An open listener with its address as bound.
+pub(super) enum Listener {
+    Tcp(TcpListener, Address),
+    Unix(UnixListener, SocketFile),
+}
+
+impl Listener {
+    /// Opens an address.
+    pub(super) async fn bind(address: &Address, insecure: bool) -> Result<Self, ServeError> {
+        let refused = |reason| ServeError::Bind { address: address.clone(), reason };
+        match address {
+            Address::Tcp(socket) => {
+                if !socket.ip().is_loopback() && !insecure {
+                    return Err(ServeError::NotLoopback { address: address.clone() });
+                }
+                let listener = TcpListener::bind(socket).await.map_err(refused)?;
+                let bound = Address::Tcp(listener.local_addr().map_err(refused)?);
+                Ok(Self::Tcp(listener, bound))
+            }
+            Address::Unix(path) => {
+                clear_stale(address, path)?;
+                let (listener, file) = bind_private(path).map_err(|reason| match reason.kind() {
+                    io::ErrorKind::AlreadyExists => ServeError::InUse { address: address.clone() },
+                    _ => refused(reason),
+                })?;
+                Ok(Self::Unix(listener, file))
+            }
+        }
+    }
+
+    /// The address as bound.
+    pub(super) fn address(&self) -> Address {
+        match self {
+            Self::Tcp(_, address) => address.clone(),
+            Self::Unix(_, file) => Address::Unix(file.path.clone()),
+        }
+    }
+
+    /// Accepts until draining starts; the socket file goes with the listener.
+    pub(super) async fn accept(
+        self,
+        places: Arc<Semaphore>,
+        shutdown: Shutdown,
+        connections: mpsc::Sender<io::Result<Connection>>,
+    ) {
+        loop {
+            let accepted = tokio::select! {
+                accepted = self.next(&places, &shutdown) => accepted,
+                () = shutdown.draining.cancelled() => return,
+            };
+            match accepted {
+                Ok(Some(connection)) => {
+                    if connections.send(Ok(connection)).await.is_err() {
+                        return;
+                    }
+                }
+                Ok(None) => tracing::warn!("connection refused: the limit is reached"),
+                Err(error) => {
+                    tracing::warn!(%error, "accept failed");
+                    tokio::time::sleep(ACCEPT_PAUSE).await;
+                }
+            }
+        }
+    }
+
+    /// One connection; none when there is no place for it.
+    async fn next(&self, places: &Arc<Semaphore>, shutdown: &Shutdown) -> io::Result<Option<Connection>> {
+        let place = || Arc::clone(places).try_acquire_owned().ok();
+        match self {
+            Self::Tcp(listener, _) => {
+                let (socket, _) = listener.accept().await?;
+                // Without this, replies wait for the peer's delayed acknowledgement: 40 ms a trial.
+                socket.set_nodelay(true)?;
+                Ok(place().map(|place| Connection::tcp(socket, &shutdown.cutting, place)))
+            }
+            Self::Unix(listener, _) => {
+                let (socket, _) = listener.accept().await?;
+                Ok(place().map(|place| Connection::unix(socket, &shutdown.cutting, place)))
+            }
+        }
+    }
+}
+
+/// A socket's file, removed when the server lets go of it, unless another server has replaced it.
+pub(super) struct SocketFile {
+    path: PathBuf,
+    device: u64,
+    inode: u64,
+}
+
+impl Drop for SocketFile {
+    fn drop(&mut self) {
+        let ours = |m: fs::Metadata| m.dev() == self.device && m.ino() == self.inode;
+        if fs::symlink_metadata(&self.path).is_ok_and(ours) {
+            let _ = fs::remove_file(&self.path);
+        }
+    }
+}
+
+/// Removes the socket of a server that is gone; refuses to touch a live one or anything else.
+fn clear_stale(address: &Address, path: &Path) -> Result<(), ServeError> {
+    let refused = |reason| ServeError::Bind { address: address.clone(), reason };
+    match fs::symlink_metadata(path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
+        Err(error) => return Err(refused(error)),
+        Ok(found) if !found.file_type().is_socket() => {
+            return Err(ServeError::NotASocket { address: address.clone() });
+        }
+        Ok(_) => {}
+    }
+    match std::os::unix::net::UnixStream::connect(path) {
+        Err(error) if error.kind() == io::ErrorKind::ConnectionRefused => fs::remove_file(path).map_err(refused),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+        Err(error) => Err(refused(error)),
+        Ok(_) => Err(ServeError::InUse { address: address.clone() }),
+    }
+}
+
+/// Binds with mode 0600 from the first moment: in a directory only the owner can enter, then linked to its place, which
+/// fails if another server took it meanwhile.
+fn bind_private(path: &Path) -> io::Result<(UnixListener, SocketFile)> {
+    let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let room = parent.join(format!(".{}", std::process::id()));
+    fs::DirBuilder::new().mode(0o700).create(&room)?;
+    let inside = room.join("s");
+    let bound = UnixListener::bind(&inside).and_then(|listener| {
+        fs::set_permissions(&inside, fs::Permissions::from_mode(0o600))?;
+        let made = fs::symlink_metadata(&inside)?;
+        fs::hard_link(&inside, path)?;
+        Ok((listener, SocketFile { path: path.to_owned(), device: made.dev(), inode: made.ino() }))
+    });
+    let _ = fs::remove_file(&inside);
+    let _ = fs::remove_dir(&room);
+    bound
+}

@@ -1,0 +1,149 @@
+//! The Trial stream: a state machine that answers each request where it arrives.
+//!
+//! A trial of a small model takes microseconds, less than handing it to another task. So the reply stream polls the
+//! request stream and computes in between; nothing is spawned and nothing crosses a channel. Models above
+//! [`Limits::inline_unknowns`](super::limits::Limits::inline_unknowns) go to a blocking thread instead, one at a time,
+//! which keeps replies in order.
+
+use super::rpc::Shared;
+use super::sessions::{Question, Session, refused};
+use super::{proto, status};
+use crate::device::Token;
+use proto::device_reply::Kind as ReplyKind;
+use proto::device_request::Kind as RequestKind;
+use std::future::Future;
+use std::pin::Pin;
+use std::sync::Arc;
+use std::task::{Context, Poll, ready};
+use tokio::task::JoinHandle;
+use tokio_stream::Stream;
+use tokio_util::sync::WaitForCancellationFutureOwned;
+use tonic::{Status, Streaming};
+
+/// Requests without a reply (accepts) answered before other tasks get their turn.
+const BURST: usize = 64;
+
+/// The replies of one stream.
+pub(super) struct TrialStream {
+    shared: Arc<Shared>,
+    requests: Streaming<proto::DeviceRequest>,
+    ending: Pin<Box<WaitForCancellationFutureOwned>>,
+    session: Option<Arc<Session>>,
+    /// Whether the session ends with this stream.
+    owned: bool,
+    running: Option<JoinHandle<Option<ReplyKind>>>,
+    finished: bool,
+}
+
+impl TrialStream {
+    pub(super) fn new(shared: Arc<Shared>, requests: Streaming<proto::DeviceRequest>) -> Self {
+        let ending = Box::pin(shared.shutdown.ending.clone().cancelled_owned());
+        Self { shared, requests, ending, session: None, owned: false, running: None, finished: false }
+    }
+
+    /// Starts on a request: a reply at once, none (an accept), or a thread in `running`.
+    fn take(&mut self, request: proto::DeviceRequest) -> Option<ReplyKind> {
+        let question = match request.kind {
+            Some(RequestKind::Open(open)) => {
+                return self.enter(&open).map_or_else(|s| Some(refused(&s)), |()| self.ask(Question::Open(open)));
+            }
+            Some(RequestKind::Attach(attach)) => return Some(self.attach(&attach.session)),
+            Some(RequestKind::Trial(trial)) => Question::Trial(trial),
+            Some(RequestKind::Accept(accept)) => Question::Accept(Token(accept.token)),
+            Some(RequestKind::Linearize(request)) => Question::Linearize(request),
+            None => return Some(refused(&Status::invalid_argument("a request without a kind"))),
+        };
+        self.ask(question)
+    }
+
+    fn ask(&mut self, question: Question) -> Option<ReplyKind> {
+        let Some(session) = &self.session else {
+            let silent = matches!(question, Question::Accept(_));
+            let fault = super::convert::device::fault_to_wire(&crate::device::DeviceError::NotOpen);
+            return (!silent).then_some(ReplyKind::Fault(fault));
+        };
+        if session.inline {
+            return session.answer(question);
+        }
+        let session = Arc::clone(session);
+        self.running = Some(tokio::task::spawn_blocking(move || session.answer(question)));
+        None
+    }
+
+    /// Makes sure there is a session for this model: a second open of the same model is only a new epoch.
+    fn enter(&mut self, open: &proto::OpenRequest) -> Result<(), Status> {
+        let alive = |session: &Arc<Session>| session.model() == open.model && !session.is_closed();
+        if self.session.as_ref().is_some_and(alive) {
+            return Ok(());
+        }
+        self.leave();
+        let model = self.shared.models.get(&open.model)?;
+        self.session = Some(self.shared.sessions.create(&model, self.shared.make, &self.shared.limits)?);
+        self.owned = true;
+        Ok(())
+    }
+
+    fn attach(&mut self, id: &str) -> ReplyKind {
+        match self.shared.sessions.get(id) {
+            Ok(session) => {
+                self.leave();
+                let opened = session.opened();
+                self.session = Some(session);
+                ReplyKind::Opened(opened)
+            }
+            Err(status) => refused(&status),
+        }
+    }
+
+    fn leave(&mut self) {
+        if let Some(session) = self.session.take().filter(|_| self.owned) {
+            self.shared.sessions.close(session.id());
+        }
+        self.owned = false;
+    }
+}
+
+impl Drop for TrialStream {
+    fn drop(&mut self) {
+        self.leave();
+    }
+}
+
+impl Stream for TrialStream {
+    type Item = Result<proto::DeviceReply, Status>;
+
+    fn poll_next(self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<Option<Self::Item>> {
+        let this = self.get_mut();
+        if this.finished {
+            return Poll::Ready(None);
+        }
+        if this.ending.as_mut().poll(cx).is_ready() {
+            this.finished = true;
+            return Poll::Ready(Some(Err(status::stopping())));
+        }
+        for _ in 0..BURST {
+            let reply = if let Some(running) = &mut this.running {
+                let reply = ready!(Pin::new(running).poll(cx)).unwrap_or_else(|_| Some(refused(&status::fault())));
+                this.running = None;
+                reply
+            } else {
+                match ready!(Pin::new(&mut this.requests).poll_next(cx)) {
+                    Some(Ok(request)) => this.take(request),
+                    Some(Err(error)) => {
+                        this.finished = true;
+                        return Poll::Ready(Some(Err(error)));
+                    }
+                    None => {
+                        this.finished = true;
+                        return Poll::Ready(None);
+                    }
+                }
+            };
+            if reply.is_some() {
+                return Poll::Ready(Some(Ok(proto::DeviceReply { kind: reply })));
+            }
+        }
+        cx.waker().wake_by_ref();
+        Poll::Pending
+    }
+}

@@ -1,0 +1,178 @@
+//! Sweeps that run while clients come and go.
+
+use super::limits::Limits;
+use super::{proto, status};
+use crate::compile::CompileOptions;
+use crate::jobs::sweep::{self, SweepError, SweepProgress, SweepSpec, SweepTable};
+use crate::netlist::Bundle;
+use proto::sweep_status::State;
+use std::collections::BTreeMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::time::{Duration, Instant};
+use tokio::sync::{Semaphore, watch};
+use tonic::Status;
+
+/// One sweep, running or finished.
+pub(super) struct Sweep {
+    status: watch::Sender<proto::SweepStatus>,
+    table: OnceLock<SweepTable>,
+    cancelled: AtomicBool,
+    used: Mutex<Instant>,
+}
+
+impl Sweep {
+    /// Its progress, now and later.
+    pub(super) fn watch(&self) -> watch::Receiver<proto::SweepStatus> {
+        self.status.subscribe()
+    }
+
+    /// Its table, once it is done.
+    pub(super) fn table(&self) -> Option<&SweepTable> {
+        self.table.get()
+    }
+
+    /// Where it stands.
+    pub(super) fn status(&self) -> proto::SweepStatus {
+        self.status.borrow().clone()
+    }
+
+    fn cancel(&self) {
+        self.cancelled.store(true, Ordering::Relaxed);
+    }
+
+    fn progress(&self, progress: SweepProgress) -> bool {
+        self.status.send_modify(|status| {
+            // Points finish on many threads; the counts a client sees never go back.
+            status.done = status.done.max(progress.done);
+            status.failed = status.failed.max(progress.failed);
+        });
+        !self.cancelled.load(Ordering::Relaxed)
+    }
+
+    fn finish(&self, outcome: Result<SweepTable, SweepError>) {
+        let (state, message) = match outcome {
+            Ok(table) => {
+                let _ = self.table.set(table);
+                (State::Done, String::new())
+            }
+            Err(SweepError::Cancelled { .. }) => (State::Cancelled, "cancelled".to_owned()),
+            Err(error) => (State::Failed, error.to_string()),
+        };
+        *self.used.lock().unwrap_or_else(PoisonError::into_inner) = Instant::now();
+        self.status.send_modify(|status| {
+            status.state = state.into();
+            status.message = message;
+        });
+    }
+
+    fn running(&self) -> bool {
+        self.status.borrow().state() == State::Running
+    }
+}
+
+/// The sweeps of a server.
+pub(super) struct Sweeps {
+    kept: Mutex<BTreeMap<String, Arc<Sweep>>>,
+    /// A sweep uses every core, so one runs at a time and the others wait.
+    turn: Arc<Semaphore>,
+    instance: u32,
+    submitted: AtomicU64,
+}
+
+impl Sweeps {
+    /// No sweeps yet; `instance` as for sessions.
+    pub(super) fn new(instance: u32) -> Self {
+        Self { kept: Mutex::default(), turn: Arc::new(Semaphore::new(1)), instance, submitted: AtomicU64::new(0) }
+    }
+
+    /// Starts a sweep; its id and its points.
+    pub(super) fn submit(
+        &self,
+        spec: SweepSpec,
+        bundle: Bundle,
+        options: CompileOptions,
+        limits: &Limits,
+    ) -> Result<(String, u64), Status> {
+        let violation = |error: SweepError| status::bad_request(&error.to_string(), [spec_violation(&error)]);
+        let points = spec.grid_points().map_err(violation)?;
+        if points > limits.sweep_points {
+            return Err(status::limit("sweep_points", limits.sweep_points, points));
+        }
+        let points = spec.point_numbers().map_err(violation)?.len() as u64;
+        let first = proto::SweepStatus { state: State::Running.into(), points, ..Default::default() };
+        let sweep = Arc::new(Sweep {
+            status: watch::Sender::new(first),
+            table: OnceLock::new(),
+            cancelled: AtomicBool::new(false),
+            used: Mutex::new(Instant::now()),
+        });
+        let number = self.submitted.fetch_add(1, Ordering::Relaxed) + 1;
+        let id = format!("{:08x}-w{number}", self.instance);
+        {
+            let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+            if kept.len() >= limits.sweeps {
+                return Err(status::limit("sweeps", limits.sweeps, "one more; cancel one that is no longer needed"));
+            }
+            kept.insert(id.clone(), Arc::clone(&sweep));
+        }
+        let turn = Arc::clone(&self.turn);
+        tokio::spawn(async move {
+            let _turn = turn.acquire_owned().await;
+            let ran = Arc::clone(&sweep);
+            let job = tokio::task::spawn_blocking(move || {
+                let outcome = catch_unwind(AssertUnwindSafe(|| {
+                    if ran.cancelled.load(Ordering::Relaxed) {
+                        return Err(SweepError::Cancelled { done: 0, points });
+                    }
+                    sweep::run(&spec, &bundle, &options, &|progress| ran.progress(progress))
+                }));
+                match outcome {
+                    Ok(outcome) => ran.finish(outcome),
+                    Err(_) => ran.finish(Err(SweepError::Threads { reason: "internal fault".to_owned() })),
+                }
+            });
+            let _ = job.await;
+        });
+        Ok((id, points))
+    }
+
+    /// The sweep of that id.
+    pub(super) fn get(&self, id: &str) -> Result<Arc<Sweep>, Status> {
+        let kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        let sweep = kept.get(id).cloned().ok_or_else(|| status::not_found("sweep", id))?;
+        *sweep.used.lock().unwrap_or_else(PoisonError::into_inner) = Instant::now();
+        Ok(sweep)
+    }
+
+    /// Stops and forgets a sweep.
+    pub(super) fn cancel(&self, id: &str) -> Result<(), Status> {
+        let removed = self.kept.lock().unwrap_or_else(PoisonError::into_inner).remove(id);
+        removed.map(|sweep| sweep.cancel()).ok_or_else(|| status::not_found("sweep", id))
+    }
+
+    /// Stops all.
+    pub(super) fn cancel_all(&self) {
+        let kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        kept.values().for_each(|sweep| sweep.cancel());
+    }
+
+    /// Forgets finished sweeps that nobody asked for during `idle`; how many.
+    pub(super) fn expire(&self, idle: Duration) -> usize {
+        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        let before = kept.len();
+        kept.retain(|_, sweep| {
+            sweep.running() || sweep.used.lock().unwrap_or_else(PoisonError::into_inner).elapsed() < idle
+        });
+        before - kept.len()
+    }
+}
+
+fn spec_violation(error: &SweepError) -> super::convert::Violation {
+    let field = match error {
+        SweepError::BadSpec { what, .. } => format!("spec.{what}"),
+        _ => "spec".to_owned(),
+    };
+    super::convert::Violation::new(field, error.to_string())
+}
