@@ -1,5 +1,6 @@
 //! From netlist text to a ready model: netlist → structure → discretize.
 
+use crate::discretize::{DiscretizeError, DiscretizeOptions, Discretized, discretize};
 use crate::netlist::{Bundle, Diagnostics, Setting};
 use crate::structure::Structure;
 use serde::{Deserialize, Serialize};
@@ -48,6 +49,8 @@ pub struct Compiled {
     pub warnings: Diagnostics,
     /// The options it was compiled with.
     pub options: CompileOptions,
+    /// Bodies, joints, gaps and electrics, and where the drawing's parts went.
+    pub parts: Discretized,
 }
 
 /// Why no model came out.
@@ -58,15 +61,8 @@ pub enum CompileError {
     #[error("{0}")]
     Netlist(Diagnostics),
     /// The structure cannot be made into a model.
-    #[error("{what}: {detail}; {hint}")]
-    Structure {
-        /// Which part of the drawing.
-        what: String,
-        /// What is wrong with it.
-        detail: String,
-        /// A way out.
-        hint: String,
-    },
+    #[error(transparent)]
+    Structure(#[from] DiscretizeError),
 }
 
 /// Compiles a netlist.
@@ -75,5 +71,18 @@ pub enum CompileError {
 /// See [`CompileError`].
 pub fn compile(bundle: &Bundle, options: &CompileOptions) -> Result<Compiled, CompileError> {
     let loaded = crate::netlist::load(bundle, &options.set).map_err(CompileError::Netlist)?;
-    Ok(Compiled { structure: loaded.structure, parameters: loaded.parameters, warnings: loaded.warnings, options: options.clone() })
+    let choices = DiscretizeOptions {
+        band: options.band,
+        tol: options.tol,
+        linear: options.linear,
+        undamped: options.undamped,
+    };
+    let parts = discretize(&loaded.structure, &choices)?;
+    Ok(Compiled {
+        structure: loaded.structure,
+        parameters: loaded.parameters,
+        warnings: loaded.warnings,
+        options: options.clone(),
+        parts,
+    })
 }

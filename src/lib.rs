@@ -14,9 +14,13 @@ pub mod analysis;
 pub mod compile;
 pub mod cosim;
 pub mod device;
+pub mod discretize;
+pub mod gaps;
 pub mod jobs;
+pub mod multibody;
 pub mod netlist;
 pub mod results;
 #[cfg(feature = "remote")]
 pub mod service;
+pub mod solve;
 pub mod structure;

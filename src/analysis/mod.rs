@@ -2,6 +2,7 @@
 
 pub mod modes;
 pub mod pull_in;
+pub mod signal;
 pub mod statics;
 pub mod transient;
 
@@ -51,3 +52,14 @@ pub enum AnalysisError {
 
 /// Voltages on ports for a whole analysis: (port name, volts). Ports not named are at 0 V.
 pub type PortVoltages = [(String, f64)];
+
+impl From<crate::solve::SolveError> for AnalysisError {
+    fn from(error: crate::solve::SolveError) -> Self {
+        use crate::solve::SolveError;
+        match error {
+            SolveError::Singular { .. } => Self::Singular { detail: error.to_string() },
+            SolveError::Lost { .. } => Self::NoEquilibrium { detail: error.to_string() },
+            SolveError::StepTooSmall { t, dt, .. } => Self::StepFailed { t, dt, detail: error.to_string() },
+        }
+    }
+}

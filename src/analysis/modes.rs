@@ -1,7 +1,11 @@
 //! Natural frequencies and shapes about the operating point.
+use super::signal::{Signal, View};
+use super::statics::{NodeMotion, operating_point};
 use super::{AnalysisError, PortVoltages};
-use super::statics::NodeMotion;
 use crate::compile::Compiled;
+use crate::multibody::BlockMatrix;
+use crate::multibody::planar::Pose;
+use crate::solve::eigen::lowest_modes;
 use serde::Serialize;
 
 /// Undamped modes.
@@ -20,8 +24,53 @@ pub struct ModesResult {
 /// The `count` lowest modes about the static equilibrium at these voltages.
 ///
 /// # Errors
-/// See [`AnalysisError`].
+/// See [`AnalysisError`]; `Singular` also when a mode did not converge, so that no unconverged frequency is shown.
 pub fn modes(compiled: &Compiled, count: usize, voltages: &PortVoltages) -> Result<ModesResult, AnalysisError> {
-    let _ = (compiled, count, voltages);
-    Err(AnalysisError::NoEquilibrium { detail: "not built yet".into() })
+    let system = &compiled.parts.system;
+    let mut drive = system.electrics.drive();
+    // without loads the drawn geometry is the operating point, also for a structure that floats freely
+    let loaded = !voltages.is_empty()
+        || !system.electrics.fixed.is_empty()
+        || !system.loads.is_empty()
+        || system.model.joints.iter().any(|j| j.rest != 0.0);
+    let q = if loaded {
+        let point = operating_point(compiled, voltages)?;
+        let mut rise = point.rise.clone();
+        system.electrics.steady(&point.sources, &mut rise, &mut drive);
+        point.q
+    } else {
+        vec![Pose::zeros(); system.bodies()]
+    };
+    let mut tangent = BlockMatrix::new(&system.model.pattern);
+    let mut residual = q.clone();
+    system.tangent(&q, &drive, &mut tangent, &mut residual);
+    let found = lowest_modes(system, &tangent, count)?;
+    let shapes = found.shapes.iter().map(|x| shape(compiled, &q, x)).collect();
+    Ok(ModesResult {
+        frequencies_hz: found.lambda.iter().map(|&l| l.max(0.0).sqrt() / std::f64::consts::TAU).collect(),
+        shapes,
+        residuals: found.residuals,
+        unknowns: system.model.unknowns(),
+    })
+}
+
+/// Displacements of the nodes in a mode, the largest translation scaled to 1.
+fn shape(compiled: &Compiled, q: &[Pose], x: &[Pose]) -> Vec<(String, NodeMotion)> {
+    let zeros = vec![Pose::zeros(); q.len()];
+    let (state, change) = (
+        View { q, v: &zeros, rise: &[], volts: &[] },
+        View { q: x, v: &zeros, rise: &[], volts: &[] },
+    );
+    let mut nodes: Vec<(String, NodeMotion)> = (compiled.structure.nodes.iter().zip(&compiled.parts.nodes))
+        .filter_map(|(node, point)| {
+            let at = |d: usize| point.map(|p| Signal::Displacement(p, d).slope(compiled, &state, &change));
+            Some((node.name.clone(), NodeMotion { x: at(0)?, y: at(1)?, rz: at(2)? }))
+        })
+        .collect();
+    let largest = nodes.iter().map(|(_, m)| m.x.hypot(m.y)).fold(0.0, f64::max);
+    let scale = if largest > 0.0 { 1.0 / largest } else { 1.0 };
+    for (_, m) in &mut nodes {
+        *m = NodeMotion { x: m.x * scale, y: m.y * scale, rz: m.rz * scale };
+    }
+    nodes
 }

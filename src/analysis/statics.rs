@@ -1,6 +1,10 @@
 //! Static equilibrium.
+use super::signal::{Signal, View};
 use super::{AnalysisError, PortVoltages};
 use crate::compile::Compiled;
+use crate::multibody::planar::Pose;
+use crate::solve::equilibrium::{Equilibrium, EquilibriumOptions, Path};
+use crate::solve::path::SourcePath;
 use serde::Serialize;
 
 /// Displacement of a node from its drawn place.
@@ -38,6 +42,103 @@ pub struct StaticResult {
 /// # Errors
 /// See [`AnalysisError`].
 pub fn static_equilibrium(compiled: &Compiled, voltages: &PortVoltages) -> Result<StaticResult, AnalysisError> {
-    let _ = (compiled, voltages);
-    Err(AnalysisError::NoEquilibrium { detail: "not built yet".into() })
+    let point = operating_point(compiled, voltages)?;
+    let system = &compiled.parts.system;
+    let structure = &compiled.structure;
+    let electrics = &system.electrics;
+    let view = View { q: &point.q, v: &point.q, rise: &point.rise, volts: &point.volts };
+    let temperatures_k = structure
+        .beams
+        .iter()
+        .enumerate()
+        .filter(|(_, b)| b.heater.is_some() || b.temperature.is_some())
+        .map(|(index, b)| {
+            let heater = compiled.parts.heaters.iter().position(|&h| h == index);
+            let rest = b.temperature.unwrap_or(b.material.ambient_temperature);
+            (b.name.clone(), heater.map_or(rest, |k| Signal::Temperature(k).value(compiled, &view)))
+        })
+        .collect();
+    let port = |p: usize| electrics.names[p].clone();
+    let current =
+        |p: usize| (0..point.sources.len()).map(|s| electrics.conductance[(p, s)] * point.sources[s]).sum::<f64>();
+    let charge = |p: usize| {
+        (0..point.volts.len())
+            .map(|g| electrics.gap_rows[(g, p)] * system.capacitance(g, &point.q) * point.volts[g])
+            .sum::<f64>()
+    };
+    Ok(StaticResult {
+        nodes: node_motions(compiled, &point.q),
+        temperatures_k,
+        currents_a: (0..electrics.ports).map(|p| (port(p), current(p))).collect(),
+        charges_c: (0..electrics.ports).map(|p| (port(p), charge(p))).collect(),
+        pulled_in: point.path.fold.is_some(),
+        unknowns: system.model.unknowns(),
+        iterations: point.path.iterations,
+    })
+}
+
+/// An equilibrium with what it was found at.
+#[derive(Debug, Clone)]
+pub(crate) struct OperatingPoint {
+    pub(crate) q: Vec<Pose>,
+    pub(crate) sources: Vec<f64>,
+    pub(crate) rise: Vec<f64>,
+    pub(crate) volts: Vec<f64>,
+    pub(crate) path: Path,
+}
+
+/// The equilibrium reached from rest.
+pub(crate) fn operating_point(
+    compiled: &Compiled,
+    voltages: &PortVoltages,
+) -> Result<OperatingPoint, AnalysisError> {
+    let system = &compiled.parts.system;
+    let electrics = &system.electrics;
+    let sources = source_vector(compiled, voltages)?;
+    let rest = vec![0.0; sources.len()];
+    let mut q = vec![Pose::zeros(); system.bodies()];
+    let mut solver = Equilibrium::new(system, EquilibriumOptions::default());
+    let loads = SourcePath::new(electrics, &rest, &sources, [0.0, 1.0]);
+    let path = solver.follow(system, &loads, &mut q).map_err(AnalysisError::from)?;
+    let mut drive = electrics.drive();
+    let mut rise = vec![0.0; electrics.heating.heaters.len()];
+    electrics.steady(&sources, &mut rise, &mut drive);
+    Ok(OperatingPoint { q, sources, rise, volts: drive.volts, path })
+}
+
+/// The source vector for voltages by port name.
+pub(crate) fn source_vector(compiled: &Compiled, voltages: &PortVoltages) -> Result<Vec<f64>, AnalysisError> {
+    let electrics = &compiled.parts.system.electrics;
+    let mut ports = vec![0.0; electrics.ports];
+    for (name, volts) in voltages {
+        let port = compiled.structure.port(name).ok_or_else(|| AnalysisError::BadRequest {
+            what: format!("port \"{name}\""),
+            detail: match electrics.ports {
+                0 => "the netlist has no ports; add one with `NAME port * [node] []`".into(),
+                n => format!("the netlist's ports are {}", electrics.names[..n].join(", ")),
+            },
+        })?;
+        if !volts.is_finite() {
+            return Err(AnalysisError::BadRequest {
+                what: format!("voltage of port \"{name}\""),
+                detail: format!("{volts} is not a finite number of volts"),
+            });
+        }
+        ports[port] = *volts;
+    }
+    let mut sources = vec![0.0; electrics.sources()];
+    electrics.fill_sources(&ports, &mut sources);
+    Ok(sources)
+}
+
+/// Displacement of every mechanical node, by name.
+pub(crate) fn node_motions(compiled: &Compiled, q: &[Pose]) -> Vec<(String, NodeMotion)> {
+    let linear = compiled.parts.system.model.linear;
+    (compiled.structure.nodes.iter().zip(&compiled.parts.nodes))
+        .filter_map(|(node, point)| {
+            let point = (*point)?;
+            let moved = point.displacement(q, linear);
+            Some((node.name.clone(), NodeMotion { x: moved.x, y: moved.y, rz: point.rotation(q) }))
+        })
+        .collect()
 }

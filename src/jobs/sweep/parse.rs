@@ -65,7 +65,7 @@ pub fn linear(low: f64, high: f64, count: usize) -> Vec<Setting> {
 }
 
 /// A finite number as the netlist language writes it.
-fn number(text: &str) -> Option<f64> {
+pub fn number(text: &str) -> Option<f64> {
     match Setting::parse(text) {
         Ok(Setting::Number(value)) if value.is_finite() => Some(value),
         _ => None,

@@ -1,0 +1,150 @@
+//! Quantities that can be read from a state by name.
+
+use super::AnalysisError;
+use crate::compile::Compiled;
+use crate::gaps::Point;
+use crate::multibody::Model;
+use crate::multibody::planar::{self, Pose};
+
+/// A quantity of a state.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Signal {
+    /// Displacement of a node: direction 0 x, 1 y, 2 rotation.
+    Displacement(Point, usize),
+    /// Rate of a node's displacement.
+    Rate(Point, usize),
+    /// Mean temperature of heater k [K].
+    Temperature(usize),
+    /// A temperature that the netlist prescribes [K].
+    Prescribed(f64),
+    /// Charge of gap g [C].
+    Charge(usize),
+    /// Distance left in gap g [m].
+    Distance(usize),
+}
+
+/// What signals are read from: a state, or a change of one.
+#[derive(Debug, Clone, Copy)]
+pub struct View<'a> {
+    /// Displacements.
+    pub q: &'a [Pose],
+    /// Rates.
+    pub v: &'a [Pose],
+    /// Rise of each heater [K].
+    pub rise: &'a [f64],
+    /// Voltage of each gap [V].
+    pub volts: &'a [f64],
+}
+
+impl Signal {
+    /// Finds a signal by name: `NODE.x|y|rz|vx|vy|vrz`, `BEAM.T`, `GAP.q`, `GAP.gap`.
+    ///
+    /// # Errors
+    /// [`AnalysisError::BadRequest`] with what would be understood.
+    pub fn find(compiled: &Compiled, name: &str) -> Result<Self, AnalysisError> {
+        Self::lookup(compiled, name)
+            .ok_or_else(|| AnalysisError::BadRequest { what: format!("signal \"{name}\""), detail: hint(compiled, name) })
+    }
+
+    fn lookup(compiled: &Compiled, name: &str) -> Option<Self> {
+        let (part, quantity) = name.rsplit_once('.')?;
+        let node = |direction: usize, rate: bool| {
+            let point = compiled.parts.nodes[compiled.structure.node(part)?.0]?;
+            Some(if rate { Self::Rate(point, direction) } else { Self::Displacement(point, direction) })
+        };
+        let gap = || compiled.parts.gap_names.iter().position(|n| n == part);
+        match quantity {
+            "x" => node(0, false),
+            "y" => node(1, false),
+            "rz" => node(2, false),
+            "vx" => node(0, true),
+            "vy" => node(1, true),
+            "vrz" => node(2, true),
+            "q" => gap().map(Self::Charge),
+            "gap" => gap().map(Self::Distance),
+            "T" => {
+                let beam = compiled.structure.beams.iter().position(|b| b.name == part)?;
+                match compiled.parts.heaters.iter().position(|&b| b == beam) {
+                    Some(heater) => Some(Self::Temperature(heater)),
+                    None => {
+                        let b = &compiled.structure.beams[beam];
+                        Some(Self::Prescribed(b.temperature.unwrap_or(b.material.ambient_temperature)))
+                    }
+                }
+            }
+            _ => None,
+        }
+    }
+
+    /// Its unit.
+    pub fn unit(&self) -> &'static str {
+        match self {
+            Self::Displacement(_, 2) => "rad",
+            Self::Displacement(..) | Self::Distance(_) => "m",
+            Self::Rate(_, 2) => "rad/s",
+            Self::Rate(..) => "m/s",
+            Self::Temperature(_) | Self::Prescribed(_) => "K",
+            Self::Charge(_) => "C",
+        }
+    }
+
+    /// Its value in a state.
+    pub fn value(&self, compiled: &Compiled, state: &View<'_>) -> f64 {
+        let system = &compiled.parts.system;
+        let linear = system.model.linear;
+        match *self {
+            Self::Displacement(p, 2) => p.rotation(state.q),
+            Self::Displacement(p, d) => p.displacement(state.q, linear)[d],
+            Self::Rate(p, 2) => Model::pose(state.v, p.body).z,
+            Self::Rate(p, d) => point_rate(p, state.q, state.v, linear)[d],
+            Self::Temperature(k) => system.electrics.heating.heaters[k].ambient + state.rise[k],
+            Self::Prescribed(t) => t,
+            Self::Charge(g) => system.capacitance(g, state.q) * state.volts[g],
+            Self::Distance(g) => system.distance(g, state.q),
+        }
+    }
+
+    /// Its change with a change of the state. The share of rotation in the rate of a point's velocity is left out: it is
+    /// of second order in rates.
+    pub fn slope(&self, compiled: &Compiled, state: &View<'_>, change: &View<'_>) -> f64 {
+        let system = &compiled.parts.system;
+        let linear = system.model.linear;
+        match *self {
+            Self::Displacement(p, 2) => p.rotation(change.q),
+            Self::Displacement(p, d) => point_rate(p, state.q, change.q, linear)[d],
+            Self::Rate(p, 2) => Model::pose(change.v, p.body).z,
+            Self::Rate(p, d) => point_rate(p, state.q, change.v, linear)[d],
+            Self::Temperature(k) => change.rise[k],
+            Self::Prescribed(_) => 0.0,
+            Self::Charge(g) => {
+                system.capacitance(g, state.q) * change.volts[g]
+                    + system.capacitance_slope(g, state.q, change.q) * state.volts[g]
+            }
+            Self::Distance(g) => system.distance_slope(g, state.q, change.q),
+        }
+    }
+}
+
+/// Rate of a material point when its body moves at `v` (or its first-order change when the body's pose changes by `v`).
+fn point_rate(p: Point, q: &[Pose], v: &[Pose], linear: bool) -> nalgebra::Vector2<f64> {
+    let (q, v) = (Model::pose(q, p.body), Model::pose(v, p.body));
+    let (turn, _) = planar::point_turn(&q, p.arm, linear);
+    nalgebra::Vector2::new(v.x, v.y) + turn * v.z
+}
+
+/// What a wrong name could have meant.
+fn hint(compiled: &Compiled, name: &str) -> String {
+    let part = name.rsplit_once('.').map_or(name, |(part, _)| part);
+    let nodes: Vec<&str> =
+        compiled.structure.nodes.iter().filter(|n| n.mechanical).map(|n| n.name.as_str()).collect();
+    if nodes.contains(&part) {
+        return format!("\"{part}\" is a node: ask for {part}.x, .y, .rz, .vx, .vy or .vrz");
+    }
+    let beams = compiled.structure.beams.iter().map(|b| b.name.as_str());
+    let known: Vec<&str> =
+        nodes.into_iter().chain(beams).chain(compiled.parts.gap_names.iter().map(String::as_str)).collect();
+    let close = known.iter().copied().filter(|k| k.contains(part) || part.contains(*k)).take(5);
+    let close: Vec<&str> = close.collect();
+    let shown = if close.is_empty() { known.into_iter().take(8).collect::<Vec<_>>() } else { close };
+    format!("no node, beam or gap of that name (expected NODE.x|y|rz|vx|vy|vrz, BEAM.T, GAP.q|gap; there is {})", shown.join(", "))
+}

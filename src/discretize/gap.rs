@@ -1,0 +1,75 @@
+//! Combs, lumped plates and facing beams → gap functions.
+
+use super::rigid::Assembly;
+use crate::gaps::approach::Approach;
+use crate::gaps::capacitor::Capacitor;
+use crate::gaps::facing::Facing;
+use crate::gaps::{Gap, Point, contact};
+use crate::multibody::BodyId;
+use crate::structure::Structure;
+use nalgebra::Vector2;
+
+/// Gaps in the order combs, plates, facing beams; their names; and the pairs of bodies they couple.
+pub fn lay(structure: &Structure, rigid: &Assembly) -> (Vec<Gap>, Vec<String>, Vec<(BodyId, BodyId)>) {
+    let mut gaps = Vec::new();
+    let mut names = Vec::new();
+    let mut couplings = Vec::new();
+    for comb in &structure.combs {
+        let approach = approach(rigid, comb.a.0, comb.b.0, comb.axis);
+        let slope = comb.gaps * comb.permittivity * comb.height / comb.gap;
+        let overlap = if comb.finite { comb.overlap } else { f64::INFINITY };
+        let capacitor = Capacitor::Comb { slope, overlap, blend: comb.gap, parasitic: comb.parasitic };
+        couplings.push((approach.a.body, approach.b.body));
+        gaps.push(Gap::Single { approach, capacitor, contact: None });
+        names.push(comb.name.clone());
+    }
+    for plate in &structure.plate_gaps {
+        let approach = approach(rigid, plate.a.0, plate.b.0, plate.axis);
+        let capacitor = Capacitor::Plates {
+            strength: plate.permittivity * plate.area,
+            gap: plate.gap,
+            closest: contact::FROZEN.min(0.5 * plate.gap),
+        };
+        couplings.push((approach.a.body, approach.b.body));
+        gaps.push(Gap::Single { approach, capacitor, contact: Some(plate.height) });
+        names.push(plate.name.clone());
+    }
+    for pair in &structure.beam_gaps {
+        let normal = pair.angle + pair.side * std::f64::consts::FRAC_PI_2;
+        let axis = [normal.cos(), normal.sin()];
+        let [a, b, c, d] = pair.nodes.map(|n| n.0);
+        let ends = [approach(rigid, a, c, axis), approach(rigid, b, d, axis)];
+        let bodies = [ends[0].a.body, ends[1].a.body, ends[0].b.body, ends[1].b.body];
+        for i in 0..4 {
+            for j in 0..i {
+                couplings.push((bodies[i], bodies[j]));
+            }
+        }
+        let facing = Facing {
+            length: pair.length,
+            gap: pair.gap,
+            strength: pair.permittivity * pair.height * pair.fringe,
+            height: pair.height,
+        };
+        gaps.push(Gap::Facing { ends, side: pair.side, facing });
+        names.push(pair.name.clone());
+    }
+    (gaps, names, couplings)
+}
+
+fn approach(rigid: &Assembly, a: usize, b: usize, axis: [f64; 2]) -> Approach {
+    Approach { a: rigid.point(a), b: rigid.point(b), axis: Vector2::new(axis[0], axis[1]) }
+}
+
+/// The gap with its points about centres of mass.
+pub fn centered(gap: Gap, moved: &dyn Fn(Point) -> Point) -> Gap {
+    let shift = |a: Approach| Approach { a: moved(a.a), b: moved(a.b), ..a };
+    match gap {
+        Gap::Single { approach, capacitor, contact } => {
+            Gap::Single { approach: shift(approach), capacitor, contact }
+        }
+        Gap::Facing { ends: [first, second], side, facing } => {
+            Gap::Facing { ends: [shift(first), shift(second)], side, facing }
+        }
+    }
+}

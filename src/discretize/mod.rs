@@ -1,0 +1,186 @@
+//! From the drawing to rigid bodies and flexible joints.
+//!
+//! Nodes become bodies (those that rigid links join become one), beams become segments: rigid bodies at their inner nodes
+//! and one joint with three directions at the middle of each segment. Anchored nodes become ground.
+//!
+//! The paper's four joint types are this one joint: rotary between equal sections (type 1), between different sections
+//! (type 2), rotary T (type 3: several joints on one body), prismatic (type 4: the axial direction).
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | [`order`] | model order: how many segments a beam gets |
+//! | [`rigid`] | nodes → rigid groups, supports → ground and held directions |
+//! | [`beam`] | the E4 segment: joints, second-order axial strain, masses |
+//! | [`gap`] | combs, plates and facing beams → gap functions |
+//! | [`ports`] | resistors, heaters, sources and ports → network and quadratic forms of temperature |
+
+pub mod beam;
+pub mod gap;
+pub mod order;
+pub mod ports;
+pub mod rigid;
+
+use crate::gaps::{Load, Point, System};
+use crate::multibody::{Damper, Joint, Model};
+use crate::structure::Structure;
+use nalgebra::{Matrix2, Matrix3, Vector2};
+use thiserror::Error;
+
+/// How a drawing is to be discretized. `Default` is the only place where the numbers stand.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DiscretizeOptions {
+    /// Highest frequency the model must resolve [Hz]; none: by slenderness alone.
+    pub band: Option<f64>,
+    /// Relative frequency error aimed at [1], default 1e-3.
+    pub tol: f64,
+    /// Small displacements about the drawn geometry.
+    pub linear: bool,
+    /// Leave out gas damping.
+    pub undamped: bool,
+}
+
+impl Default for DiscretizeOptions {
+    fn default() -> Self {
+        Self { band: None, tol: 1e-3, linear: false, undamped: false }
+    }
+}
+
+/// A system, and where the drawing's parts went.
+#[derive(Debug, Clone)]
+pub struct Discretized {
+    /// Bodies, joints, gaps, electrics.
+    pub system: System,
+    /// For each node of the structure, its material point; none for purely electrical nodes.
+    pub nodes: Vec<Option<Point>>,
+    /// For each beam, the points along its centreline, ends included.
+    pub beams: Vec<Vec<Point>>,
+    /// For each heater of the electrics, its beam in the structure.
+    pub heaters: Vec<usize>,
+    /// Name of each gap of the system.
+    pub gap_names: Vec<String>,
+}
+
+/// Why a drawing cannot become a model.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum DiscretizeError {
+    /// A quantity that must be positive is not.
+    #[error("{element}: {quantity} is {value:e}, expected a positive number")]
+    NotPositive {
+        /// Element name.
+        element: String,
+        /// Which quantity.
+        quantity: &'static str,
+        /// Its value.
+        value: f64,
+    },
+    /// Sources or ports in a loop.
+    #[error("{source_name} closes a loop of ideal voltage sources; remove it or put a resistor in the loop")]
+    SourceLoop {
+        /// Name of the port or source.
+        source_name: String,
+    },
+    /// A heater whose heat cannot leave.
+    #[error("{beam} is heated but nothing conducts its heat to an anchor; use beam2det for the beams in between")]
+    NoHeatSink {
+        /// Name of a beam in that part.
+        beam: String,
+    },
+    /// Everything is ground.
+    #[error("nothing can move: every node is anchored")]
+    NothingMoves,
+}
+
+/// Turns a drawing into a system.
+///
+/// # Errors
+/// See [`DiscretizeError`].
+pub fn discretize(structure: &Structure, options: &DiscretizeOptions) -> Result<Discretized, DiscretizeError> {
+    let mut rigid = rigid::Assembly::new(structure);
+    let mut joints: Vec<Joint> = Vec::new();
+    let mut dampers: Vec<Damper> = Vec::new();
+    let mut beams = Vec::with_capacity(structure.beams.len());
+    let mut heaters = Vec::new();
+    for (index, drawn) in structure.beams.iter().enumerate() {
+        let segments = order::segments(drawn, options.band, options.tol)?;
+        let heater = drawn.heater.is_some().then(|| {
+            heaters.push(index);
+            heaters.len() - 1
+        });
+        beams.push(beam::lay(drawn, segments, heater, options.undamped, &mut rigid, &mut joints));
+    }
+    for mass in &structure.masses {
+        rigid.add_plate(mass, options.undamped);
+    }
+    let stiffest = joints.iter().map(|j| j.stiffness[(0, 0)]).fold(0.0, f64::max);
+    for spring in &structure.springs {
+        lay_spring(spring, options.undamped, &rigid, &mut joints, &mut dampers);
+    }
+    rigid.hold_hinges(structure, stiffest, &mut joints);
+    let (gaps, gap_names, couplings) = gap::lay(structure, &rigid);
+    let loads: Vec<(usize, Load)> = structure
+        .loads
+        .iter()
+        .map(|l| {
+            let force = Vector2::new(l.force[0], l.force[1]);
+            (l.node.0, Load { point: rigid.point(l.node.0), force, moment: l.moment })
+        })
+        .collect();
+    let electrics = ports::lay(structure, &heaters, &rigid)?;
+    let narrowest = structure.beams.iter().map(|b| b.width).fold(f64::INFINITY, f64::min);
+    let gap_scale = structure.plate_gaps.iter().map(|g| g.gap).chain(structure.combs.iter().map(|c| c.gap));
+    let scale = gap_scale.fold(narrowest, f64::min);
+    if rigid.bodies.is_empty() {
+        return Err(DiscretizeError::NothingMoves);
+    }
+    let bodies = rigid.finish_bodies();
+    for joint in &mut joints {
+        rigid.center(joint.a, joint.b, &mut joint.frame);
+    }
+    for damper in &mut dampers {
+        rigid.center(damper.a, damper.b, &mut damper.frame);
+    }
+    let (model, place) = Model::new(bodies, joints, dampers, &couplings, options.linear);
+    let moved = |p: Point| rigid.centered(p, &place);
+    let system = System {
+        model,
+        gaps: gaps.into_iter().map(|g| gap::centered(g, &moved)).collect(),
+        loads: loads.into_iter().map(|(_, l)| Load { point: moved(l.point), ..l }).collect(),
+        electrics,
+        length_scale: if scale.is_finite() { scale } else { 1e-6 },
+    };
+    let nodes = (0..structure.nodes.len())
+        .map(|n| structure.nodes[n].mechanical.then(|| moved(rigid.point(n))))
+        .collect();
+    let beams = beams.into_iter().map(|points| points.into_iter().map(moved).collect()).collect();
+    Ok(Discretized { system, nodes, beams, heaters, gap_names })
+}
+
+/// A lumped spring and damper: a joint half way between its two nodes.
+fn lay_spring(
+    spring: &crate::structure::SpringDamper,
+    undamped: bool,
+    rigid: &rigid::Assembly,
+    joints: &mut Vec<Joint>,
+    dampers: &mut Vec<Damper>,
+) {
+    let (a, b) = (rigid.point(spring.a.0), rigid.point(spring.b.0));
+    if a.body == b.body {
+        return;
+    }
+    let frame = rigid.frame(a, b, spring.angle);
+    if spring.stiffness.iter().any(|&k| k != 0.0) {
+        joints.push(Joint {
+            a: a.body,
+            b: b.body,
+            frame,
+            stiffness: Matrix3::from_diagonal(&spring.stiffness.into()),
+            second: Matrix2::zeros(),
+            expansion: None,
+            rest: 0.0,
+        });
+    }
+    if !undamped && spring.damping.iter().any(|&c| c != 0.0) {
+        dampers.push(Damper { a: a.body, b: b.body, frame, coefficients: spring.damping.into() });
+    }
+}

@@ -1,0 +1,42 @@
+//! Model order: how many segments a beam gets.
+//!
+//! A chain of E4 segments of length h follows a wave of number k with the relative frequency error (kh)⁴/1440. With the
+//! bending wave number at the edge of the band, k = (ρA·ω²/EI)^¼, the error stays below `tol` for
+//! N = ⌈kL/(1440·tol)^¼⌉ segments. A beam longer than about a wavelength over two (kL > 3) gets at least two, so that its
+//! first clamped mode has a body to move.
+//!
+//! Without a band only the shape decides: a slender beam gets enough segments for large static deflections.
+
+use super::DiscretizeError;
+use crate::structure::Beam;
+
+/// Length over width above which a beam counts as slender.
+const SLENDER: f64 = 8.0;
+/// Segments of a slender beam when no band is given.
+const STATIC_SEGMENTS: usize = 2;
+
+/// Number of segments of a beam.
+///
+/// # Errors
+/// [`DiscretizeError::NotPositive`] for a beam without length, section or stiffness.
+pub fn segments(beam: &Beam, band: Option<f64>, tol: f64) -> Result<usize, DiscretizeError> {
+    for (quantity, value) in [
+        ("length", beam.length),
+        ("width", beam.width),
+        ("thickness", beam.thickness),
+        ("Young's modulus", beam.material.youngs_modulus),
+    ] {
+        if value.is_nan() || value <= 0.0 {
+            return Err(DiscretizeError::NotPositive { element: beam.name.clone(), quantity, value });
+        }
+    }
+    let Some(band) = band else {
+        return Ok(if beam.length / beam.width > SLENDER { STATIC_SEGMENTS } else { 1 });
+    };
+    let omega = 2.0 * std::f64::consts::PI * band;
+    // ρA/EI = 12ρ/(E·w²)
+    let inverse = 12.0 * beam.material.density / (beam.material.youngs_modulus * beam.width * beam.width);
+    let kl = (inverse * omega * omega).powf(0.25) * beam.length;
+    let count = (kl / (1440.0 * tol).powf(0.25)).ceil().max(1.0) as usize;
+    Ok(if kl > 3.0 { count.max(2) } else { count })
+}

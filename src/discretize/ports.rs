@@ -1,0 +1,84 @@
+//! Resistors, heated beams, sources and ports → potentials, port conductances and quadratic forms of temperature.
+//!
+//! Sources are numbered ports first, then the netlist's voltage sources, then one for each gap with a fixed voltage (which
+//! touches no node).
+
+use super::DiscretizeError;
+use super::rigid::Assembly;
+use crate::gaps::drive::Electrics;
+use crate::gaps::network::Circuit;
+use crate::gaps::thermal::{Heater, Heating};
+use crate::structure::{GapVoltage, Structure};
+use nalgebra::{DMatrix, RowDVector};
+
+/// Builds the electrical side; `heated` lists the beams that are heaters, in heater order.
+///
+/// # Errors
+/// [`DiscretizeError::SourceLoop`], [`DiscretizeError::NoHeatSink`].
+pub fn lay(structure: &Structure, heated: &[usize], rigid: &Assembly) -> Result<Electrics, DiscretizeError> {
+    let ports = structure.ports.len();
+    let mut names: Vec<String> = structure.ports.iter().map(|p| p.name.clone()).collect();
+    names.extend(structure.voltage_sources.iter().map(|s| s.name.clone()));
+    let mut fixed: Vec<f64> = structure.voltage_sources.iter().map(|s| s.voltage).collect();
+
+    let mut heaters = Vec::with_capacity(heated.len());
+    for &index in heated {
+        let beam = &structure.beams[index];
+        if let Some(h) = &beam.heater {
+            heaters.push(Heater {
+                a: beam.a.0,
+                b: beam.b.0,
+                resistance: h.resistance,
+                conductance: h.conductance,
+                expansion: beam.material.thermal_expansion,
+                ambient: beam.material.ambient_temperature,
+                time_constant: h.time_constant,
+            });
+        }
+    }
+    let circuit = Circuit {
+        nodes: structure.nodes.len(),
+        resistors: (structure.resistors.iter().map(|r| (r.a.0, r.b.0, r.resistance)))
+            .chain(heaters.iter().map(|h| (h.a, h.b, h.resistance)))
+            .collect(),
+        sources: (structure.ports.iter().map(|p| (p.plus.0, p.minus.map(|n| n.0))))
+            .chain(structure.voltage_sources.iter().map(|s| (s.plus.0, Some(s.minus.0))))
+            .collect(),
+        grounds: structure.electrical_grounds.iter().map(|n| n.0).collect(),
+    };
+    let potentials = circuit
+        .solve()
+        .map_err(|e| DiscretizeError::SourceLoop { source_name: names[e.source_index].clone() })?;
+    let driven = potentials.potential.ncols();
+
+    let voltages = (structure.combs.iter().map(|c| (&c.name, &c.voltage)))
+        .chain(structure.plate_gaps.iter().map(|g| (&g.name, &g.voltage)))
+        .chain(structure.beam_gaps.iter().map(|g| (&g.name, &g.voltage)));
+    let mut rows: Vec<Result<Vec<f64>, usize>> = Vec::new();
+    for (name, voltage) in voltages {
+        rows.push(match voltage {
+            GapVoltage::Nodes(a, b) => Ok(potentials.difference(a.0, b.0).iter().copied().collect()),
+            GapVoltage::Fixed(v) => {
+                fixed.push(*v);
+                names.push(name.clone());
+                Err(ports + fixed.len() - 1)
+            }
+        });
+    }
+    let sources = ports + fixed.len();
+    let mut gap_rows = DMatrix::zeros(rows.len(), sources);
+    for (g, row) in rows.into_iter().enumerate() {
+        match row {
+            Ok(row) => gap_rows.view_mut((g, 0), (1, driven)).copy_from(&RowDVector::from_vec(row)),
+            Err(own) => gap_rows[(g, own)] = 1.0,
+        }
+    }
+    let sink: Vec<bool> = (0..structure.nodes.len())
+        .map(|n| structure.nodes[n].mechanical && rigid.grounded(n))
+        .collect();
+    let heating = Heating::new(heaters, &potentials, sources, &sink)
+        .map_err(|e| DiscretizeError::NoHeatSink { beam: structure.beams[heated[e.heater]].name.clone() })?;
+    let mut conductance = DMatrix::zeros(ports, sources);
+    conductance.view_mut((0, 0), (ports, driven)).copy_from(&potentials.conductance.rows(0, ports));
+    Ok(Electrics { ports, fixed, names, gap_rows, conductance, heating })
+}

@@ -1,0 +1,284 @@
+//! Nodes → rigid bodies. Links join nodes to one body; anchors make it ground; other supports hold directions.
+//!
+//! Until [`Assembly::finish_bodies`] every point is given from its group's reference point (the position of the group's
+//! first node); after it, from the centre of mass, in which the mass matrix is diagonal and constant.
+
+use crate::gaps::Point;
+use crate::multibody::planar::JointFrame;
+use crate::multibody::{Body, BodyId, Joint};
+use crate::structure::{Mass, Structure};
+use nalgebra::{Matrix2, Matrix3, Vector2};
+
+/// Mass, first and second moment of something, and the same for its drag.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Lump {
+    /// Mass [kg] or drag [N·s/m].
+    pub amount: f64,
+    /// First moment about the reference point [kg·m].
+    pub first: Vector2<f64>,
+    /// Second moment about the reference point [kg·m²].
+    pub second: f64,
+}
+
+impl Lump {
+    /// Adds a lump whose own reference point lies at `shift` from this one's.
+    pub fn add(&mut self, other: &Self, shift: Vector2<f64>, factor: f64) {
+        self.amount += factor * other.amount;
+        self.first += (other.first + shift * other.amount) * factor;
+        self.second +=
+            factor * (other.second + 2.0 * other.first.dot(&shift) + other.amount * shift.norm_squared());
+    }
+
+    fn center(&self) -> Vector2<f64> {
+        if self.amount > 0.0 { self.first / self.amount } else { Vector2::zeros() }
+    }
+}
+
+/// A body in the making.
+#[derive(Debug, Clone)]
+pub struct Rough {
+    name: String,
+    reference: Vector2<f64>,
+    mass: Lump,
+    drag: Lump,
+    held: Vec<Vector2<f64>>,
+    fixed_angle: bool,
+}
+
+/// Groups of nodes and the bodies they become.
+#[derive(Debug, Clone)]
+pub struct Assembly {
+    /// Bodies so far: node groups, then beam segments.
+    pub bodies: Vec<Rough>,
+    group: Vec<BodyId>,
+    position: Vec<Vector2<f64>>,
+}
+
+impl Assembly {
+    /// Groups the nodes of a drawing.
+    pub fn new(structure: &Structure) -> Self {
+        let count = structure.nodes.len();
+        let mut leader: Vec<usize> = (0..count).collect();
+        for link in &structure.links {
+            let (a, b) = (root(&mut leader, link.a.0), root(&mut leader, link.b.0));
+            leader[a.max(b)] = a.min(b);
+        }
+        let mut anchored = vec![false; count];
+        for support in &structure.supports {
+            if support.held == [true; 3] {
+                anchored[root(&mut leader, support.node.0)] = true;
+            }
+        }
+        let position: Vec<_> =
+            structure.nodes.iter().map(|n| Vector2::new(n.position[0], n.position[1])).collect();
+        let mut bodies = Vec::new();
+        let mut group = vec![BodyId::Ground; count];
+        for node in 0..count {
+            if !structure.nodes[node].mechanical {
+                continue;
+            }
+            let first = root(&mut leader, node);
+            if anchored[first] {
+                continue;
+            }
+            group[node] = if first == node || group[first] == BodyId::Ground {
+                bodies.push(Rough::new(structure.nodes[node].name.clone(), position[node]));
+                BodyId::Free(bodies.len() - 1)
+            } else {
+                group[first]
+            };
+            group[first] = group[node];
+        }
+        let mut assembly = Self { bodies, group, position };
+        for support in &structure.supports {
+            if let BodyId::Free(k) = assembly.group[support.node.0] {
+                assembly.bodies[k].hold(support.held, support.angle);
+            }
+        }
+        assembly
+    }
+
+    /// The material point of a node.
+    pub fn point(&self, node: usize) -> Point {
+        match self.group[node] {
+            BodyId::Ground => Point { body: BodyId::Ground, arm: Vector2::zeros() },
+            BodyId::Free(k) => {
+                Point { body: self.group[node], arm: self.position[node] - self.bodies[k].reference }
+            }
+        }
+    }
+
+    /// True when the node is part of the ground.
+    pub fn grounded(&self, node: usize) -> bool {
+        self.group[node] == BodyId::Ground
+    }
+
+    /// Drawn position of a point [m].
+    pub fn position(&self, node: usize) -> Vector2<f64> {
+        self.position[node]
+    }
+
+    /// A new body for an inner node of a beam.
+    pub fn add_segment(&mut self, name: String, position: Vector2<f64>) -> Point {
+        self.bodies.push(Rough::new(name, position));
+        Point { body: BodyId::Free(self.bodies.len() - 1), arm: Vector2::zeros() }
+    }
+
+    /// Adds a mass and its drag to the body of a point; `lump` is about that point.
+    pub fn add_mass(&mut self, point: Point, lump: &Lump, drag_per_mass: f64) {
+        if let BodyId::Free(k) = point.body {
+            self.bodies[k].mass.add(lump, point.arm, 1.0);
+            self.bodies[k].drag.add(lump, point.arm, drag_per_mass);
+        }
+    }
+
+    /// Adds a plate or lumped mass.
+    pub fn add_plate(&mut self, plate: &Mass, undamped: bool) {
+        let point = self.point(plate.node.0);
+        if let BodyId::Free(k) = point.body {
+            let lump = Lump { amount: plate.mass, first: Vector2::zeros(), second: plate.inertia };
+            let drag = Lump { amount: plate.drag[0], first: Vector2::zeros(), second: plate.drag[1] };
+            self.bodies[k].mass.add(&lump, point.arm, 1.0);
+            if !undamped {
+                self.bodies[k].drag.add(&drag, point.arm, 1.0);
+            }
+        }
+    }
+
+    /// The frame of a joint half way between two points (of nodes: ground points carry no position, so they coincide
+    /// with the other side).
+    pub fn frame(&self, a: Point, b: Point, angle: f64) -> JointFrame {
+        let at = |p: Point| match p.body {
+            BodyId::Ground => None,
+            BodyId::Free(k) => Some(self.bodies[k].reference + p.arm),
+        };
+        let middle = match (at(a), at(b)) {
+            (Some(a), Some(b)) => (a + b) * 0.5,
+            (Some(p), None) | (None, Some(p)) => p,
+            (None, None) => Vector2::zeros(),
+        };
+        self.frame_at(a, b, middle, angle)
+    }
+
+    /// The frame of a joint at a drawn position.
+    pub fn frame_at(&self, a: Point, b: Point, position: Vector2<f64>, angle: f64) -> JointFrame {
+        let arm = |p: Point| match p.body {
+            BodyId::Ground => Vector2::zeros(),
+            BodyId::Free(k) => position - self.bodies[k].reference,
+        };
+        JointFrame { arm_a: arm(a), arm_b: arm(b), axis: Vector2::new(angle.cos(), angle.sin()) }
+    }
+
+    /// Supports that hold a translation but let the body turn: a joint to ground ten thousand times stiffer than the
+    /// stiffest beam. (Held directions of the centre of mass would be wrong: the node moves when the body turns.)
+    pub fn hold_hinges(&self, structure: &Structure, stiffest: f64, joints: &mut Vec<Joint>) {
+        let stiffness = if stiffest > 0.0 { 1e4 * stiffest } else { 1e10 };
+        for support in &structure.supports {
+            let point = self.point(support.node.0);
+            let BodyId::Free(k) = point.body else { continue };
+            if self.bodies[k].fixed_angle || !(support.held[0] || support.held[1]) {
+                continue;
+            }
+            let at = |held: bool| if held { stiffness } else { 0.0 };
+            joints.push(Joint {
+                a: BodyId::Ground,
+                b: point.body,
+                frame: self.frame_at(
+                    Point { body: BodyId::Ground, arm: Vector2::zeros() },
+                    point,
+                    self.position[support.node.0],
+                    support.angle,
+                ),
+                stiffness: Matrix3::from_diagonal(&[at(support.held[0]), at(support.held[1]), 0.0].into()),
+                second: Matrix2::zeros(),
+                expansion: None,
+                rest: 0.0,
+            });
+        }
+    }
+
+    /// The finished bodies, about their centres of mass.
+    pub fn finish_bodies(&self) -> Vec<Body> {
+        self.bodies.iter().map(Rough::finish).collect()
+    }
+
+    /// Moves a frame's arms from reference points to centres of mass.
+    pub fn center(&self, a: BodyId, b: BodyId, frame: &mut JointFrame) {
+        for (id, arm) in [(a, &mut frame.arm_a), (b, &mut frame.arm_b)] {
+            if let BodyId::Free(k) = id {
+                *arm -= self.bodies[k].mass.center();
+            }
+        }
+    }
+
+    /// A point about its body's centre of mass, the body renumbered by `place`.
+    pub fn centered(&self, point: Point, place: &[usize]) -> Point {
+        match point.body {
+            BodyId::Ground => point,
+            BodyId::Free(k) => {
+                Point { body: BodyId::Free(place[k]), arm: point.arm - self.bodies[k].mass.center() }
+            }
+        }
+    }
+}
+
+impl Rough {
+    fn new(name: String, reference: Vector2<f64>) -> Self {
+        let (mass, drag) = (Lump::default(), Lump::default());
+        Self { name, reference, mass, drag, held: Vec::new(), fixed_angle: false }
+    }
+
+    fn hold(&mut self, held: [bool; 3], angle: f64) {
+        let (s, c) = angle.sin_cos();
+        if held[0] {
+            self.held.push(Vector2::new(c, s));
+        }
+        if held[1] {
+            self.held.push(Vector2::new(-s, c));
+        }
+        self.fixed_angle |= held[2];
+    }
+
+    fn finish(&self) -> Body {
+        let center = self.mass.center();
+        let mut drag = Lump::default();
+        drag.add(&self.drag, -center, 1.0);
+        let (c, s) = (drag.amount, drag.first);
+        Body {
+            name: self.name.clone(),
+            center: self.reference + center,
+            mass: self.mass.amount,
+            inertia: (self.mass.second - self.mass.amount * center.norm_squared()).max(0.0),
+            drag: Matrix3::new(c, 0.0, -s.y, 0.0, c, s.x, -s.y, s.x, drag.second),
+            free: self.projector(),
+        }
+    }
+
+    /// Projector onto the free directions; none when nothing is held rigidly.
+    fn projector(&self) -> Option<Matrix3<f64>> {
+        if !self.fixed_angle {
+            return None;
+        }
+        let mut p = Matrix3::from_diagonal(&[1.0, 1.0, 0.0].into());
+        let mut basis: Vec<Vector2<f64>> = Vec::new();
+        for &n in &self.held {
+            let rest = basis.iter().fold(n, |v, b| v - b * b.dot(&n));
+            if rest.norm() > 1e-9 {
+                basis.push(rest.normalize());
+            }
+        }
+        for n in basis {
+            let v = nalgebra::Vector3::new(n.x, n.y, 0.0);
+            p -= v * v.transpose();
+        }
+        Some(p)
+    }
+}
+
+fn root(leader: &mut [usize], mut node: usize) -> usize {
+    while leader[node] != node {
+        leader[node] = leader[leader[node]];
+        node = leader[node];
+    }
+    node
+}

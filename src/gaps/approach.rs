@@ -1,0 +1,83 @@
+//! The scalar that a gap measures: how far a point of one body has come along a fixed direction towards another's.
+
+use crate::multibody::planar::{self, Pose};
+use crate::multibody::{BodyId, Model};
+use nalgebra::{Matrix6, Vector2, Vector6};
+
+/// A material point of a body.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Point {
+    /// The body.
+    pub body: BodyId,
+    /// From its centre of mass to the point, as drawn [m].
+    pub arm: Vector2<f64>,
+}
+
+impl Point {
+    /// Displacement of the point [m].
+    #[inline]
+    pub fn displacement(&self, q: &[Pose], linear: bool) -> Vector2<f64> {
+        planar::point(&Model::pose(q, self.body), self.arm, linear)
+    }
+
+    /// Rotation of its body [rad].
+    #[inline]
+    pub fn rotation(&self, q: &[Pose]) -> f64 {
+        Model::pose(q, self.body).z
+    }
+}
+
+/// u(q) = (displacement of `a` − displacement of `b`) · axis, zero as drawn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Approach {
+    /// Moving point.
+    pub a: Point,
+    /// Point it approaches.
+    pub b: Point,
+    /// Fixed unit vector.
+    pub axis: Vector2<f64>,
+}
+
+/// An approach with its derivatives over the pair's six coordinates.
+#[derive(Debug, Clone, Copy)]
+pub struct Measured {
+    /// u [m].
+    pub value: f64,
+    /// ∂u/∂(q_a, q_b).
+    pub gradient: Vector6<f64>,
+    /// ∂²u/∂θ_a², ∂²u/∂θ_b² [m]; every other second derivative is zero.
+    pub bend: [f64; 2],
+}
+
+impl Approach {
+    /// u at a configuration [m].
+    #[inline]
+    pub fn value(&self, q: &[Pose], linear: bool) -> f64 {
+        (self.a.displacement(q, linear) - self.b.displacement(q, linear)).dot(&self.axis)
+    }
+
+    /// u with its derivatives.
+    #[inline]
+    pub fn measure(&self, q: &[Pose], linear: bool) -> Measured {
+        let (pa, pb) = (Model::pose(q, self.a.body), Model::pose(q, self.b.body));
+        let (ta, sa) = planar::point_turn(&pa, self.a.arm, linear);
+        let (tb, sb) = planar::point_turn(&pb, self.b.arm, linear);
+        let n = self.axis;
+        Measured {
+            value: self.value(q, linear),
+            gradient: Vector6::new(n.x, n.y, n.dot(&ta), -n.x, -n.y, -n.dot(&tb)),
+            bend: [n.dot(&sa), -n.dot(&sb)],
+        }
+    }
+}
+
+impl Measured {
+    /// Hessian of a potential φ(u) over the pair: φ″·∇u∇uᵀ + φ′·∇²u.
+    #[inline]
+    pub fn hessian(&self, first: f64, second: f64) -> Matrix6<f64> {
+        let mut h = self.gradient * self.gradient.transpose() * second;
+        h[(2, 2)] += first * self.bend[0];
+        h[(5, 5)] += first * self.bend[1];
+        h
+    }
+}

@@ -1,0 +1,207 @@
+//! From source voltages to what a mechanism feels: the voltage of each gap and the free strain of each heated beam.
+
+use super::thermal::{Heating, lagged};
+use crate::multibody::forces::RestStrain;
+use nalgebra::DMatrix;
+
+/// What a mechanism feels at one instant, or the change of it.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Drive {
+    /// Voltage of each gap [V].
+    pub volts: Vec<f64>,
+    /// Free strain α·T̄ of each heated beam [1].
+    pub expansion: Vec<f64>,
+    /// Share of the dead loads and built-in strains that acts [1].
+    pub load: f64,
+}
+
+impl Drive {
+    /// The part that sets rest offsets.
+    pub fn rest(&self) -> RestStrain<'_> {
+        RestStrain { expansion: &self.expansion, built_in: self.load }
+    }
+}
+
+/// The electrical side of a system. The source vector u holds the ports first, then the netlist's own sources.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Electrics {
+    /// Number of ports.
+    pub ports: usize,
+    /// Voltages of the netlist's own sources [V].
+    pub fixed: Vec<f64>,
+    /// Names of all sources, ports first.
+    pub names: Vec<String>,
+    /// ∂gap voltage/∂u, gaps × sources.
+    pub gap_rows: DMatrix<f64>,
+    /// ∂port current/∂u, ports × sources [S].
+    pub conductance: DMatrix<f64>,
+    /// Heated beams.
+    pub heating: Heating,
+}
+
+impl Electrics {
+    /// Length of the source vector.
+    pub fn sources(&self) -> usize {
+        self.ports + self.fixed.len()
+    }
+
+    /// A drive of the right size, all zero, loads acting fully.
+    pub fn drive(&self) -> Drive {
+        Drive {
+            volts: vec![0.0; self.gap_rows.nrows()],
+            expansion: vec![0.0; self.heating.heaters.len()],
+            load: 1.0,
+        }
+    }
+
+    /// Fills in the source vector for given port voltages.
+    pub fn fill_sources(&self, ports: &[f64], u: &mut [f64]) {
+        u[..self.ports].copy_from_slice(ports);
+        u[self.ports..].copy_from_slice(&self.fixed);
+    }
+
+    /// The drive at source voltages `u` when every heater is at its steady rise, which goes to `rise` [K].
+    pub fn steady(&self, u: &[f64], rise: &mut [f64], drive: &mut Drive) {
+        for (k, rise) in rise.iter_mut().enumerate() {
+            *rise = self.heating.steady(k, u);
+        }
+        self.apply(u, rise, drive);
+    }
+
+    /// The drive at source voltages `u` and temperature rises `rise` [K].
+    pub fn apply(&self, u: &[f64], rise: &[f64], drive: &mut Drive) {
+        self.gap_volts(u, &mut drive.volts);
+        for (k, heater) in self.heating.heaters.iter().enumerate() {
+            drive.expansion[k] = heater.expansion * rise[k];
+        }
+    }
+
+    /// The change of the steady drive with source `s`, at source voltages `u`.
+    pub fn steady_slope(&self, u: &[f64], unit: &[f64], slope: &mut Drive) {
+        self.gap_volts(unit, &mut slope.volts);
+        for (k, heater) in self.heating.heaters.iter().enumerate() {
+            slope.expansion[k] = heater.expansion * 2.0 * self.heating.mixed(k, u, unit);
+        }
+        slope.load = 0.0;
+    }
+
+    #[inline]
+    fn gap_volts(&self, u: &[f64], volts: &mut [f64]) {
+        for (g, v) in volts.iter_mut().enumerate() {
+            *v = (0..u.len()).map(|s| self.gap_rows[(g, s)] * u[s]).sum();
+        }
+    }
+}
+
+/// Source voltages that go linearly from one value to another during a step, with the rises that follow them.
+#[derive(Debug, Clone, Copy)]
+pub struct Ramp<'a> {
+    /// The electrical side.
+    pub electrics: &'a Electrics,
+    /// Source voltages at the start [V].
+    pub from: &'a [f64],
+    /// Source voltages at the end [V].
+    pub to: &'a [f64],
+    /// Rise of each heater at the start [K].
+    pub rise: &'a [f64],
+    /// Length of the step [s].
+    pub dt: f64,
+}
+
+impl Ramp<'_> {
+    /// Coefficients of the steady rise of heater `k` in the time since the start.
+    fn parabola(&self, k: usize) -> [f64; 3] {
+        let h = &self.electrics.heating;
+        let (a, b, c) = (h.mixed(k, self.from, self.from), h.mixed(k, self.from, self.to), h.mixed(k, self.to, self.to));
+        [a, 2.0 * (b - a) / self.dt, (a - 2.0 * b + c) / (self.dt * self.dt)]
+    }
+
+    /// Rise of heater `k` at time `s` after the start [K].
+    pub fn rise_at(&self, k: usize, s: f64) -> f64 {
+        let p = self.parabola(k);
+        let tau = self.electrics.heating.heaters[k].time_constant;
+        if tau > 0.0 { lagged(self.rise[k], tau, s, p) } else { p[0] + s * (p[1] + s * p[2]) }
+    }
+
+    /// The drive at time `s` after the start.
+    pub fn at(&self, s: f64, drive: &mut Drive) {
+        let x = s / self.dt;
+        for (g, v) in drive.volts.iter_mut().enumerate() {
+            *v = self.gap(g, |i| self.from[i] + x * (self.to[i] - self.from[i]));
+        }
+        for k in 0..drive.expansion.len() {
+            drive.expansion[k] = self.electrics.heating.heaters[k].expansion * self.rise_at(k, s);
+        }
+    }
+
+    /// The drive's rate of change in time at `s` [1/s].
+    pub fn rate(&self, s: f64, rate: &mut Drive) {
+        for (g, v) in rate.volts.iter_mut().enumerate() {
+            *v = self.gap(g, |i| (self.to[i] - self.from[i]) / self.dt);
+        }
+        for k in 0..rate.expansion.len() {
+            let heater = &self.electrics.heating.heaters[k];
+            let p = self.parabola(k);
+            let slope = if heater.time_constant > 0.0 {
+                (p[0] + s * (p[1] + s * p[2]) - self.rise_at(k, s)) / heater.time_constant
+            } else {
+                p[1] + 2.0 * s * p[2]
+            };
+            rate.expansion[k] = heater.expansion * slope;
+        }
+        rate.load = 0.0;
+    }
+
+    /// The change of the drive at time `s` with the final voltage of source `port`.
+    pub fn sensitivity(&self, s: f64, port: usize, out: &mut Drive) {
+        let x = s / self.dt;
+        for (g, v) in out.volts.iter_mut().enumerate() {
+            *v = self.electrics.gap_rows[(g, port)] * x;
+        }
+        for k in 0..out.expansion.len() {
+            let heater = &self.electrics.heating.heaters[k];
+            let [p1, p2] = self.parabola_change(k, port);
+            let rise = if heater.time_constant > 0.0 {
+                lagged(0.0, heater.time_constant, s, [0.0, p1, p2])
+            } else {
+                s * (p1 + s * p2)
+            };
+            out.expansion[k] = heater.expansion * rise;
+        }
+        out.load = 0.0;
+    }
+
+    /// The change of [`Ramp::rate`] at time `s` with the final voltage of source `port`.
+    pub fn rate_sensitivity(&self, s: f64, port: usize, out: &mut Drive) {
+        for (g, v) in out.volts.iter_mut().enumerate() {
+            *v = self.electrics.gap_rows[(g, port)] / self.dt;
+        }
+        for k in 0..out.expansion.len() {
+            let heater = &self.electrics.heating.heaters[k];
+            let [p1, p2] = self.parabola_change(k, port);
+            let slope = if heater.time_constant > 0.0 {
+                let rise = lagged(0.0, heater.time_constant, s, [0.0, p1, p2]);
+                (s * (p1 + s * p2) - rise) / heater.time_constant
+            } else {
+                p1 + 2.0 * s * p2
+            };
+            out.expansion[k] = heater.expansion * slope;
+        }
+        out.load = 0.0;
+    }
+
+    /// Change of the parabola's second and third coefficient with the final voltage of source `port`; the first has none.
+    fn parabola_change(&self, k: usize, port: usize) -> [f64; 2] {
+        let (b, c) = (self.row(k, port, self.from), self.row(k, port, self.to));
+        [2.0 * b / self.dt, 2.0 * (c - b) / (self.dt * self.dt)]
+    }
+
+    /// (Q·u)_port of heater `k`.
+    fn row(&self, k: usize, port: usize, u: &[f64]) -> f64 {
+        (0..u.len()).map(|j| self.electrics.heating.entry(k, port, j) * u[j]).sum()
+    }
+
+    fn gap(&self, g: usize, u: impl Fn(usize) -> f64) -> f64 {
+        (0..self.from.len()).map(|i| self.electrics.gap_rows[(g, i)] * u(i)).sum()
+    }
+}

@@ -1,0 +1,31 @@
+//! Gap functions: what heat and voltage do to a mechanism.
+//!
+//! Two kinds (Popa et al., "Computationally efficient dynamic modeling of MEMS", Q4): a *rest offset* of a joint (thermal
+//! expansion ∝ V², residual stress) and a *force law* between two bodies (comb, plates, contact). Force laws come from a
+//! potential, so that forces, stiffness, charges and the small-signal response of one element always agree:
+//! ```text
+//! Π(q, V) = U(q) − ½ Σ C_k(q) V_k² + Σ contact(q),     r = ∂Π/∂q,     Q_k = C_k V_k
+//! ```
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | [`approach`] | the scalar a gap measures between two material points, and its derivatives |
+//! | [`capacitor`] | C(u) of a comb and of parallel plates |
+//! | [`contact`] | SUGAR's repulsion of nearly closed gaps |
+//! | [`facing`] | two facing beams: pressure along a gap that varies over their length |
+//! | [`network`] | potentials of a resistive network driven by ports and sources |
+//! | [`thermal`] | mean temperature rise of beams that carry current; its lag in time |
+//! | [`drive`] | ports → gap voltages and free strains, at a time within a step |
+//! | [`system`] | a multibody model with its gaps, loads and network: what `solve` works on |
+
+pub mod approach;
+pub mod capacitor;
+pub mod contact;
+pub mod drive;
+pub mod facing;
+pub mod network;
+pub mod system;
+pub mod thermal;
+
+pub use drive::{Drive, Ramp};
+pub use system::{Gap, Load, Point, System};

@@ -1,0 +1,285 @@
+//! Symmetric block factorization L·D·Lᵀ, leaf to root, and the solves with it.
+//!
+//! Generic over the scalar (f64; complex for small-signal work) and over the block size (planar bodies 3, spatial 6).
+//! The matrix is symmetric, not Hermitian, for complex scalars too. Each body costs one block inverse, one product per
+//! row of its column and one per pair of rows: a fixed amount for a tree. Nothing is allocated after [`BlockMatrix::new`].
+//!
+//! A block is inverted by its own L·D·Lᵀ without exchanges, so the whole is an unpivoted symmetric elimination: backward
+//! stable for the definite matrices of implicit steps and stable equilibria, and invariant to the units of each direction.
+//! The signs of the scalar pivots give the inertia (Sylvester), which tells a stable equilibrium from an unstable one and
+//! counts the modes below a shift.
+//!
+//! Reference: K. S. Anderson, J. H. Critchley, "Improved 'order-N' performance algorithm for the simulation of constrained
+//! multi-rigid-body dynamic systems", Multibody System Dynamics 9 (2003): the recursion that this elimination is, in
+//! absolute coordinates; G. H. Golub, C. F. Van Loan, "Matrix Computations" (2013), §4.1 for L·D·Lᵀ.
+
+use super::Pattern;
+use nalgebra::{ComplexField, SMatrix, SVector};
+
+/// What a block entry can be.
+pub trait Scalar: ComplexField<RealField = f64> + Copy {}
+impl Scalar for f64 {}
+impl Scalar for nalgebra::Complex<f64> {}
+
+/// A symmetric matrix of N×N blocks on a [`Pattern`]; after [`BlockMatrix::factor`], its factors in the same storage.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BlockMatrix<T: Scalar, const N: usize> {
+    /// Diagonal blocks in elimination order; after factoring, their inverses.
+    pub diagonal: Vec<SMatrix<T, N, N>>,
+    /// Blocks below the diagonal (row body × column body), in the order of the pattern; after factoring, L.
+    pub below: Vec<SMatrix<T, N, N>>,
+    /// Diagonal entries before elimination: the scale against which a pivot has vanished.
+    scale: Vec<SVector<f64, N>>,
+}
+
+/// A pivot smaller than this share of its diagonal entry is taken for zero. Soft MEMS suspensions reach 1e-10.
+const LOST: f64 = 1e-13;
+
+/// Where a factorization met a pivot that is zero or not finite.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ZeroPivot {
+    /// Body in elimination order.
+    pub body: usize,
+    /// Direction within its block.
+    pub direction: usize,
+}
+
+/// Counts of the pivots' signs.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Inertia {
+    /// Negative pivots: the number of negative eigenvalues.
+    pub negative: usize,
+}
+
+impl<T: Scalar, const N: usize> BlockMatrix<T, N> {
+    /// A zero matrix on `pattern`.
+    pub fn new(pattern: &Pattern) -> Self {
+        Self {
+            diagonal: vec![SMatrix::zeros(); pattern.bodies()],
+            below: vec![SMatrix::zeros(); pattern.off_blocks()],
+            scale: vec![SVector::zeros(); pattern.bodies()],
+        }
+    }
+
+    /// Sets every block to zero.
+    pub fn clear(&mut self) {
+        self.diagonal.fill(SMatrix::zeros());
+        self.below.fill(SMatrix::zeros());
+    }
+
+    /// Replaces the matrix by its factors.
+    ///
+    /// # Errors
+    /// [`ZeroPivot`] where a pivot vanishes against the entries it came from, or is not finite.
+    pub fn factor(&mut self, pattern: &Pattern) -> Result<Inertia, ZeroPivot> {
+        let mut inertia = Inertia::default();
+        for (scale, block) in self.scale.iter_mut().zip(&self.diagonal) {
+            *scale = SVector::from_fn(|i, _| block[(i, i)].modulus());
+        }
+        for j in 0..pattern.bodies() {
+            let inverse = invert(&self.diagonal[j], &self.scale[j], &mut inertia)
+                .map_err(|direction| ZeroPivot { body: j, direction })?;
+            self.diagonal[j] = inverse;
+            let column = pattern.column(j);
+            let mut target = pattern.targets(j).iter();
+            for k in column.clone() {
+                let row = pattern.row(k);
+                let coupling = self.below[k];
+                let scaled = coupling * inverse;
+                // rows before k already hold L; their couplings are L·D, so update with L·(A)ᵀ from this side
+                for i in column.start..k {
+                    if let Some(&at) = target.next() {
+                        let update = coupling * self.below[i].transpose();
+                        self.below[at] -= update;
+                    }
+                }
+                self.diagonal[row] -= scaled * coupling.transpose();
+                self.below[k] = scaled;
+            }
+        }
+        Ok(inertia)
+    }
+
+    /// Solves in place with the factors: `b` becomes A⁻¹·b. Body vectors in elimination order.
+    pub fn solve(&self, pattern: &Pattern, b: &mut [SVector<T, N>]) {
+        for j in 0..pattern.bodies() {
+            let pivot = b[j];
+            for k in pattern.column(j) {
+                b[pattern.row(k)] -= self.below[k] * pivot;
+            }
+            b[j] = self.diagonal[j] * pivot;
+        }
+        for j in (0..pattern.bodies()).rev() {
+            let mut sum = b[j];
+            for k in pattern.column(j) {
+                sum -= self.below[k].tr_mul(&b[pattern.row(k)]);
+            }
+            b[j] = sum;
+        }
+    }
+
+    /// `y += A·x` with the unfactored matrix.
+    pub fn multiply_add(&self, pattern: &Pattern, x: &[SVector<T, N>], y: &mut [SVector<T, N>]) {
+        for j in 0..pattern.bodies() {
+            let mut sum = self.diagonal[j] * x[j];
+            for k in pattern.column(j) {
+                let row = pattern.row(k);
+                sum += self.below[k].tr_mul(&x[row]);
+                y[row] += self.below[k] * x[j];
+            }
+            y[j] += sum;
+        }
+    }
+}
+
+/// Inverse of a symmetric block by L·D·Lᵀ; adds the pivots' signs to `inertia`.
+///
+/// Only the lower triangle is read. The error is the direction whose pivot vanished.
+fn invert<T: Scalar, const N: usize>(
+    a: &SMatrix<T, N, N>,
+    scale: &SVector<f64, N>,
+    inertia: &mut Inertia,
+) -> Result<SMatrix<T, N, N>, usize> {
+    let mut l = SMatrix::<T, N, N>::identity();
+    let mut pivot = SVector::<T, N>::zeros();
+    for j in 0..N {
+        let mut d = a[(j, j)];
+        for k in 0..j {
+            d -= l[(j, k)] * l[(j, k)] * pivot[k];
+        }
+        if d.modulus() <= LOST * scale[j] || !d.is_finite() {
+            return Err(j);
+        }
+        if d.real() < 0.0 {
+            inertia.negative += 1;
+        }
+        pivot[j] = d;
+        for i in j + 1..N {
+            let mut s = a[(i, j)];
+            for k in 0..j {
+                s -= l[(i, k)] * l[(j, k)] * pivot[k];
+            }
+            l[(i, j)] = s / d;
+        }
+    }
+    // L⁻¹ by forward substitution, then (L⁻¹)ᵀ D⁻¹ L⁻¹
+    let mut li = SMatrix::<T, N, N>::identity();
+    for j in 0..N {
+        for i in j + 1..N {
+            let mut s = T::zero();
+            for k in j..i {
+                s -= l[(i, k)] * li[(k, j)];
+            }
+            li[(i, j)] = s;
+        }
+    }
+    let mut inverse = SMatrix::<T, N, N>::zeros();
+    for i in 0..N {
+        for j in 0..=i {
+            let mut s = T::zero();
+            for k in i..N {
+                s += li[(k, i)] * li[(k, j)] / pivot[k];
+            }
+            inverse[(i, j)] = s;
+            inverse[(j, i)] = s;
+        }
+    }
+    Ok(inverse)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Complex, DMatrix, DVector};
+
+    const EDGES: [(usize, usize); 9] = [(0, 1), (1, 2), (2, 5), (3, 4), (4, 5), (5, 6), (0, 6), (1, 4), (6, 7)];
+
+    fn entry(seed: &mut u64) -> f64 {
+        *seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (*seed >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+    }
+
+    fn check<T: Scalar, const N: usize>(make: impl Fn(&mut u64) -> T, tolerance: f64) {
+        let pattern = Pattern::new(8, &EDGES);
+        let mut a = BlockMatrix::<T, N>::new(&pattern);
+        let mut seed = 7;
+        for block in &mut a.diagonal {
+            let raw = SMatrix::<T, N, N>::from_fn(|_, _| make(&mut seed));
+            *block = raw + raw.transpose() + SMatrix::identity() * T::from_real(6.0 * N as f64);
+        }
+        for &(p, q) in &EDGES {
+            let k = pattern.block(p.max(q), p.min(q)).unwrap();
+            a.below[k] = SMatrix::from_fn(|_, _| make(&mut seed));
+        }
+        let n = 8 * N;
+        let mut dense = DMatrix::<T>::zeros(n, n);
+        for j in 0..8 {
+            dense.view_mut((j * N, j * N), (N, N)).copy_from(&a.diagonal[j]);
+            for k in pattern.column(j) {
+                let r = pattern.row(k);
+                dense.view_mut((r * N, j * N), (N, N)).copy_from(&a.below[k]);
+                dense.view_mut((j * N, r * N), (N, N)).copy_from(&a.below[k].transpose());
+            }
+        }
+        let b: Vec<SVector<T, N>> = (0..8).map(|_| SVector::from_fn(|_, _| make(&mut seed))).collect();
+        let mut product = vec![SVector::<T, N>::zeros(); 8];
+        a.multiply_add(&pattern, &b, &mut product);
+        let mut x = b.clone();
+        a.factor(&pattern).unwrap();
+        a.solve(&pattern, &mut x);
+        let flat = DVector::from_iterator(n, b.iter().flat_map(|v| v.iter().copied()));
+        let expected = dense.clone().lu().solve(&flat).unwrap();
+        let times = &dense * &flat;
+        for (j, v) in x.iter().enumerate() {
+            for i in 0..N {
+                assert!((v[i] - expected[j * N + i]).modulus() < tolerance * expected.norm());
+                assert!((product[j][i] - times[j * N + i]).modulus() < tolerance * times.norm());
+            }
+        }
+    }
+
+    /// On a graph with coupled loops the factor solves as dense pivoted LU does, for planar and spatial blocks, real and
+    /// complex scalars, to rounding.
+    #[test]
+    fn agrees_with_dense_lu() {
+        check::<f64, 3>(entry, 1e-14);
+        check::<f64, 6>(entry, 1e-14);
+        check::<Complex<f64>, 3>(|s| Complex::new(entry(s), entry(s)), 1e-14);
+    }
+
+    /// The number of negative pivots is the number of negative eigenvalues (Sylvester's law of inertia).
+    #[test]
+    fn inertia_counts_negative_eigenvalues() {
+        let pattern = Pattern::new(8, &EDGES);
+        let mut seed = 3;
+        for shift in [-2.0, -0.5, 0.0, 0.7, 2.5] {
+            let mut a = BlockMatrix::<f64, 3>::new(&pattern);
+            let mut dense = DMatrix::<f64>::zeros(24, 24);
+            for j in 0..8 {
+                let raw = SMatrix::<f64, 3, 3>::from_fn(|_, _| entry(&mut seed));
+                a.diagonal[j] = raw + raw.transpose() - SMatrix::identity() * shift;
+                dense.view_mut((j * 3, j * 3), (3, 3)).copy_from(&a.diagonal[j]);
+            }
+            for &(p, q) in &EDGES {
+                let k = pattern.block(p.max(q), p.min(q)).unwrap();
+                a.below[k] = SMatrix::from_fn(|_, _| entry(&mut seed));
+                let (r, c) = (p.max(q) * 3, p.min(q) * 3);
+                dense.view_mut((r, c), (3, 3)).copy_from(&a.below[k]);
+                dense.view_mut((c, r), (3, 3)).copy_from(&a.below[k].transpose());
+            }
+            let negative = dense.symmetric_eigenvalues().iter().filter(|&&v| v < 0.0).count();
+            assert_eq!(a.factor(&pattern).unwrap().negative, negative);
+        }
+    }
+
+    /// A body without stiffness is found and named, not divided by.
+    #[test]
+    fn a_zero_pivot_names_its_body() {
+        let pattern = Pattern::new(2, &[(0, 1)]);
+        let mut a = BlockMatrix::<f64, 3>::new(&pattern);
+        a.diagonal[0] = SMatrix::identity();
+        a.diagonal[1] = SMatrix::identity();
+        a.below[0] = SMatrix::identity();
+        assert_eq!(a.factor(&pattern), Err(ZeroPivot { body: 1, direction: 0 }));
+    }
+}

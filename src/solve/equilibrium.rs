@@ -1,0 +1,285 @@
+//! Static equilibrium r(q, drive(s)) = 0 along a path of loads, s from 0 to 1.
+//!
+//! Each step predicts along the tangent, then corrects by Newton. It is accepted only when the corrector converges, ends on
+//! a stable equilibrium (no negative pivot), and corrects less than it predicted: a Newton iteration that wandered to
+//! another branch corrects more. Otherwise the step is halved. Where steps vanish the path has a fold: pull-in, release or
+//! snap-through. From there the system falls, as an overdamped motion, to the next stable equilibrium, and the path goes on
+//! from that; the fold's place is reported.
+//!
+//! Reference: E. Riks, "An incremental approach to the solution of snapping and buckling problems", Int. J. Solids
+//! Structures 15 (1979), for folds; Kelley & Keyes, "Convergence analysis of pseudo-transient continuation", SIAM J. Numer.
+//! Anal. 35 (1998), for the fall.
+
+use super::SolveError;
+use super::path::LoadPath;
+use crate::gaps::{Drive, System};
+use crate::multibody::BlockMatrix;
+use crate::multibody::planar::Pose;
+
+/// How an equilibrium is searched. `Default` is the only place where the numbers stand.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EquilibriumOptions {
+    /// Newton stops when a correction is below this share of the displacement, default 1e-10. Smaller: one more iteration.
+    pub tolerance: f64,
+    /// Newton iterations per load step, default 12.
+    pub iterations: usize,
+    /// Smallest load step before a fold is declared, default 1e-7 of the path. Smaller: folds located more sharply.
+    pub smallest_step: f64,
+    /// Steps of a fall after a fold, default 4000.
+    pub fall_steps: usize,
+    /// Stop at the first fold instead of falling, default false.
+    pub stop_at_fold: bool,
+}
+
+impl Default for EquilibriumOptions {
+    fn default() -> Self {
+        Self { tolerance: 1e-10, iterations: 12, smallest_step: 1e-7, fall_steps: 4000, stop_at_fold: false }
+    }
+}
+
+/// What a search along a path found.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Path {
+    /// Newton iterations.
+    pub iterations: usize,
+    /// Share of the path at the first fold; none when there was none.
+    pub fold: Option<f64>,
+    /// Share of the path that was reached: 1 unless it stopped at a fold.
+    pub reached: f64,
+}
+
+/// Solver with its storage. Nothing is allocated after [`Equilibrium::new`].
+#[derive(Debug, Clone)]
+pub struct Equilibrium {
+    /// Options.
+    pub options: EquilibriumOptions,
+    tangent: BlockMatrix<f64, 3>,
+    residual: Vec<Pose>,
+    step: Vec<Pose>,
+    trial: Vec<Pose>,
+    drive: Drive,
+    slope: Drive,
+}
+
+enum Corrected {
+    Stable,
+    No,
+}
+
+impl Equilibrium {
+    /// Storage for a system.
+    pub fn new(system: &System, options: EquilibriumOptions) -> Self {
+        let zeros = vec![Pose::zeros(); system.bodies()];
+        Self {
+            options,
+            tangent: BlockMatrix::new(&system.model.pattern),
+            residual: zeros.clone(),
+            step: zeros.clone(),
+            trial: zeros,
+            drive: system.electrics.drive(),
+            slope: system.electrics.drive(),
+        }
+    }
+
+    /// The factored tangent of the last equilibrium.
+    pub fn factor(&self) -> &BlockMatrix<f64, 3> {
+        &self.tangent
+    }
+
+    /// Follows the path from the equilibrium `q` at s = 0 (or near it) to s = 1; `q` becomes the equilibrium there.
+    ///
+    /// # Errors
+    /// [`SolveError::Singular`] where a body moves freely, [`SolveError::Lost`] where no equilibrium was found.
+    pub fn follow(&mut self, system: &System, path: &dyn LoadPath, q: &mut [Pose]) -> Result<Path, SolveError> {
+        let mut done = Path::default();
+        let mut s = 0.0;
+        let mut ds = 1.0;
+        while s < 1.0 {
+            let step = f64::min(ds, 1.0 - s);
+            let to = if 1.0 - s - step < 1e-12 { 1.0 } else { s + step };
+            self.predict(system, path, s, to - s, q)?;
+            match self.correct(system, path, to, q, &mut done)? {
+                Corrected::Stable => {
+                    q.copy_from_slice(&self.trial);
+                    s = to;
+                    ds = 2.0 * step;
+                }
+                Corrected::No if step > self.options.smallest_step => ds = 0.5 * step,
+                Corrected::No => {
+                    done.fold.get_or_insert(s);
+                    if self.options.stop_at_fold {
+                        done.reached = s;
+                        return Ok(done);
+                    }
+                    // just past the fold, where the branch is gone
+                    let to = f64::min(s + 4.0 * self.options.smallest_step, 1.0);
+                    self.fall(system, path, to, q, &mut done)?;
+                    s = to;
+                    ds = 0.25;
+                }
+            }
+        }
+        done.reached = 1.0;
+        Ok(done)
+    }
+
+    /// Puts the tangent prediction for a step from `s` into `trial` and its increment into `step`.
+    fn predict(
+        &mut self,
+        system: &System,
+        path: &dyn LoadPath,
+        s: f64,
+        ds: f64,
+        q: &[Pose],
+    ) -> Result<(), SolveError> {
+        path.at(s, &mut self.drive);
+        path.slope(s, &mut self.slope);
+        system.tangent(q, &self.drive, &mut self.tangent, &mut self.residual);
+        system.model.project_matrix(&mut self.tangent);
+        self.tangent.factor(&system.model.pattern).map_err(|p| SolveError::singular(system, p))?;
+        system.drive_force(q, &self.drive, &self.slope, &mut self.step);
+        for (step, r) in self.step.iter_mut().zip(&self.residual) {
+            *step = *step * -ds - r;
+        }
+        self.tangent.solve(&system.model.pattern, &mut self.step);
+        for ((trial, q), step) in self.trial.iter_mut().zip(q).zip(&self.step) {
+            *trial = q + step;
+        }
+        Ok(())
+    }
+
+    /// Newton at `s` from the prediction in `trial`.
+    fn correct(
+        &mut self,
+        system: &System,
+        path: &dyn LoadPath,
+        s: f64,
+        q: &[Pose],
+        done: &mut Path,
+    ) -> Result<Corrected, SolveError> {
+        let predicted = size(system, &self.step);
+        path.at(s, &mut self.drive);
+        let mut last = f64::INFINITY;
+        for _ in 0..self.options.iterations {
+            done.iterations += 1;
+            system.tangent(&self.trial, &self.drive, &mut self.tangent, &mut self.residual);
+            system.model.project_matrix(&mut self.tangent);
+            let Ok(inertia) = self.tangent.factor(&system.model.pattern) else { return Ok(Corrected::No) };
+            std::mem::swap(&mut self.step, &mut self.residual);
+            self.tangent.solve(&system.model.pattern, &mut self.step);
+            let correction = size(system, &self.step);
+            if !correction.is_finite() || (correction > last && correction > 1e-3 * system.length_scale) {
+                return Ok(Corrected::No);
+            }
+            last = correction;
+            for (trial, step) in self.trial.iter_mut().zip(&self.step) {
+                *trial -= step;
+            }
+            let reach = size(system, &self.trial).max(1e-6 * system.length_scale);
+            if correction <= self.options.tolerance * reach {
+                if inertia.negative > 0 {
+                    return Ok(Corrected::No);
+                }
+                let moved = distance(system, &self.trial, q);
+                let tame = moved <= 3.0 * predicted + 1e-3 * system.length_scale
+                    && predicted <= 3.0 * moved + 1e-3 * system.length_scale;
+                return Ok(if tame { Corrected::Stable } else { Corrected::No });
+            }
+        }
+        Ok(Corrected::No)
+    }
+
+    /// Lets the system fall at fixed loads, as an overdamped motion, to a stable equilibrium.
+    fn fall(
+        &mut self,
+        system: &System,
+        path: &dyn LoadPath,
+        s: f64,
+        q: &mut [Pose],
+        done: &mut Path,
+    ) -> Result<(), SolveError> {
+        path.at(s, &mut self.drive);
+        // no step longer than a twentieth of the smallest gap
+        let longest = 0.05 * system.length_scale;
+        let mut damping = 0.0;
+        for _ in 0..self.options.fall_steps {
+            done.iterations += 1;
+            system.tangent(q, &self.drive, &mut self.tangent, &mut self.residual);
+            let first_damping = 1e-6 * mean_ratio(system, &self.tangent);
+            loop {
+                if damping > 0.0 {
+                    for (j, block) in self.tangent.diagonal.iter_mut().enumerate() {
+                        let m = fall_mass(system, j);
+                        for i in 0..3 {
+                            block[(i, i)] += damping * m[i];
+                        }
+                    }
+                }
+                system.model.project_matrix(&mut self.tangent);
+                let stable = matches!(self.tangent.factor(&system.model.pattern), Ok(i) if i.negative == 0);
+                if stable {
+                    self.step.copy_from_slice(&self.residual);
+                    self.tangent.solve(&system.model.pattern, &mut self.step);
+                    if size(system, &self.step) <= longest {
+                        break;
+                    }
+                }
+                if damping > 1e12 * first_damping.max(1e-300) {
+                    return Err(self.lost(system, s, done.iterations));
+                }
+                damping = if damping == 0.0 { first_damping } else { 3.0 * damping };
+                system.tangent(q, &self.drive, &mut self.tangent, &mut self.residual);
+            }
+            for (q, step) in q.iter_mut().zip(&self.step) {
+                *q -= step;
+            }
+            let moved = size(system, &self.step);
+            if damping == 0.0 && moved <= self.options.tolerance * size(system, q).max(system.length_scale) {
+                return Ok(());
+            }
+            damping = if damping <= first_damping { 0.0 } else { damping / 9.0 };
+        }
+        Err(self.lost(system, s, done.iterations))
+    }
+
+    fn lost(&self, system: &System, share: f64, iterations: usize) -> SolveError {
+        let worst = (0..self.residual.len()).max_by(|&a, &b| {
+            self.residual[a].amax().total_cmp(&self.residual[b].amax())
+        });
+        let worst = worst.unwrap_or(0);
+        SolveError::Lost {
+            share,
+            iterations,
+            residual: self.residual[worst].amax(),
+            body: system.model.bodies[worst].name.clone(),
+        }
+    }
+}
+
+/// Largest displacement of a body: translation [m], or rotation times the length scale.
+fn size(system: &System, x: &[Pose]) -> f64 {
+    x.iter().map(|p| extent(system, p)).fold(0.0, f64::max)
+}
+
+fn distance(system: &System, a: &[Pose], b: &[Pose]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| extent(system, &(a - b))).fold(0.0, f64::max)
+}
+
+fn extent(system: &System, p: &Pose) -> f64 {
+    // a comparison with NaN must not hide it
+    let e = p.x.abs().max(p.y.abs()).max(p.z.abs() * system.length_scale);
+    if p.iter().all(|v| v.is_finite()) { e } else { f64::INFINITY }
+}
+
+/// Mass-like weights of the overdamped motion; massless bodies get the lightest body's.
+fn fall_mass(system: &System, body: usize) -> Pose {
+    let m = system.model.mass(body);
+    let floor = 1e-18;
+    Pose::new(m.x.max(floor), m.y.max(floor), m.z.max(floor * system.length_scale * system.length_scale))
+}
+
+/// A typical stiffness over mass, to begin damping with.
+fn mean_ratio(system: &System, tangent: &BlockMatrix<f64, 3>) -> f64 {
+    let n = tangent.diagonal.len();
+    (0..n).map(|j| tangent.diagonal[j][(0, 0)].abs() / fall_mass(system, j).x).fold(f64::INFINITY, f64::min)
+}

@@ -1,0 +1,80 @@
+//! Small-signal response at one angular frequency: (K − ω²M + iωC)·x = f.
+//!
+//! The same block factorization over complex numbers; the matrix is symmetric. An undamped structure close to a local
+//! resonance of one of its branches can have a small pivot, so each solution is refined once against its own residual.
+
+use super::SolveError;
+use crate::gaps::System;
+use crate::multibody::BlockMatrix;
+use nalgebra::{Complex, Vector3};
+
+/// Complex displacement of one body.
+pub type ComplexPose = Vector3<Complex<f64>>;
+
+/// Solver with its storage.
+#[derive(Debug, Clone)]
+pub struct Harmonic {
+    matrix: BlockMatrix<Complex<f64>, 3>,
+    factor: BlockMatrix<Complex<f64>, 3>,
+    damping: BlockMatrix<f64, 3>,
+    rest: Vec<ComplexPose>,
+}
+
+impl Harmonic {
+    /// Storage for a system.
+    pub fn new(system: &System) -> Self {
+        let pattern = &system.model.pattern;
+        let matrix = BlockMatrix::new(pattern);
+        let factor = matrix.clone();
+        let mut damping = BlockMatrix::new(pattern);
+        crate::multibody::forces::add_inertia(&system.model, 0.0, 1.0, &mut damping);
+        Self { matrix, factor, damping, rest: vec![ComplexPose::zeros(); system.bodies()] }
+    }
+
+    /// Factors K − ω²M + iωC for a tangent K (held directions not yet projected).
+    ///
+    /// # Errors
+    /// [`SolveError::Singular`] at an undamped resonance.
+    pub fn factor(
+        &mut self,
+        system: &System,
+        stiffness: &BlockMatrix<f64, 3>,
+        omega: f64,
+    ) -> Result<(), SolveError> {
+        let model = &system.model;
+        let blend = |k: &nalgebra::Matrix3<f64>, c: &nalgebra::Matrix3<f64>| k.zip_map(c, |k, c| Complex::new(k, omega * c));
+        for (out, (k, c)) in self.matrix.diagonal.iter_mut().zip(stiffness.diagonal.iter().zip(&self.damping.diagonal)) {
+            *out = blend(k, c);
+        }
+        for (out, (k, c)) in self.matrix.below.iter_mut().zip(stiffness.below.iter().zip(&self.damping.below)) {
+            *out = blend(k, c);
+        }
+        for (j, block) in self.matrix.diagonal.iter_mut().enumerate() {
+            let m = model.mass(j);
+            for i in 0..3 {
+                block[(i, i)] -= Complex::from(omega * omega * m[i]);
+            }
+        }
+        model.project_matrix(&mut self.matrix);
+        self.factor.diagonal.copy_from_slice(&self.matrix.diagonal);
+        self.factor.below.copy_from_slice(&self.matrix.below);
+        self.factor.factor(&model.pattern).map_err(|p| SolveError::singular(system, p))?;
+        Ok(())
+    }
+
+    /// Solves for one force; `x` holds it and becomes the response.
+    pub fn solve(&mut self, system: &System, x: &mut [ComplexPose]) {
+        let pattern = &system.model.pattern;
+        let force = x.to_vec();
+        self.factor.solve(pattern, x);
+        self.rest.fill(ComplexPose::zeros());
+        self.matrix.multiply_add(pattern, x, &mut self.rest);
+        for (r, f) in self.rest.iter_mut().zip(&force) {
+            *r = f - *r;
+        }
+        self.factor.solve(pattern, &mut self.rest);
+        for (x, r) in x.iter_mut().zip(&self.rest) {
+            *x += r;
+        }
+    }
+}
