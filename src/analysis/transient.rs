@@ -131,7 +131,7 @@ pub fn transient(
     let mut stepper = Adaptive::new(system, 0);
     let mut h = first_step(system, options.stop);
     let tol = STEP_SHARE * options.tol;
-    let end = stepper.advance(system, &ramp, &mut motion, &mut [], &mut h, tol, usize::MAX, &mut observe)?;
+    let end = stepper.advance(system, &ramp, &mut motion, &[], &mut [], &mut h, tol, usize::MAX, &mut observe)?;
     if end == Advance::Stopped {
         return Err(AnalysisError::Cancelled);
     }

@@ -11,6 +11,7 @@
 //! knows the steps that were accepted.
 
 pub mod local;
+pub mod states;
 
 use serde::{Deserialize, Serialize};
 use thiserror::Error;

@@ -160,15 +160,16 @@ impl Ramp<'_> {
         }
         for k in 0..out.expansion.len() {
             let heater = &self.electrics.heating.heaters[k];
-            let [p1, p2] = self.parabola_change(k, port);
-            let rise = if heater.time_constant > 0.0 {
-                lagged(0.0, heater.time_constant, s, [0.0, p1, p2])
-            } else {
-                s * (p1 + s * p2)
-            };
-            out.expansion[k] = heater.expansion * rise;
+            out.expansion[k] = heater.expansion * self.rise_sensitivity(k, s, port);
         }
         out.load = 0.0;
+    }
+
+    /// The change of the rise of heater `k` at time `s` with the final voltage of source `port` [K/V].
+    pub fn rise_sensitivity(&self, k: usize, s: f64, port: usize) -> f64 {
+        let tau = self.electrics.heating.heaters[k].time_constant;
+        let [p1, p2] = self.parabola_change(k, port);
+        if tau > 0.0 { lagged(0.0, tau, s, [0.0, p1, p2]) } else { s * (p1 + s * p2) }
     }
 
     /// The change of [`Ramp::rate`] at time `s` with the final voltage of source `port`.
@@ -180,8 +181,7 @@ impl Ramp<'_> {
             let heater = &self.electrics.heating.heaters[k];
             let [p1, p2] = self.parabola_change(k, port);
             let slope = if heater.time_constant > 0.0 {
-                let rise = lagged(0.0, heater.time_constant, s, [0.0, p1, p2]);
-                (s * (p1 + s * p2) - rise) / heater.time_constant
+                (s * (p1 + s * p2) - self.rise_sensitivity(k, s, port)) / heater.time_constant
             } else {
                 p1 + 2.0 * s * p2
             };

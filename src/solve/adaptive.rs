@@ -65,7 +65,7 @@ impl Adaptive {
         }
     }
 
-    /// Advances `motion` from the start of the ramp to its end. `h` holds the first step to try [s] and receives the step
+    /// Advances `motion` from the start of the ramp to its end, and with it the sensitivities to the sources `ports`. `h` holds the first step to try [s] and receives the step
     /// that would come next.
     ///
     /// # Errors
@@ -76,6 +76,7 @@ impl Adaptive {
         system: &System,
         ramp: &Ramp<'_>,
         motion: &mut Motion,
+        ports: &[usize],
         sensitivity: &mut [Motion],
         h: &mut f64,
         tol: f64,
@@ -95,7 +96,7 @@ impl Adaptive {
             for (keep, now) in self.sensitivity_before.iter_mut().zip(sensitivity.iter()) {
                 keep.clone_from(now);
             }
-            let stepped = self.method.step(system, ramp, s, step, motion, &mut self.error, sensitivity);
+            let stepped = self.method.step(system, ramp, s, step, motion, &mut self.error, ports, sensitivity);
             let error = if stepped.is_ok() { self.relative_error(system, motion, step, tol) } else { f64::INFINITY };
             if error <= 1.0 {
                 let last = s + step >= ramp.dt * (1.0 - 1e-14);

@@ -129,8 +129,9 @@ impl Rodas4 {
         }
     }
 
+    #[allow(clippy::too_many_arguments)]
     /// One step of length `h` from `motion` at time `s` of the ramp. The new motion replaces `motion`, and `error` receives
-    /// the embedded estimate. `sensitivity[p]` holds ∂motion/∂(final voltage of port p) and is advanced too.
+    /// the embedded estimate. `sensitivity[p]` holds ∂motion/∂(final voltage of source `ports[p]`) and is advanced too.
     ///
     /// # Errors
     /// [`ZeroPivot`] when W cannot be factored; `motion` is then unchanged.
@@ -142,6 +143,7 @@ impl Rodas4 {
         h: f64,
         motion: &mut Motion,
         error: &mut Motion,
+        ports: &[usize],
         sensitivity: &mut [Motion],
     ) -> Result<(), ZeroPivot> {
         let model = &system.model;
@@ -159,7 +161,7 @@ impl Rodas4 {
         self.factorizations += 1;
         ramp.rate(s, &mut self.rate);
         system.drive_force(&motion.q, &self.drive, &self.rate, &mut self.forcing);
-        self.forcing_sensitivities(system, ramp, s, motion, sensitivity.len());
+        self.forcing_sensitivities(system, ramp, s, motion, ports);
         for i in 0..6 {
             self.at.copy(motion);
             for j in 0..i {
@@ -175,7 +177,7 @@ impl Rodas4 {
             }
             // sensitivities first: they need this stage's tangent, and `force` is consumed below
             for (p, start) in sensitivity.iter().enumerate() {
-                self.sensitivity_stage(system, ramp, s, h, i, p, start);
+                self.sensitivity_stage(system, ramp, s, h, i, (p, ports[p]), start);
             }
             forces::add_damping(model, &self.at.v, &mut self.force);
             let (before, rest) = self.stages.split_at_mut(i);
@@ -195,13 +197,12 @@ impl Rodas4 {
     }
 
     /// ∂(∂r/∂drive·rate)/∂(final voltage) of each port at the start of the step.
-    fn forcing_sensitivities(&mut self, system: &System, ramp: &Ramp<'_>, s: f64, motion: &Motion, ports: usize) {
-        for p in 0..ports {
-            let port = &mut self.ports[p];
-            ramp.rate_sensitivity(s, p, &mut self.change);
+    fn forcing_sensitivities(&mut self, system: &System, ramp: &Ramp<'_>, s: f64, motion: &Motion, sources: &[usize]) {
+        for (port, &source) in self.ports.iter_mut().zip(sources) {
+            ramp.rate_sensitivity(s, source, &mut self.change);
             system.drive_force(&motion.q, &self.drive, &self.change, &mut port.forcing);
             // forces are quadratic in gap voltages: the voltage that rate acts on changes too
-            ramp.sensitivity(s, p, &mut self.change);
+            ramp.sensitivity(s, source, &mut self.change);
             self.change.expansion.fill(0.0);
             system.drive_force(&motion.q, &self.rate, &self.change, &mut self.scratch);
             for (f, x) in port.forcing.iter_mut().zip(&self.scratch) {
@@ -218,7 +219,7 @@ impl Rodas4 {
         s: f64,
         h: f64,
         i: usize,
-        p: usize,
+        (p, source): (usize, usize),
         start: &Motion,
     ) {
         let port = &mut self.ports[p];
@@ -226,7 +227,7 @@ impl Rodas4 {
         for j in 0..i {
             port.at.add(A[i][j], &port.stages[j]);
         }
-        ramp.sensitivity(s + ALPHA[i] * h, p, &mut self.change);
+        ramp.sensitivity(s + ALPHA[i] * h, source, &mut self.change);
         let force = &mut self.scratch;
         system.drive_force(&self.at.q, &self.drive, &self.change, force);
         self.stage_tangent.multiply_add(&system.model.pattern, &port.at.q, force);

@@ -1,0 +1,102 @@
+//! The states behind tokens: immutable, few, found by a hash of the request that made them.
+
+use super::{Mode, Token, Trial};
+use crate::multibody::planar::Pose;
+use serde::{Deserialize, Serialize};
+use std::collections::{HashMap, VecDeque};
+use std::sync::Arc;
+
+/// States held at most; the least recently used goes first. A circuit needs its last accepted state and its trials.
+const MOST: usize = 64;
+
+/// Everything the next step depends on.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Snapshot {
+    /// Displacements.
+    pub q: Vec<Pose>,
+    /// Rates.
+    pub v: Vec<Pose>,
+    /// Rise of each heater [K].
+    pub rise: Vec<f64>,
+    /// Source voltages [V].
+    pub sources: Vec<f64>,
+    /// First internal step of what follows [s].
+    pub next_step: f64,
+}
+
+/// Held states, in order of last use.
+#[derive(Debug, Default)]
+pub struct States {
+    held: HashMap<Token, (Option<Token>, Arc<Snapshot>)>,
+    used: VecDeque<Token>,
+}
+
+impl States {
+    /// The state of a token, if it is still held.
+    pub fn get(&mut self, token: Token) -> Option<Arc<Snapshot>> {
+        let state = self.held.get(&token).map(|(_, s)| Arc::clone(s))?;
+        self.touch(token);
+        Some(state)
+    }
+
+    /// Stores the outcome of a request under the request's token.
+    pub fn insert(&mut self, request: &Trial<'_>, snapshot: Snapshot) -> Token {
+        let token = name(request);
+        self.held.insert(token, (request.parent, Arc::new(snapshot)));
+        self.touch(token);
+        while self.used.len() > MOST {
+            if let Some(old) = self.used.pop_front() {
+                self.held.remove(&old);
+            }
+        }
+        token
+    }
+
+    /// Frees the other trials of the accepted state's parent.
+    pub fn accept(&mut self, token: Token) {
+        let Some(&(parent, _)) = self.held.get(&token) else { return };
+        let rivals: Vec<Token> = (self.used.iter().copied())
+            .filter(|t| *t != token && self.held.get(t).is_some_and(|(p, _)| *p == parent && parent.is_some()))
+            .collect();
+        for rival in rivals {
+            self.held.remove(&rival);
+        }
+        self.used.retain(|t| self.held.contains_key(t));
+    }
+
+    /// Bytes that the states take, about.
+    pub fn bytes(&self) -> usize {
+        let size = |s: &Snapshot| {
+            (s.q.len() + s.v.len()) * size_of::<Pose>() + (s.rise.len() + s.sources.len()) * 8 + size_of::<Snapshot>()
+        };
+        self.held.values().map(|(_, s)| size(s)).sum()
+    }
+
+    fn touch(&mut self, token: Token) {
+        // recent tokens stand at the back, so the search is short
+        if let Some(at) = self.used.iter().rposition(|t| *t == token) {
+            self.used.remove(at);
+        }
+        self.used.push_back(token);
+    }
+}
+
+/// The token of a request: FNV-1a over all that its answer depends on, folded to 53 bits and never 0.
+fn name(request: &Trial<'_>) -> Token {
+    let mut hash = 0xcbf2_9ce4_8422_2325_u64;
+    let mut eat = |word: u64| {
+        for byte in word.to_le_bytes() {
+            hash = (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3);
+        }
+    };
+    eat(request.parent.map_or(0, |t| t.0));
+    eat(match request.mode {
+        Mode::Static => 1,
+        Mode::Transient => request.dt.to_bits(),
+    });
+    for v in request.voltages {
+        eat(v.to_bits());
+    }
+    let folded = (hash >> 53) ^ (hash & ((1 << 53) - 1));
+    Token(folded.max(1))
+}
