@@ -25,11 +25,11 @@ pub(crate) struct ModelArgs {
     include: Vec<PathBuf>,
 
     /// Relative error aimed at; smaller means more unknowns and shorter steps [default: 1e-3]
-    #[arg(long, value_parser = value::number)]
+    #[arg(long, value_parser = value::number, allow_negative_numbers = true)]
     tol: Option<f64>,
 
     /// Highest frequency the model must resolve [Hz]; higher means more unknowns [default: by slenderness]
-    #[arg(long, value_name = "HZ", value_parser = value::number)]
+    #[arg(long, value_name = "HZ", value_parser = value::number, allow_negative_numbers = true)]
     band: Option<f64>,
 
     /// How beams meet; centreline: in points, as in SUGAR

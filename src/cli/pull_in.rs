@@ -26,7 +26,7 @@ pub(crate) struct Pullin {
     source: Option<String>,
 
     /// Highest voltage tried [V]
-    #[arg(long, default_value = "200", value_name = "VOLTS", value_parser = value::number)]
+    #[arg(long, default_value = "200", value_name = "VOLTS", value_parser = value::number, allow_negative_numbers = true)]
     max: f64,
 
     #[command(flatten)]

@@ -50,7 +50,7 @@ pub(crate) struct Sweep {
     source: Option<String>,
 
     /// Pull-in: highest voltage tried [V]
-    #[arg(long, default_value = "200", value_name = "VOLTS", value_parser = value::number)]
+    #[arg(long, default_value = "200", value_name = "VOLTS", value_parser = value::number, allow_negative_numbers = true)]
     max: f64,
 
     /// Run part I of N (I from 0) of the grid
@@ -66,7 +66,7 @@ pub(crate) struct Sweep {
     to: Option<String>,
 
     /// Longest wait for an answer of the server [s]
-    #[arg(long, default_value = "30", value_parser = value::number)]
+    #[arg(long, default_value = "30", value_parser = value::number, allow_negative_numbers = true)]
     deadline: f64,
 
     /// Write the table to a .csv file [default: standard output]

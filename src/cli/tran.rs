@@ -28,7 +28,7 @@ pub(crate) struct Tran {
     model: ModelArgs,
 
     /// End time [s], such as 30u
-    #[arg(long, value_name = "SECONDS", value_parser = value::number)]
+    #[arg(long, value_name = "SECONDS", value_parser = value::number, allow_negative_numbers = true)]
     stop: f64,
 
     /// Number of equally spaced output times, both ends included

@@ -1,0 +1,24 @@
+# Every target does its own set-up on a fresh Debian or Ubuntu with a Rust toolchain, and says what it does.
+.PHONY: help demo test bench clean
+
+help:
+	@echo "make demo    build, run the bank in ngspice here and through a server, compare, draw (out/demo)"
+	@echo "make test    everything that must hold: format, lints, tests, documentation, Python, ngspice decks"
+	@echo "make bench   measure (criterion)"
+	@echo "make clean   remove everything that was built"
+
+demo:
+	@scripts/setup ngspice build
+	@examples/bank/demo
+
+test:
+	@scripts/setup ngspice python
+	@scripts/check
+
+bench:
+	@scripts/setup build
+	cargo bench --workspace
+
+clean:
+	rm -rf target out .venv
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,111 @@
+//! Each analysis prints the JSON that is documented, in SI, against closed forms.
+
+use crate::bench::{Bench, CANTILEVER, PLATE};
+use approx::assert_relative_eq;
+use serde_json::Value;
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
+}
+
+/// `check` counts what is there and fails nowhere.
+#[test]
+fn check() {
+    let bench = Bench::new(&[("c.net", CANTILEVER), ("p.net", PLATE)]);
+    let found = bench.json("check c.net --set F=2u");
+    assert_eq!((&found["nodes"], &found["beams"]), (&2.into(), &1.into()));
+    assert_eq!(number(&found["parameters"]["F"]), 2e-6);
+    assert_eq!(bench.json("check p.net")["ports"], serde_json::json!(["drive"]));
+    assert!(bench.run("check p.net").stdout.contains("no errors, 0 warnings"));
+}
+
+/// The tip of a cantilever moves by F·l³/(3·E·I) and turns by F·l²/(2·E·I); every option is in the document.
+#[test]
+fn static_equilibrium() {
+    let bench = Bench::new(&[("c.net", CANTILEVER)]);
+    let found = bench.json("static c.net --linear --set F=2u --junctions centreline --tol 1e-4");
+    let ei = 165e9 * 2e-6 * 8e-18 / 12.0;
+    assert_relative_eq!(number(&found["nodes"]["b"]["y"]), 2e-6 * 1e-12 / (3.0 * ei), max_relative = 1e-9);
+    assert_relative_eq!(number(&found["nodes"]["b"]["rz"]), 2e-6 * 1e-8 / (2.0 * ei), max_relative = 1e-9);
+    assert_eq!(number(&found["nodes"]["a"]["y"]), 0.0);
+    assert_eq!((&found["junctions"], &found["linear"]), (&"centreline".into(), &true.into()));
+    assert_eq!(number(&found["tol"]), 1e-4);
+    assert!(found["unknowns"].as_u64() > Some(0) && found["iterations"].as_u64() > Some(0));
+
+    let report = bench.run("static c.net --linear");
+    assert!(report.stdout.contains("1.515 µm"), "{}", report.stdout);
+}
+
+/// The clamped-free beam rings at (β₁l)²/2π·√(E·I/(ρ·A·l⁴)), β₁l = 1.8751041 (Blevins, table 8-1).
+#[test]
+fn modes() {
+    let bench = Bench::new(&[("c.net", CANTILEVER)]);
+    let found = bench.json("modes c.net --count 2 --tol 1e-4 --band 2M");
+    let root = (165e9 * 2e-6 * 8e-18 / 12.0 / (2300.0 * 4e-12 * 1e-16_f64)).sqrt();
+    let f1 = 1.8751041_f64.powi(2) * root / std::f64::consts::TAU;
+    assert_relative_eq!(number(&found["frequencies_hz"][0]), f1, max_relative = 1e-3);
+    assert_eq!(found["frequencies_hz"].as_array().map(Vec::len), Some(2));
+    assert_eq!(found["shapes"].as_array().map(Vec::len), Some(2));
+    assert!(number(&found["residuals"][0]) < 1e-6);
+}
+
+/// A plate on a spring pulls in at √(8·k·g³/(27·ε·A)) (Nathanson et al., 1967).
+#[test]
+fn pull_in() {
+    let bench = Bench::new(&[("p.net", PLATE)]);
+    let found = bench.json("pullin p.net --max 20");
+    let theory = (8.0 * 8e-18 / (27.0 * 8.854e-12 * 1e-8_f64)).sqrt();
+    assert_relative_eq!(number(&found["pull_in_v"]), theory, max_relative = 1e-3);
+    assert!(found["release_v"].is_null() || number(&found["release_v"]) < theory);
+    assert_eq!(found["port"], "drive");
+}
+
+/// A released cantilever starts at its equilibrium under load and swings through it with the other sign.
+#[test]
+fn transient() {
+    let bench = Bench::new(&[("c.net", CANTILEVER)]);
+    let words = "tran c.net --set F=1u --release F --stop 8u --points 161 --undamped --linear --signals b.y,b.rz";
+    let found = bench.json(words);
+    let y: Vec<f64> = found["signals"]["b.y"].as_array().expect("samples").iter().map(number).collect();
+    let t: Vec<f64> = found["t"].as_array().expect("times").iter().map(number).collect();
+    assert_eq!((t.len(), y.len()), (161, 161));
+    assert_eq!((t[0], t[160]), (0.0, 8e-6));
+    assert_relative_eq!(y[0], 1e-18 / (3.0 * 165e9 * 2e-6 * 8e-18 / 12.0), max_relative = 1e-6);
+    assert!(y.iter().copied().fold(f64::INFINITY, f64::min) < -0.8 * y[0]);
+    assert_eq!((&found["units"]["b.y"], &found["units"]["b.rz"]), (&"m".into(), &"rad".into()));
+    assert_eq!(found["release"], "F");
+    assert!(found["counters"]["steps"].as_u64() > Some(10));
+}
+
+/// Shards of a sweep put together are the whole sweep, to the byte, on any number of threads.
+#[test]
+fn sweep() {
+    let bench = Bench::new(&[("c.net", CANTILEVER)]);
+    let words = "sweep c.net --linear --param F=1u:2u:5 --signals b.y";
+    let whole = bench.run(words);
+    assert_eq!(whole.status, 0, "{}", whole.stderr);
+    assert!(whole.stderr.contains("5 points"), "{}", whole.stderr);
+    let lines: Vec<&str> = whole.stdout.lines().collect();
+    assert_eq!(lines[0], "point,F,b.y [m],error");
+    let cells: Vec<&str> = lines[5].split(',').collect();
+    let tip: f64 = cells[2].parse().expect("a number");
+    assert_relative_eq!(tip, 2e-18 / (3.0 * 165e9 * 2e-6 * 8e-18 / 12.0), max_relative = 1e-9);
+
+    let mut merged: Vec<String> = Vec::new();
+    for shard in ["0/2", "1/2"] {
+        let ran = bench.run(&format!("{words} --threads 1 --shard {shard}"));
+        merged.extend(ran.stdout.lines().skip(1).map(str::to_owned));
+    }
+    merged.sort();
+    assert_eq!(merged, lines[1..]);
+}
+
+/// A point that cannot be computed has its reason in the table; the others keep their results.
+#[test]
+fn a_sweep_goes_on_past_a_bad_point() {
+    let bench = Bench::new(&[("c.net", &CANTILEVER.replace("l=100u", "l=L").replace("param F", "param L=1u, F"))]);
+    let ran = bench.run("sweep c.net --param L=-1u,100u --signals b.y");
+    assert_eq!(ran.status, 0, "{}", ran.stderr);
+    assert!(ran.stderr.contains("1 without a result"), "{}", ran.stderr);
+    assert!(ran.stdout.lines().last().is_some_and(|line| line.starts_with("1,1e-4,")), "{}", ran.stdout);
+}
