@@ -4,4 +4,3 @@ mod analyses;
 mod bench;
 mod errors;
 mod outputs;
-mod service;
