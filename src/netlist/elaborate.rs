@@ -17,7 +17,7 @@ const DEEPEST_RUN: usize = 400;
 /// Statements that one netlist may run: loops and recursion end here instead of never.
 const MOST_STATEMENTS: usize = 20_000_000;
 /// Elements and subnet instances that one netlist may build.
-const MOST_ELEMENTS: usize = 1_000_000;
+const MOST_ELEMENTS: usize = 300_000;
 
 /// A layer's entries, evaluated: its own before its parent's.
 pub(crate) type LayerValues<'p> = Rc<Vec<(&'p str, Value)>>;

@@ -228,9 +228,15 @@ impl<'a> Parser<'a> {
     }
 
     /// True when the tokens ahead look like the head of an element: two or three words, then a list.
-    pub(super) fn element_ahead(&self) -> bool {
+    fn element_ahead(&self) -> bool {
         let word = |n: usize| matches!(self.ahead(n).kind, Kind::Identifier | Kind::Star);
         word(1) && (self.ahead(2).kind == Kind::OpenList || (word(2) && self.ahead(3).kind == Kind::OpenList))
+    }
+
+    /// True when a new statement begins here, on a line of its own: inside a list, its `]` is missing.
+    pub(super) fn statement_ahead(&self) -> bool {
+        let token = self.peek();
+        token.starts_line && (token.kind.begins_statement() || self.element_ahead())
     }
 
     pub(super) fn nested<T>(&mut self, parse: impl FnOnce(&mut Self) -> Parsed<T>) -> Parsed<T> {

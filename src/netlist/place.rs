@@ -25,6 +25,9 @@ enum Mark {
 /// Fills in the positions of all nodes, the lengths of beams that were left to be measured, and the warnings.
 pub(crate) fn place(drawing: &mut Drawing, sink: &mut Sink) {
     let starts = walk(drawing);
+    if unplaced_nodes(drawing, sink) {
+        return;
+    }
     unconnected_parts(drawing, &starts, sink);
     open_loops(drawing, sink);
     measure(drawing, sink);
@@ -39,14 +42,6 @@ fn walk(drawing: &mut Drawing) -> Vec<usize> {
         for node in &placement.nodes {
             elements[node.0].push(index);
             marks[node.0] = Mark::Unplaced;
-        }
-    }
-    for unmeasured in &drawing.unmeasured {
-        let beam = &drawing.structure.beams[unmeasured.beam];
-        for node in [beam.a.0, beam.b.0] {
-            if marks[node] == Mark::None {
-                marks[node] = Mark::Unplaced;
-            }
         }
     }
     let mut starts = Vec::new();
@@ -75,6 +70,24 @@ fn walk(drawing: &mut Drawing) -> Vec<usize> {
         }
     }
     starts
+}
+
+/// Reports nodes that only beams and links without a length touch: nothing says where they lie.
+fn unplaced_nodes(drawing: &Drawing, sink: &mut Sink) -> bool {
+    let mut placed = vec![false; drawing.structure.nodes.len()];
+    for node in drawing.placements.iter().flat_map(|p| &p.nodes) {
+        placed[node.0] = true;
+    }
+    let beams = drawing.structure.beams.iter().flat_map(|b| [b.a, b.b]);
+    let links = drawing.structure.links.iter().flat_map(|l| [l.a, l.b]);
+    let mut found = false;
+    for node in beams.chain(links).filter(|n| !placed[n.0]) {
+        found = true;
+        let message = format!("nothing says where node `{}` lies", drawing.structure.nodes[node.0].name);
+        let help = "give the beam or link that leads to it its `l=`, or place it with `pos`";
+        sink.error("E065", drawing.first_named[node.0], message, help);
+    }
+    found
 }
 
 fn unconnected_parts(drawing: &Drawing, starts: &[usize], sink: &mut Sink) {

@@ -213,6 +213,7 @@ impl Parser<'_> {
                     );
                 }
                 Kind::End => return Err(self.unclosed(open)),
+                _ if self.statement_ahead() => return Err(self.unclosed(open)),
                 _ => {
                     let base = self.ident("a node name or `]`")?;
                     names.push(self.indices(base)?);
@@ -250,8 +251,7 @@ impl Parser<'_> {
 
     /// The next name of a parameter list, or the error that the list was left open.
     fn list_name(&mut self, open: Token) -> Parsed<Ident> {
-        let token = self.peek();
-        if token.kind == Kind::End || (token.starts_line && (token.kind.begins_statement() || self.element_ahead())) {
+        if self.peek().kind == Kind::End || self.statement_ahead() {
             return Err(self.unclosed(open));
         }
         self.ident("a parameter name or `]`")

@@ -1,0 +1,302 @@
+//! What each element adds to the structure, with numbers worked out by hand from its equations in docs/netlist.md.
+
+use bimorph::netlist::{Bundle, load};
+use bimorph::structure::{GapVoltage, NodeId, Structure};
+
+/// A layer with round numbers.
+const P1: &str = "process p1 = [Youngsmodulus=160e9 Poisson=0.25 density=2000 h=2u viscosity=2e-5 fluid=1u permittivity=9e-12\n\
+                  sheetresistance=20 thermcond=30 thermalexpansion=3e-6 ambienttemperature=300 stress=1M]\n";
+
+fn drawn(text: &str) -> Structure {
+    let loaded = load(&Bundle::from_text("t.net", &format!("{P1}{text}")), &[]).unwrap_or_else(|d| panic!("{d}"));
+    loaded.structure
+}
+
+fn codes(text: &str) -> Vec<String> {
+    let loaded = load(&Bundle::from_text("t.net", &format!("{P1}{text}")), &[]).unwrap_or_else(|d| panic!("{d}"));
+    loaded.warnings.items.into_iter().map(|d| d.code).collect()
+}
+
+fn at(structure: &Structure, name: &str) -> [f64; 2] {
+    structure.nodes[structure.node(name).expect(name).0].position
+}
+
+/// Two numbers that agree to rounding of a few sums and products.
+#[track_caller]
+fn same(got: f64, want: f64) {
+    assert!((got - want).abs() <= 1e-12 * want.abs().max(1e-12), "{got:e} is not {want:e}");
+}
+
+#[track_caller]
+fn same2(got: [f64; 2], want: [f64; 2]) {
+    let size = want[0].abs().max(want[1].abs()).max(1e-6);
+    assert!((got[0] - want[0]).abs() + (got[1] - want[1]).abs() <= 1e-12 * size, "{got:?} is not {want:?}");
+}
+
+/// A beam takes its section from itself and its material from the layer.
+#[test]
+fn beam2d() {
+    let s = drawn("anchor p1 [a] []\nx beam2d p1 [a b] [l=100u w=3u oz=pi/2 T=350]");
+    let beam = &s.beams[0];
+    assert_eq!((beam.name.as_str(), beam.a, beam.b), ("x", NodeId(0), NodeId(1)));
+    assert_eq!((beam.length, beam.width, beam.thickness), (100e-6, 3e-6, 2e-6));
+    assert_eq!(beam.temperature, Some(350.0));
+    same(beam.angle, std::f64::consts::FRAC_PI_2);
+    let m = &beam.material;
+    assert_eq!((m.youngs_modulus, m.poisson, m.density, m.stress), (160e9, 0.25, 2000.0, 1e6));
+    assert_eq!((m.viscosity, m.fluid, m.thermal_expansion, m.ambient_temperature), (2e-5, 1e-6, 3e-6, 300.0));
+    same2(at(&s, "b"), [0.0, 100e-6]);
+}
+
+/// Without viscosity or film there is no damping.
+#[test]
+fn damping_needs_viscosity_and_film() {
+    let s = drawn(
+        "process q = [Youngsmodulus=1e9 density=1 h=1u viscosity=1e-5]\nanchor q [a] []\nbeam2d q [a b] [l=10u w=1u]",
+    );
+    assert_eq!(s.beams[0].material.viscosity, 0.0);
+}
+
+/// A beam without `l` is measured from positions that others give.
+#[test]
+fn beam_without_length() {
+    let s = drawn("anchor p1 [a] []\npos * [a b] [x=30u y=40u]\nbeam2d p1 [a b] [w=2u]");
+    same(s.beams[0].length, 50e-6);
+    same(s.beams[0].angle, (4.0f64 / 3.0).atan());
+}
+
+/// `pos` alone makes no mechanical node.
+#[test]
+fn pos_only_places() {
+    let s = drawn("anchor p1 [a] []\nbeam2d p1 [a b] [l=10u w=1u]\npos * [a mark] [x=1u y=2u]");
+    let mark = s.node("mark").expect("mark");
+    assert!(!s.nodes[mark.0].mechanical);
+    same2(at(&s, "mark"), [1e-6, 2e-6]);
+}
+
+/// A quarter turn about its axis swaps a beam's width and thickness; a mirrored beam stays a beam.
+#[test]
+fn beam_turned_about_itself() {
+    let s = drawn("anchor p1 [a] []\nbeam2d p1 [a b] [l=10u w=5u ox=pi/2]\nbeam2d p1 [b c] [l=10u w=5u oy=pi]");
+    assert_eq!((s.beams[0].width, s.beams[0].thickness), (2e-6, 5e-6));
+    assert_eq!((s.beams[1].width, s.beams[1].thickness), (5e-6, 2e-6));
+    same2(at(&s, "c"), [0.0, 0.0]);
+}
+
+/// Orientation composes as R = R_parent·Ry(oy)·Rz(oz)·Rx(ox): SUGAR 2 places l = 10 µm with oy = 0.4, oz = 0.5 at
+/// (8.083, 4.794, −3.417) µm; here its shadow on the plane is seen through `pos`.
+#[test]
+fn rotation_order() {
+    let s = drawn("anchor p1 [a] []\npos * [a b] [x=10u ox=0.3 oy=0.4 oz=0.5]");
+    let [x, y] = at(&s, "b");
+    assert!((x - 8.083e-6).abs() < 5e-10 && (y - 4.794e-6).abs() < 5e-10, "{x:e} {y:e}");
+}
+
+/// Arms of a beam3dlink are rigid links, turned from the beam's own direction.
+#[test]
+fn beam_with_rigid_arms() {
+    let s = drawn("anchor p1 [a] []\nk beam3dlink p1 [a b] [l=20u w=2u L1=5u L2=7u oz2=pi/2]");
+    assert_eq!(s.links.len(), 2);
+    same2(at(&s, "k.start"), [5e-6, 0.0]);
+    same2(at(&s, "k.end"), [25e-6, 0.0]);
+    same2(at(&s, "b"), [25e-6, 7e-6]);
+    assert_eq!((s.beams[0].name.as_str(), s.beams[0].length), ("k", 20e-6));
+    assert_eq!((s.beams[0].a, s.beams[0].b), (s.node("k.start").expect("start"), s.node("k.end").expect("end")));
+}
+
+/// anchor, hinge, slider and guide hold their directions; pinjoint holds none in the plane.
+#[test]
+fn supports() {
+    let s = drawn(
+        "anchor p1 [a] []\nhinge * [b] []\nslider * [c] []\nguide2d * [d] [oz=pi/2]\npinjoint * [d] []\n\
+         beam2d p1 [a b] [l=1u w=1u]\nbeam2d p1 [b c] [l=1u w=1u]\nbeam2d p1 [c d] [l=1u w=1u]",
+    );
+    let held: Vec<[bool; 3]> = s.supports.iter().map(|s| s.held).collect();
+    assert_eq!(held, [[true, true, true], [true, true, false], [false, false, true], [false, true, true]]);
+    same(s.supports[3].angle, std::f64::consts::FRAC_PI_2);
+}
+
+/// f2d and f3d push along the local x axis; f2d turns about z, f3d about its own x axis.
+#[test]
+fn loads() {
+    let s = drawn(
+        "anchor p1 [a] []\nbeam2d p1 [a b] [l=1u w=1u]\nf2d * [b] [F=2u M=3n oz=pi/2]\nf3d * [b] [F=2u oz=pi]\nf3d * [b] [M=5n oy=-pi/2]",
+    );
+    same2(s.loads[0].force, [2e-6 * std::f64::consts::FRAC_PI_2.cos(), 2e-6]);
+    assert_eq!(s.loads[0].moment, 3e-9);
+    same2(s.loads[1].force, [-2e-6, 0.0]);
+    assert_eq!(s.loads[2].force, [0.0, 0.0]);
+    same(s.loads[2].moment, 5e-9);
+}
+
+/// A force or moment that the plane cannot hold is told.
+#[test]
+fn loads_out_of_plane() {
+    let base = "anchor p1 [a] []\nbeam2d p1 [a b] [l=1u w=1u]\n";
+    assert_eq!(codes(&format!("{base}f3d * [b] [F=1u oy=-pi/2]")), ["W020"]);
+    assert_eq!(codes(&format!("{base}f3d * [b] [M=1n]")), ["W020"]);
+    assert!(codes(&format!("{base}f3d * [b] [F=1u oz=1]")).is_empty());
+}
+
+/// A plate's mass and inertia come from its size and density, its drag from the film under it.
+#[test]
+fn plate2d() {
+    let s = drawn("anchor p1 [a] []\nlink2d * [a c] [l=5u]\nplate2d p1 [c] [l=60u w=40u oz=1]");
+    let plate = &s.masses[0];
+    same(plate.mass, 2000.0 * 60e-6 * 40e-6 * 2e-6);
+    let radius2 = (60e-6f64.powi(2) + 40e-6f64.powi(2)) / 12.0;
+    same(plate.inertia, plate.mass * radius2);
+    same(plate.drag[0], 2e-5 / 1e-6 * 60e-6 * 40e-6);
+    same(plate.drag[1], plate.drag[0] * radius2);
+    assert_eq!(plate.outline, [60e-6, 40e-6, 1.0]);
+}
+
+/// The lumped plate over its electrode: positions, axis, and the electrical side.
+#[test]
+fn lumped_plate() {
+    let s = drawn(
+        "anchor * [f] []\nmass2d * [m] [m=1e-10]\nguide2d * [m] []\nspring2d * [f m] [kx=1 l=4u]\nanchor * [e] []\n\
+         plategap2d * [m e] [A=1e-8 gap=2u]\neground * [e] []\ndrive port * [m e] []",
+    );
+    let gap = &s.plate_gaps[0];
+    assert_eq!((gap.area, gap.gap, gap.permittivity, gap.height), (1e-8, 2e-6, 8.854e-12, 2e-6));
+    assert_eq!(gap.axis, [1.0, 0.0]);
+    let (m, e) = (s.node("m").expect("m"), s.node("e").expect("e"));
+    assert_eq!(gap.voltage, GapVoltage::Nodes(m, e));
+    same2(at(&s, "e"), [6e-6, 0.0]);
+    assert_eq!(s.springs[0].stiffness, [1.0, 0.0, 0.0]);
+    assert_eq!((s.ports[0].name.as_str(), s.ports[0].plus, s.ports[0].minus), ("drive", m, Some(e)));
+    assert_eq!(s.electrical_grounds, [e]);
+    assert!(s.nodes[m.0].mechanical && s.nodes[m.0].electrical);
+}
+
+/// damper2d, and a spring turned by oz.
+#[test]
+fn springs_and_dampers() {
+    let s = drawn(
+        "anchor * [a] []\nspring2d * [a b] [kx=1 ky=2 krz=3 l=10u oz=pi/2]\ndamper2d * [a b] [bx=4 by=5 brz=6 l=10u oz=pi/2]\nmass2d * [b] [m=1p J=2]",
+    );
+    same2(at(&s, "b"), [0.0, 10e-6]);
+    assert_eq!((s.springs[0].stiffness, s.springs[0].damping), ([1.0, 2.0, 3.0], [0.0; 3]));
+    assert_eq!((s.springs[1].stiffness, s.springs[1].damping), ([0.0; 3], [4.0, 5.0, 6.0]));
+    assert_eq!((s.masses[0].mass, s.masses[0].inertia), (1e-12, 2.0));
+}
+
+/// gap2d brings its two beams; c and d lie below a and b by gap + (w1 + w2)/2.
+#[test]
+fn gap2d() {
+    let s = drawn(
+        "anchor p1 [a] []\ng gap2d p1 [a b c d] [l=100u w1=10u w2=5u gap=2u V=8]\nanchor p1 [c] []\nanchor p1 [d] []",
+    );
+    assert_eq!((s.beams[0].name.as_str(), s.beams[0].width), ("g.upper", 10e-6));
+    assert_eq!((s.beams[1].name.as_str(), s.beams[1].width), ("g.lower", 5e-6));
+    same2(at(&s, "c"), [0.0, -9.5e-6]);
+    same2(at(&s, "d"), [100e-6, -9.5e-6]);
+    let gap = &s.beam_gaps[0];
+    assert_eq!((gap.length, gap.gap, gap.height, gap.permittivity), (100e-6, 2e-6, 2e-6, 9e-12));
+    same(gap.fringe, 1.0 + 1.12);
+    assert_eq!((gap.side, gap.voltage.clone()), (1.0, GapVoltage::Fixed(8.0)));
+}
+
+/// oy = pi mirrors a gap: the lower beam then lies above when seen along a–b.
+#[test]
+fn gap_mirrored() {
+    let s = drawn(
+        "anchor p1 [a] []\ngap2d p1 [a b c d] [l=100u w=4u gap=2u V=1 oy=pi]\nanchor p1 [c] []\nanchor p1 [d] []",
+    );
+    assert_eq!(s.beam_gaps[0].side, -1.0);
+    same2(at(&s, "b"), [-100e-6, 0.0]);
+    same2(at(&s, "d"), [-100e-6, -6e-6]);
+}
+
+/// gap2de is two resistors, two beams and a field at the voltage of a over c; each plate has its own resistance.
+#[test]
+fn gap2de() {
+    let s = drawn(
+        "anchor p1 [a] []\ngap2de p1 [a b c d] [l=100u w1=10u w2=5u gap=2u R1=100 R2=300 h=4u]\nanchor p1 [c] []\nanchor p1 [d] []\n\
+         eground * [c] []\nVsrc * [a c] [V=3]",
+    );
+    let resistances: Vec<f64> = s.resistors.iter().map(|r| r.resistance).collect();
+    assert_eq!(resistances, [100.0, 300.0]);
+    assert_eq!(s.beam_gaps[0].voltage, GapVoltage::Nodes(NodeId(0), NodeId(2)));
+    assert_eq!((s.beam_gaps[0].height, s.beams[1].thickness), (4e-6, 4e-6));
+    assert_eq!(s.voltage_sources[0].voltage, 3.0);
+}
+
+/// beam2de takes R, else G, else resistivity·l/(w·h), else the layer's sheet resistance.
+#[test]
+fn beam2de() {
+    let one = |extra: &str| {
+        drawn(&format!("anchor p1 [a] []\neground * [a] []\nbeam2de p1 [a b] [l=100u w=4u {extra}]")).resistors[0]
+            .resistance
+    };
+    same(one("R=7"), 7.0);
+    same(one("G=4"), 0.25);
+    same(one("resistivity=2e-5"), 2e-5 * 100e-6 / (4e-6 * 2e-6));
+    same(one(""), 20.0 * 100.0 / 4.0);
+}
+
+/// An electro-thermal beam: resistance, end-to-end conductance, and the time constant of the slowest thermal mode.
+#[test]
+fn beam2det() {
+    let one = |extra: &str| {
+        drawn(&format!("anchor p1 [a] []\neground * [a] []\nhot beam2det p1 [a b] [l=100u w=4u {extra}]\nanchor p1 [b] []\nheat port * [b a] []"))
+            .beams[0]
+            .heater
+            .clone()
+            .expect("heater")
+    };
+    let plain = one("");
+    same(plain.resistance, 500.0);
+    same(plain.conductance, 30.0 * 4e-6 * 2e-6 / 100e-6);
+    assert_eq!(plain.time_constant, 0.0);
+    let slow = one("specificheat=700 R=50");
+    same(slow.resistance, 50.0);
+    same(slow.time_constant, 2000.0 * 700.0 * 1e-8 / (std::f64::consts::PI.powi(2) * 30.0));
+    assert_eq!(one("tau=1m specificheat=700").time_constant, 1e-3);
+}
+
+/// comb2d: constant force, b at 2L − l; comb2de: finite overlap between electrical nodes.
+#[test]
+fn combs() {
+    let s = drawn(
+        "anchor p1 [a] []\nanchor p1 [b] []\ncomb2d p1 [a b] [l=5u L=20u w=2u gap=3u N=10 V=15]\nanchor p1 [q] []\n\
+         c comb2de p1 [a q] [l=4u L=20u gap=2u N=40 Cp=1f oz=pi]\nport * [a q] []",
+    );
+    same2(at(&s, "b"), [35e-6, 0.0]);
+    same2(at(&s, "q"), [-36e-6, 0.0]);
+    let (fixed, driven) = (&s.combs[0], &s.combs[1]);
+    assert_eq!((fixed.gaps, fixed.gap, fixed.height, fixed.overlap), (10.0, 3e-6, 2e-6, 5e-6));
+    assert_eq!((fixed.finite, fixed.voltage.clone()), (false, GapVoltage::Fixed(15.0)));
+    assert_eq!((driven.finite, driven.parasitic, driven.permittivity), (true, 1e-15, 9e-12));
+    same2(driven.axis, [-1.0, 0.0]);
+}
+
+/// Resistors by R or G; an inductor is a short, a capacitor is left out, both with a word.
+#[test]
+fn circuit() {
+    let text = "R * [p q] [R=5]\nR * [q r] [G=4]\nL * [r s] [L=1n]\nC * [p r] [C=1p]\neground * [s] []\nVsrc * [p s] [V=1]\n\
+                anchor p1 [a] []\nbeam2d p1 [a b] [l=1u w=1u]";
+    let s = drawn(text);
+    let resistances: Vec<f64> = s.resistors.iter().map(|r| r.resistance).collect();
+    assert_eq!(resistances, [5.0, 0.25]);
+    assert_eq!((s.voltage_sources[0].voltage, s.voltage_sources.len()), (0.0, 2));
+    assert_eq!(codes(text), ["W021", "W021"]);
+}
+
+/// A link without a length joins nodes where others put them.
+#[test]
+fn link_without_length() {
+    let s =
+        drawn("anchor p1 [a] []\nbeam2d p1 [a b] [l=10u w=1u]\nbeam2d p1 [a c] [l=10u w=1u oz=1]\nlink2d * [b c] []");
+    assert_eq!(s.links.len(), 1);
+    same2(at(&s, "c"), [10e-6 * 1f64.cos(), 10e-6 * 1f64.sin()]);
+}
+
+/// The first mechanical node lies at the origin, also when a force names another one first.
+#[test]
+fn origin() {
+    let s = drawn("f2d * [b] [F=1u]\nanchor p1 [a] []\nbeam2d p1 [a b] [l=10u w=1u]");
+    same2(at(&s, "b"), [0.0, 0.0]);
+    same2(at(&s, "a"), [-10e-6, 0.0]);
+}
