@@ -97,8 +97,11 @@ enum Tree {
     Binary(usize, Box<Tree>, Box<Tree>),
 }
 
-/// Sign, strength and meaning of each binary operator.
-const OPERATORS: [(&str, u8, fn(f64, f64) -> f64); 11] = [
+/// Sign, strength and meaning.
+type Operator = (&'static str, u8, fn(f64, f64) -> f64);
+
+/// The binary operators.
+const OPERATORS: [Operator; 11] = [
     ("|", 1, |a, b| f64::from(a != 0.0 || b != 0.0)),
     ("&", 2, |a, b| f64::from(a != 0.0 && b != 0.0)),
     ("==", 3, |a, b| f64::from(a == b)),
