@@ -49,7 +49,8 @@ impl Session {
     /// Answers one question; none for an accept. A fault inside closes this session and no other.
     pub(super) fn answer(&self, question: Question) -> Option<ReplyKind> {
         if self.is_closed() {
-            return Some(refused(&status::not_found("session", &self.id)));
+            let silent = matches!(question, Question::Accept(_));
+            return (!silent).then(|| refused(&status::not_found("session", &self.id)));
         }
         self.touch();
         let outcome = catch_unwind(AssertUnwindSafe(|| {

@@ -1,0 +1,134 @@
+//! Each limit is answered with RESOURCE_EXHAUSTED and its name; what was idle too long is forgotten.
+
+use super::running::{block_on, compiled, start, wire_bundle};
+use bimorph::device::{Device, DeviceError, Mode, OpenRequest, Trial, TrialReply};
+use bimorph::service::limits::Limits;
+use bimorph::service::proto;
+use std::time::Duration;
+use tonic::{Code, Status};
+
+fn exhausted(status: &Status, name: &str) {
+    assert_eq!(status.code(), Code::ResourceExhausted, "{status:?}");
+    assert!(status.message().starts_with(name), "{}", status.message());
+}
+
+/// Netlist size, unknowns, sessions, modes, samples, sweep points and sweeps are limited.
+#[test]
+fn limits_are_named() {
+    let small = Limits {
+        netlist_bytes: 400,
+        sessions: 1,
+        modes: 3,
+        transient_values: 100,
+        sweep_points: 10,
+        sweeps: 0,
+        ..Limits::default()
+    };
+    let server = start("127.0.0.1:0", small);
+    block_on(async {
+        let mut client = server.client().await;
+        let model = compiled(&mut client).await;
+        let large = proto::Bundle { root: "a".into(), files: [("a".to_owned(), "% ".repeat(400))].into() };
+        let request = proto::CompileRequest { bundle: Some(large), options: None };
+        exhausted(&client.compile(request).await.expect_err("too large"), "netlist_bytes");
+        let open = proto::OpenRequest { model: model.clone(), ..Default::default() };
+        client.open(open.clone()).await.expect("the first");
+        exhausted(&client.open(open).await.expect_err("the second"), "sessions");
+        let modes = proto::ModesRequest { model: model.clone(), count: 4, voltages: vec![] };
+        exhausted(&client.modes(modes).await.expect_err("too many"), "modes");
+        let transient = proto::TransientRequest { model, stop_s: 1.0, points: 101, ..Default::default() };
+        exhausted(&client.transient(transient).await.expect_err("too many"), "transient_values");
+        let sweep = |count| {
+            let values = proto::sweep_parameter::Values::Linear(proto::Linear { low: 0.0, high: 1.0, count });
+            let spec = proto::SweepSpec {
+                parameters: vec![proto::SweepParameter { name: "V".into(), values: Some(values) }],
+                analysis: Some(proto::sweep_spec::Analysis::Static(proto::SweepStatic::default())),
+                ..Default::default()
+            };
+            proto::SubmitSweepRequest { bundle: wire_bundle(), options: None, spec: Some(spec) }
+        };
+        exhausted(&client.submit_sweep(sweep(u32::MAX)).await.expect_err("too many"), "sweep_points");
+        exhausted(&client.submit_sweep(sweep(2)).await.expect_err("too many"), "sweeps");
+    });
+}
+
+/// A model with too many unknowns is refused after compiling (the echo device has three).
+#[test]
+fn large_models_are_refused() {
+    let server = start("127.0.0.1:0", Limits { unknowns: 2, ..Limits::default() });
+    let request = proto::CompileRequest { bundle: wire_bundle(), options: None };
+    let status = block_on(async { server.client().await.compile(request).await }).expect_err("too many");
+    exhausted(&status, "unknowns");
+}
+
+/// Trials without accepts are bounded, and an accept makes room.
+#[test]
+fn states_are_bounded_and_accepts_make_room() {
+    let server = start("127.0.0.1:0", Limits { states_per_session: 3, ..Limits::default() });
+    let mut device = server.device();
+    device.open(&OpenRequest::default()).expect("opens");
+    let mut reply = TrialReply::default();
+    let mut try_one = |device: &mut bimorph::service::client::RemoteDevice, v: f64| {
+        let trial = Trial { mode: Mode::Static, parent: None, t: 0.0, dt: 0.0, voltages: &[v, 0.0] };
+        device.trial(&trial, &mut reply).map(|()| reply.token)
+    };
+    for v in [1.0, 2.0, 3.0] {
+        try_one(&mut device, v).expect("has room");
+    }
+    let full = try_one(&mut device, 4.0).expect_err("is full");
+    assert!(matches!(&full, DeviceError::Remote { reason, .. } if reason.contains("states_per_session")), "{full}");
+    device.accept(bimorph::device::Token(1));
+    try_one(&mut device, 4.0).expect("has room again");
+}
+
+/// The model unused for longest goes first.
+#[test]
+fn the_oldest_model_goes_first() {
+    let server = start("127.0.0.1:0", Limits { models: 2, ..Limits::default() });
+    block_on(async {
+        let mut client = server.client().await;
+        let mut ids: Vec<String> = Vec::new();
+        for tol in [1e-3, 1e-4, 1e-5] {
+            if ids.len() == 2 {
+                client.describe(proto::DescribeRequest { model: ids[0].clone() }).await.expect("kept");
+            }
+            let options = Some(proto::CompileOptions { tol: Some(tol), ..Default::default() });
+            let response = client.compile(proto::CompileRequest { bundle: wire_bundle(), options }).await;
+            let id = response.expect("compiles").into_inner().model.expect("a description").id;
+            ids.push(id);
+        }
+        client.describe(proto::DescribeRequest { model: ids[0].clone() }).await.expect("was used");
+        let gone = client.describe(proto::DescribeRequest { model: ids[1].clone() }).await;
+        assert_eq!(gone.expect_err("was unused").code(), Code::NotFound);
+    });
+}
+
+/// An idle session is forgotten; a remote device notices, and opens anew.
+#[test]
+fn idle_sessions_are_forgotten() {
+    let server = start("127.0.0.1:0", Limits { idle: Duration::from_millis(40), ..Limits::default() });
+    let mut device = server.device();
+    device.open(&OpenRequest::default()).expect("opens");
+    let trial = Trial { mode: Mode::Static, parent: None, t: 0.0, dt: 0.0, voltages: &[1.0, 0.0] };
+    let mut reply = TrialReply::default();
+    std::thread::sleep(Duration::from_millis(300));
+    let gone = device.trial(&trial, &mut reply).expect_err("is forgotten");
+    assert!(gone.to_string().contains("no session"), "{gone}");
+    device.open(&OpenRequest::default()).expect("opens anew");
+    device.trial(&trial, &mut reply).expect("answers");
+}
+
+/// A thousand sessions one after another leave nothing behind: the limit of four is never reached.
+#[test]
+fn closed_sessions_leave_no_trace() {
+    let server = start("127.0.0.1:0", Limits { sessions: 4, ..Limits::default() });
+    block_on(async {
+        let mut client = server.client().await;
+        let model = compiled(&mut client).await;
+        for _ in 0..1000 {
+            let open = proto::OpenRequest { model: model.clone(), ..Default::default() };
+            let session = client.open(open).await.expect("has room").into_inner().session;
+            client.close(proto::CloseRequest { session }).await.expect("closes");
+        }
+    });
+}

@@ -1,0 +1,11 @@
+//! The service from outside: every call over a real socket, on port 0 or a temporary path.
+#![cfg(feature = "server")]
+
+mod calls;
+mod echo;
+mod endings;
+mod limits;
+mod listening;
+mod random;
+mod refusals;
+mod running;
