@@ -37,10 +37,18 @@ struct Registry {
     good: bool,
     /// Set when the analysis must end: no device is asked any more.
     stopped: bool,
+    /// Name of the instance being asked.
+    asked: String,
 }
 
-static REGISTRY: Mutex<Registry> =
-    Mutex::new(Registry { entries: Vec::new(), epochs: 0, delta: 0.0, good: true, stopped: false });
+static REGISTRY: Mutex<Registry> = Mutex::new(Registry {
+    entries: Vec::new(),
+    epochs: 0,
+    delta: 0.0,
+    good: true,
+    stopped: false,
+    asked: String::new(),
+});
 
 fn registry() -> MutexGuard<'static, Registry> {
     REGISTRY.lock().unwrap_or_else(PoisonError::into_inner)
@@ -277,6 +285,7 @@ pub(crate) unsafe extern "C" fn evaluate(data: *mut c_void) {
             registry.good = false;
             return None;
         }
+        registry.asked.clear();
         Some(respond(&call, &mut registry))
     }));
     let outcome = match outcome {
@@ -284,11 +293,14 @@ pub(crate) unsafe extern "C" fn evaluate(data: *mut c_void) {
         Ok(Some(outcome)) => outcome,
         Err(_) => Outcome::Stop(format!("internal error: {}; please report it", panics::last())),
     };
-    registry().good = false;
+    let mut registry = registry();
+    registry.good = false;
     if let Outcome::Stop(text) = outcome {
-        registry().stopped = true;
-        record_failure(&text);
-        trace::line(format_args!("stop: {text}"));
+        registry.stopped = true;
+        let reason = format!("instance {}: {text}", registry.asked);
+        drop(registry);
+        record_failure(&reason);
+        trace::line(format_args!("stop: {reason}"));
         // SAFETY: this is within a load.
         unsafe { host::message(&format!("Error: bimorph: {text}")) };
     }
@@ -300,6 +312,7 @@ fn respond(call: &Call<'_>, registry: &mut Registry) -> Outcome {
     let Some(entry) = registry.entries.iter_mut().find(|e| e.key == call.key()) else {
         return Outcome::Stop("an instance was not set up".into());
     };
+    registry.asked.push_str(entry.instance.name());
     let question = call.question(delta);
     let ports = call.size(PORTS);
     let doubles = history::len(ports);

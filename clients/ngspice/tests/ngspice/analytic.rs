@@ -77,7 +77,7 @@ fn a_failure_ends_the_analysis_with_one_message() {
         return;
     }
     let (reason, output) = stopped("fails.cir");
-    assert_eq!(reason, "the plate broke off");
+    assert_eq!(reason, "instance a1: the plate broke off");
     let lines: Vec<_> = output.lines().filter(|l| l.contains("broke off")).collect();
     assert_eq!(lines, ["Instance: a1   Message: Error: bimorph: the plate broke off"]);
     assert!(output.contains("simulation(s) aborted"), "{output}");
@@ -89,7 +89,7 @@ fn a_failure_inside_control_is_a_failure() {
     if skipped() {
         return;
     }
-    assert_eq!(stopped("fails_in_control.cir").0, "the plate broke off");
+    assert_eq!(stopped("fails_in_control.cir").0, "instance a1: the plate broke off");
 }
 
 /// A bug in the device reaches ngspice as an error and nothing else.
@@ -99,7 +99,7 @@ fn a_panic_becomes_an_error() {
         return;
     }
     let (reason, output) = stopped("panics.cir");
-    assert!(reason.starts_with("internal error: a bug at ") && reason.contains("analytic.rs"), "{reason}");
+    assert!(reason.starts_with("instance a1: internal error: a bug at ") && reason.contains("analytic.rs"), "{reason}");
     assert!(!output.contains("panicked"), "{output}");
 }
 

@@ -1,5 +1,7 @@
 //! Decks run by ngspice with the plug-in loaded. Skipped aloud where ngspice is missing.
 
 mod analytic;
+mod models;
+mod remote;
 mod support;
 mod syntax;
