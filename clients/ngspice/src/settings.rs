@@ -4,7 +4,6 @@
 //! parentheses. So `set=["w=2.1u" "F=0"]` arrives as w, 2.1u, F, 0, and a node `x1(2)` arrives as two words. Later
 //! versions keep more of it together. Both forms are read here.
 
-use bimorph::jobs::sweep::parse::number;
 use bimorph::netlist::Setting;
 
 /// A signal shown as a voltage.
@@ -22,6 +21,17 @@ impl Monitor {
         let scaled = text.rsplit_once(':').and_then(|(name, scale)| Some((name, number(scale)?)));
         let (signal, scale) = scaled.unwrap_or((text, 1.0));
         Self { signal: signal.to_owned(), scale }
+    }
+}
+
+/// A number as decks or as netlists write it.
+fn number(text: &str) -> Option<f64> {
+    if let Ok(value) = text.parse::<f64>() {
+        return Some(value).filter(|v| v.is_finite());
+    }
+    match Setting::parse(text) {
+        Ok(Setting::Number(value)) if value.is_finite() => Some(value),
+        _ => None,
     }
 }
 
@@ -88,6 +98,7 @@ mod tests {
     fn monitors() {
         assert_eq!(Monitor::parse("yoke.y:1e6"), Monitor { signal: "yoke.y".into(), scale: 1e6 });
         assert_eq!(Monitor::parse("yoke.y:1M").scale, 1e6);
+        assert_eq!(Monitor::parse("yoke.y:1E6").scale, 1e6);
         assert_eq!(Monitor::parse("b1.hot.T"), Monitor { signal: "b1.hot.T".into(), scale: 1.0 });
         assert_eq!(Monitor::parse("odd:name").signal, "odd:name");
     }

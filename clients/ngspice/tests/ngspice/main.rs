@@ -2,6 +2,5 @@
 
 mod analytic;
 mod models;
-mod remote;
 mod support;
 mod syntax;

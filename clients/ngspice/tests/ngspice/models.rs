@@ -83,7 +83,7 @@ fn comb_agrees_with_b_sources() {
     let (a, b) = (ours.plot("Transient"), theirs.plot("Transient"));
     for column in ["v(x)", "i(vs)"] {
         let wave = |p| (real(p, "time"), real(p, column));
-        let off = deviation(wave(a), wave(b), 1e-6, 150e-6);
+        let off = deviation(wave(a), wave(b), 1e-6, 90e-6);
         assert!(off < 1e-4, "tran {column}: {off:e}");
     }
 }
@@ -98,7 +98,7 @@ fn rejected_steps_leave_no_trace() {
     let (free, fine) = (run(options("comb_edges.cir")).unwrap(), run(options("comb_edges_fine.cir")).unwrap());
     let (a, b) = (free.plot("Transient"), fine.plot("Transient"));
     let wave = |p| (real(p, "time"), real(p, "v(x)"));
-    let off = deviation(wave(a), wave(b), 1e-6, 60e-6);
+    let off = deviation(wave(a), wave(b), 1e-6, 30e-6);
     assert!(off < 1e-3, "{off:e}");
 }
 

@@ -76,15 +76,16 @@ pub(crate) fn value(t: &[f64], y: &[f64], at: f64) -> f64 {
     y[i - 1] + (y[i] - y[i - 1]) * (at - t[i - 1]) / (t[i] - t[i - 1])
 }
 
-/// Largest difference of two waveforms between `from` and `to`, over the range of the second.
+/// Largest difference of two waveforms between `from` and `to`, at the points of the first, over the range of the
+/// second.
 pub(crate) fn deviation(a: (&[f64], &[f64]), b: (&[f64], &[f64]), from: f64, to: f64) -> f64 {
-    let times: Vec<f64> = (0..=2000).map(|i| from + (to - from) * f64::from(i) / 2000.0).collect();
     let (mut worst, mut low, mut high) = (0.0f64, f64::INFINITY, f64::NEG_INFINITY);
-    for at in times {
-        let (x, y) = (value(a.0, a.1, at), value(b.0, b.1, at));
+    for (at, x) in a.0.iter().zip(a.1).filter(|(t, _)| (from..=to).contains(*t)) {
+        let y = value(b.0, b.1, *at);
         worst = worst.max((x - y).abs());
         (low, high) = (low.min(y), high.max(y));
     }
+    assert!(high > low, "no points between {from} and {to} s");
     worst / (high - low)
 }
 
