@@ -262,6 +262,12 @@ fn closed_loops_are_silent() {
 fn slips() {
     warning("anchor p1 [a] []\nbeam2d p1 [a b] [l=10u w=1u oz=90]", "W003", "90 looks like degrees");
     warning("anchor p1 [a] []\nbeam2d p1 [a b] [l=100 w=1u]", "W005", "`l` is 100 m long");
+    warning("anchor p1 [a] []\nbeam2d p1 [a b] [l=10u w=1u Youngsmodulus=165]", "W008", "165 Pa");
+    warning(
+        "anchor p1 [a] []\nbeam2d p1 [a b] [l=10u w=1u]\neground * [a] []\nport * [a] []",
+        "W009",
+        "called `anon4`",
+    );
     warning("anchor p1 [a] []\nbeam2d p1 [a b] [l=10u w=1u wdith=3u]", "W004", "takes no parameter `wdith`");
     warning("anchor p1 [a] []\nbeam2d p1 [a b] [l=10e-6m w=1u]", "W001", "is milli");
     warning("anchor p1 [a] []\nbeam2d p1 [a b] [l=10u w=1u T=310]", "W032", "`T` = 310 is a temperature rise of 310 K");

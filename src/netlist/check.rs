@@ -10,6 +10,9 @@ use crate::structure::{GapVoltage, NodeId, Structure};
 /// So many loose parts or floating nodes are told one by one.
 const TOLD: usize = 3;
 
+/// So many loose nodes are told.
+const MOST_LOOSE: usize = 20;
+
 /// Checks a drawing whose nodes are placed.
 pub(crate) fn check(drawing: &Drawing, sink: &mut Sink) {
     facts(drawing, sink);
@@ -51,6 +54,11 @@ fn facts(drawing: &Drawing, sink: &mut Sink) {
                 format!("no `density`: taken as massless ({elements})"),
                 "modes and transients need the layer's `density` [kg/m³]",
             ),
+            Fact::OddModulus => (
+                "W008",
+                format!("`Youngsmodulus` = {number} Pa is that of no solid ({elements})"),
+                "it is in pascals: polysilicon has 160e9",
+            ),
             Fact::SmallConductivity => (
                 "W034",
                 format!("the layer's `thermcond` = {number} W/(m·K) is small for a conductivity ({elements})"),
@@ -83,7 +91,7 @@ fn loose_nodes(drawing: &Drawing, connected: &[bool], sink: &mut Sink) {
         }
     }
     let loose = |i: &usize| structure.nodes[*i].mechanical && !connected[*i] && held[*i] != [true; 3];
-    for index in (0..structure.nodes.len()).filter(loose) {
+    for index in (0..structure.nodes.len()).filter(loose).take(MOST_LOOSE) {
         let name = &structure.nodes[index].name;
         let message = format!("node `{name}` is connected to nothing: no beam, link or spring holds it");
         let others = (0..structure.nodes.len()).filter(|&i| connected[i]).map(|i| structure.nodes[i].name.as_str());

@@ -2,6 +2,7 @@
 
 use super::source::Span;
 use crate::structure::{Beam, Node, NodeId, Structure};
+use std::collections::HashSet;
 
 /// How one element fixes the positions of its nodes relative to each other.
 #[derive(Debug, Clone)]
@@ -33,6 +34,8 @@ pub(crate) enum Fact {
     AmbientZero,
     /// Beams or plates without a density.
     NoDensity,
+    /// A Young's modulus that is no solid's, as in GPa by mistake.
+    OddModulus,
     /// A layer's thermal conductivity is too small to be one.
     SmallConductivity,
     /// Capacitors, which are open in statics and are left out.
@@ -56,6 +59,9 @@ pub(crate) struct Drawing {
     pub(crate) unmeasured: Vec<Unmeasured>,
     /// In order of appearance.
     pub(crate) facts: Vec<Noted>,
+    /// Nodes at electrical ground, and names of ports, so far.
+    pub(crate) grounded: HashSet<NodeId>,
+    pub(crate) port_names: HashSet<String>,
     /// Where each node was first named.
     pub(crate) first_named: Vec<Span>,
 }

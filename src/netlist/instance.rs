@@ -94,6 +94,7 @@ impl<'p> Elaborator<'p> {
                 let values = layer.map_or_else(|| Ok(Rc::new(Vec::new())), |layer| self.layer(layer))?;
                 let instance = Instance {
                     name: format!("{}{local}", self.here().prefix),
+                    anonymous: element.name.is_none(),
                     model: &element.model.name,
                     span: element.model.span,
                     nodes,

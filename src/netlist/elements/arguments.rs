@@ -33,6 +33,8 @@ pub(crate) struct Arguments<'p> {
 pub(crate) struct Instance<'p> {
     /// Full name.
     pub(crate) name: String,
+    /// True when the netlist gives it no name.
+    pub(crate) anonymous: bool,
     pub(crate) model: &'p str,
     /// Place of the model's word.
     pub(crate) span: Span,

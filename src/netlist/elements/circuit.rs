@@ -53,7 +53,7 @@ pub(super) fn capacitor(site: &mut Site<'_, '_>) -> Result<(), Reported> {
 pub(super) fn eground(site: &mut Site<'_, '_>) -> Result<(), Reported> {
     let node = site.node(0);
     site.drawing.electrical(&[node]);
-    if !site.drawing.structure.electrical_grounds.contains(&node) {
+    if site.drawing.grounded.insert(node) {
         site.drawing.structure.electrical_grounds.push(node);
     }
     Ok(())
@@ -63,9 +63,14 @@ pub(super) fn port(site: &mut Site<'_, '_>) -> Result<(), Reported> {
     let name = site.name();
     let nodes = &site.instance.nodes;
     site.drawing.electrical(nodes);
-    if site.drawing.structure.ports.iter().any(|p| p.name == name) {
+    if !site.drawing.port_names.insert(name.clone()) {
         let message = format!("there is a port `{name}` already");
         return Err(site.error("E063", message, "a port's name is its element's name; give each its own"));
+    }
+    if site.instance.anonymous {
+        let message = format!("this port has no name: it is called `{name}`");
+        let help = "write its name before the word: `heat port * [a b] []`";
+        site.sink.warning("W009", site.instance.span, message, help);
     }
     let (plus, minus) = (nodes[0], nodes.get(1).copied());
     if minus == Some(plus) {

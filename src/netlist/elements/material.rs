@@ -9,6 +9,8 @@ use crate::structure::Material;
 const POISSON: f64 = 0.3;
 /// Film thickness of a material without damping [m]; its viscosity is 0 then, so that no number depends on it.
 const NO_FILM: f64 = 1.0;
+/// Young's moduli of structural solids, from rubber to diamond [Pa].
+const SOLID: std::ops::Range<f64> = 1e6..2e12;
 /// Permittivity of vacuum, as SUGAR's process files round it [F/m].
 pub(super) const VACUUM: f64 = 8.854e-12;
 
@@ -18,6 +20,10 @@ impl Site<'_, '_> {
         let youngs_modulus = self.positive("Youngsmodulus")?;
         let [viscosity, fluid] = self.film()?;
         let span = self.instance.span;
+        if !SOLID.contains(&youngs_modulus) {
+            let span = self.span_of("Youngsmodulus");
+            self.drawing.note_number(Fact::OddModulus, span, youngs_modulus);
+        }
         if self.number_or("straingradient", 0.0)? != 0.0 {
             self.drawing.note(Fact::StrainGradient, span);
         }
