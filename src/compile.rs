@@ -34,7 +34,14 @@ pub struct CompileOptions {
 
 impl Default for CompileOptions {
     fn default() -> Self {
-        Self { set: Vec::new(), band: None, tol: 1e-3, linear: false, undamped: false, junctions: Junctions::Centreline }
+        Self {
+            set: Vec::new(),
+            band: None,
+            tol: 1e-3,
+            linear: false,
+            undamped: false,
+            junctions: Junctions::Centreline,
+        }
     }
 }
 
@@ -71,12 +78,8 @@ pub enum CompileError {
 /// See [`CompileError`].
 pub fn compile(bundle: &Bundle, options: &CompileOptions) -> Result<Compiled, CompileError> {
     let loaded = crate::netlist::load(bundle, &options.set).map_err(CompileError::Netlist)?;
-    let choices = DiscretizeOptions {
-        band: options.band,
-        tol: options.tol,
-        linear: options.linear,
-        undamped: options.undamped,
-    };
+    let choices =
+        DiscretizeOptions { band: options.band, tol: options.tol, linear: options.linear, undamped: options.undamped };
     let parts = discretize(&loaded.structure, &choices)?;
     Ok(Compiled {
         structure: loaded.structure,

@@ -188,7 +188,8 @@ pub fn run(options: &CosimOptions) -> Result<CosimReport, CosimError> {
 
     let mut command = Command::new(&ngspice);
     command.arg("-b").env("SPICE_USERINIT_DIR", &scratch.0).env("BIMORPH_FAILURE", &failure).stdin(Stdio::null());
-    if let Some(folder) = deck.parent().and_then(|p| if p.as_os_str().is_empty() { None } else { p.canonicalize().ok() })
+    if let Some(folder) =
+        deck.parent().and_then(|p| if p.as_os_str().is_empty() { None } else { p.canonicalize().ok() })
     {
         command.env("BIMORPH_DECK_DIR", folder);
     }

@@ -57,10 +57,8 @@ pub fn modes(compiled: &Compiled, count: usize, voltages: &PortVoltages) -> Resu
 /// Displacements of the nodes in a mode, the largest translation scaled to 1.
 fn shape(compiled: &Compiled, q: &[Pose], x: &[Pose]) -> Vec<(String, NodeMotion)> {
     let zeros = vec![Pose::zeros(); q.len()];
-    let (state, change) = (
-        View { q, v: &zeros, rise: &[], volts: &[] },
-        View { q: x, v: &zeros, rise: &[], volts: &[] },
-    );
+    let (state, change) =
+        (View { q, v: &zeros, rise: &[], volts: &[] }, View { q: x, v: &zeros, rise: &[], volts: &[] });
     let mut nodes: Vec<(String, NodeMotion)> = (compiled.structure.nodes.iter().zip(&compiled.parts.nodes))
         .filter_map(|(node, point)| {
             let at = |d: usize| point.map(|p| Signal::Displacement(p, d).slope(compiled, &state, &change));

@@ -42,8 +42,10 @@ impl Signal {
     /// # Errors
     /// [`AnalysisError::BadRequest`] with what would be understood.
     pub fn find(compiled: &Compiled, name: &str) -> Result<Self, AnalysisError> {
-        Self::lookup(compiled, name)
-            .ok_or_else(|| AnalysisError::BadRequest { what: format!("signal \"{name}\""), detail: hint(compiled, name) })
+        Self::lookup(compiled, name).ok_or_else(|| AnalysisError::BadRequest {
+            what: format!("signal \"{name}\""),
+            detail: hint(compiled, name),
+        })
     }
 
     fn lookup(compiled: &Compiled, name: &str) -> Option<Self> {
@@ -135,8 +137,7 @@ fn point_rate(p: Point, q: &[Pose], v: &[Pose], linear: bool) -> nalgebra::Vecto
 /// What a wrong name could have meant.
 fn hint(compiled: &Compiled, name: &str) -> String {
     let part = name.rsplit_once('.').map_or(name, |(part, _)| part);
-    let nodes: Vec<&str> =
-        compiled.structure.nodes.iter().filter(|n| n.mechanical).map(|n| n.name.as_str()).collect();
+    let nodes: Vec<&str> = compiled.structure.nodes.iter().filter(|n| n.mechanical).map(|n| n.name.as_str()).collect();
     if nodes.contains(&part) {
         return format!("\"{part}\" is a node: ask for {part}.x, .y, .rz, .vx, .vy or .vrz");
     }
@@ -146,5 +147,8 @@ fn hint(compiled: &Compiled, name: &str) -> String {
     let close = known.iter().copied().filter(|k| k.contains(part) || part.contains(*k)).take(5);
     let close: Vec<&str> = close.collect();
     let shown = if close.is_empty() { known.into_iter().take(8).collect::<Vec<_>>() } else { close };
-    format!("no node, beam or gap of that name (expected NODE.x|y|rz|vx|vy|vrz, BEAM.T, GAP.q|gap; there is {})", shown.join(", "))
+    format!(
+        "no node, beam or gap of that name (expected NODE.x|y|rz|vx|vy|vrz, BEAM.T, GAP.q|gap; there is {})",
+        shown.join(", ")
+    )
 }

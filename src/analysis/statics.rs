@@ -88,10 +88,7 @@ pub(crate) struct OperatingPoint {
 }
 
 /// The equilibrium reached from rest.
-pub(crate) fn operating_point(
-    compiled: &Compiled,
-    voltages: &PortVoltages,
-) -> Result<OperatingPoint, AnalysisError> {
+pub(crate) fn operating_point(compiled: &Compiled, voltages: &PortVoltages) -> Result<OperatingPoint, AnalysisError> {
     let system = &compiled.parts.system;
     let electrics = &system.electrics;
     let sources = source_vector(compiled, voltages)?;

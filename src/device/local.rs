@@ -213,13 +213,7 @@ impl Session {
     }
 
     /// A static trial: from the parent's equilibrium along straight lines in voltage, or from rest.
-    fn balance(
-        &mut self,
-        compiled: &Compiled,
-        request: &Trial<'_>,
-        parent: Option<&Snapshot>,
-        reply: &mut TrialReply,
-    ) {
+    fn balance(&mut self, compiled: &Compiled, request: &Trial<'_>, parent: Option<&Snapshot>, reply: &mut TrialReply) {
         let system = &compiled.parts.system;
         let electrics = &system.electrics;
         self.fill_sources(compiled, request.voltages);
@@ -253,13 +247,7 @@ impl Session {
     }
 
     /// A transient trial: the motion over dt, sensitivities along.
-    fn advance(
-        &mut self,
-        compiled: &Compiled,
-        request: &Trial<'_>,
-        parent: Option<&Snapshot>,
-        reply: &mut TrialReply,
-    ) {
+    fn advance(&mut self, compiled: &Compiled, request: &Trial<'_>, parent: Option<&Snapshot>, reply: &mut TrialReply) {
         let system = &compiled.parts.system;
         self.fill_sources(compiled, request.voltages);
         let from: Vec<f64> = match parent {
@@ -337,7 +325,9 @@ impl Session {
             let row = electrics.conductance.row(port);
             reply.currents.push(row.iter().zip(&self.sources).map(|(g, u)| g * u).sum());
             reply.di_dv.extend(self.ports.iter().map(|&other| row[other]));
-            reply.charges.push((0..gaps).map(|g| electrics.gap_rows[(g, port)] * system.capacitance(g, view.q) * view.volts[g]).sum());
+            reply.charges.push(
+                (0..gaps).map(|g| electrics.gap_rows[(g, port)] * system.capacitance(g, view.q) * view.volts[g]).sum(),
+            );
         }
         reply.outputs.extend(self.signals.iter().map(|s| s.value(compiled, &view)));
         reply.dq_dv.clear();
@@ -354,10 +344,8 @@ impl Session {
                         self.unit[port] = 1.0;
                         2.0 * electrics.heating.mixed(k, &self.sources, &self.unit)
                     }
-                    Some(from) => {
-                        Ramp { electrics, from, to: &self.sources, rise: &self.rise, dt: request.dt }
-                            .rise_sensitivity(k, request.dt, port)
-                    }
+                    Some(from) => Ramp { electrics, from, to: &self.sources, rise: &self.rise, dt: request.dt }
+                        .rise_sensitivity(k, request.dt, port),
                 };
             }
             for g in 0..gaps {

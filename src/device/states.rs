@@ -8,6 +8,8 @@ use std::sync::Arc;
 
 /// States held at most; the least recently used goes first. A circuit needs its last accepted state and its trials.
 const MOST: usize = 64;
+/// States kept when the circuit says which one it accepted.
+const KEPT: usize = 8;
 
 /// Everything the next step depends on.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -52,7 +54,7 @@ impl States {
         token
     }
 
-    /// Frees the other trials of the accepted state's parent.
+    /// Frees the other trials of the accepted state's parent, and all but the last used states.
     pub fn accept(&mut self, token: Token) {
         let Some(&(parent, _)) = self.held.get(&token) else { return };
         let rivals: Vec<Token> = (self.used.iter().copied())
@@ -62,6 +64,12 @@ impl States {
             self.held.remove(&rival);
         }
         self.used.retain(|t| self.held.contains_key(t));
+        self.touch(token);
+        while self.used.len() > KEPT {
+            if let Some(old) = self.used.pop_front() {
+                self.held.remove(&old);
+            }
+        }
     }
 
     /// Bytes that the states take, about.

@@ -63,11 +63,8 @@ fn add_masses(beam: &Beam, segments: usize, undamped: bool, points: &[Point], ri
     let h = beam.length / segments as f64;
     let unit = beam.material.density * beam.width * beam.thickness * h;
     let m = &beam.material;
-    let drag_per_mass = if undamped || m.viscosity == 0.0 {
-        0.0
-    } else {
-        m.viscosity / (m.fluid * m.density * beam.thickness)
-    };
+    let drag_per_mass =
+        if undamped || m.viscosity == 0.0 { 0.0 } else { m.viscosity / (m.fluid * m.density * beam.thickness) };
     let along = Vector2::new(beam.angle.cos(), beam.angle.sin());
     for (k, &point) in points.iter().enumerate() {
         if point.body == BodyId::Ground {

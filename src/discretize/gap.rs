@@ -65,9 +65,7 @@ fn approach(rigid: &Assembly, a: usize, b: usize, axis: [f64; 2]) -> Approach {
 pub fn centered(gap: Gap, moved: &dyn Fn(Point) -> Point) -> Gap {
     let shift = |a: Approach| Approach { a: moved(a.a), b: moved(a.b), ..a };
     match gap {
-        Gap::Single { approach, capacitor, contact } => {
-            Gap::Single { approach: shift(approach), capacitor, contact }
-        }
+        Gap::Single { approach, capacitor, contact } => Gap::Single { approach: shift(approach), capacitor, contact },
         Gap::Facing { ends: [first, second], side, facing } => {
             Gap::Facing { ends: [shift(first), shift(second)], side, facing }
         }

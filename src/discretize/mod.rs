@@ -149,9 +149,8 @@ pub fn discretize(structure: &Structure, options: &DiscretizeOptions) -> Result<
         electrics,
         length_scale: if scale.is_finite() { scale } else { 1e-6 },
     };
-    let nodes = (0..structure.nodes.len())
-        .map(|n| structure.nodes[n].mechanical.then(|| moved(rigid.point(n))))
-        .collect();
+    let nodes =
+        (0..structure.nodes.len()).map(|n| structure.nodes[n].mechanical.then(|| moved(rigid.point(n)))).collect();
     let beams = beams.into_iter().map(|points| points.into_iter().map(moved).collect()).collect();
     Ok(Discretized { system, nodes, beams, heaters, gap_names })
 }

@@ -46,9 +46,8 @@ pub fn lay(structure: &Structure, heated: &[usize], rigid: &Assembly) -> Result<
             .collect(),
         grounds: structure.electrical_grounds.iter().map(|n| n.0).collect(),
     };
-    let potentials = circuit
-        .solve()
-        .map_err(|e| DiscretizeError::SourceLoop { source_name: names[e.source_index].clone() })?;
+    let potentials =
+        circuit.solve().map_err(|e| DiscretizeError::SourceLoop { source_name: names[e.source_index].clone() })?;
     let driven = potentials.potential.ncols();
 
     let voltages = (structure.combs.iter().map(|c| (&c.name, &c.voltage)))
@@ -73,9 +72,8 @@ pub fn lay(structure: &Structure, heated: &[usize], rigid: &Assembly) -> Result<
             Err(own) => gap_rows[(g, own)] = 1.0,
         }
     }
-    let sink: Vec<bool> = (0..structure.nodes.len())
-        .map(|n| structure.nodes[n].mechanical && rigid.grounded(n))
-        .collect();
+    let sink: Vec<bool> =
+        (0..structure.nodes.len()).map(|n| structure.nodes[n].mechanical && rigid.grounded(n)).collect();
     let heating = Heating::new(heaters, &potentials, sources, &sink)
         .map_err(|e| DiscretizeError::NoHeatSink { beam: structure.beams[heated[e.heater]].name.clone() })?;
     let mut conductance = DMatrix::zeros(ports, sources);

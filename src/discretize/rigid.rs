@@ -25,8 +25,7 @@ impl Lump {
     pub fn add(&mut self, other: &Self, shift: Vector2<f64>, factor: f64) {
         self.amount += factor * other.amount;
         self.first += (other.first + shift * other.amount) * factor;
-        self.second +=
-            factor * (other.second + 2.0 * other.first.dot(&shift) + other.amount * shift.norm_squared());
+        self.second += factor * (other.second + 2.0 * other.first.dot(&shift) + other.amount * shift.norm_squared());
     }
 
     fn center(&self) -> Vector2<f64> {
@@ -69,8 +68,7 @@ impl Assembly {
                 anchored[root(&mut leader, support.node.0)] = true;
             }
         }
-        let position: Vec<_> =
-            structure.nodes.iter().map(|n| Vector2::new(n.position[0], n.position[1])).collect();
+        let position: Vec<_> = structure.nodes.iter().map(|n| Vector2::new(n.position[0], n.position[1])).collect();
         let mut bodies = Vec::new();
         let mut group = vec![BodyId::Ground; count];
         for node in 0..count {
@@ -102,9 +100,7 @@ impl Assembly {
     pub fn point(&self, node: usize) -> Point {
         match self.group[node] {
             BodyId::Ground => Point { body: BodyId::Ground, arm: Vector2::zeros() },
-            BodyId::Free(k) => {
-                Point { body: self.group[node], arm: self.position[node] - self.bodies[k].reference }
-            }
+            BodyId::Free(k) => Point { body: self.group[node], arm: self.position[node] - self.bodies[k].reference },
         }
     }
 
@@ -215,9 +211,7 @@ impl Assembly {
     pub fn centered(&self, point: Point, place: &[usize]) -> Point {
         match point.body {
             BodyId::Ground => point,
-            BodyId::Free(k) => {
-                Point { body: BodyId::Free(place[k]), arm: point.arm - self.bodies[k].mass.center() }
-            }
+            BodyId::Free(k) => Point { body: BodyId::Free(place[k]), arm: point.arm - self.bodies[k].mass.center() },
         }
     }
 }

@@ -47,11 +47,7 @@ impl Electrics {
 
     /// A drive of the right size, all zero, loads acting fully.
     pub fn drive(&self) -> Drive {
-        Drive {
-            volts: vec![0.0; self.gap_rows.nrows()],
-            expansion: vec![0.0; self.heating.heaters.len()],
-            load: 1.0,
-        }
+        Drive { volts: vec![0.0; self.gap_rows.nrows()], expansion: vec![0.0; self.heating.heaters.len()], load: 1.0 }
     }
 
     /// Fills in the source vector for given port voltages.
@@ -112,7 +108,8 @@ impl Ramp<'_> {
     /// Coefficients of the steady rise of heater `k` in the time since the start.
     fn parabola(&self, k: usize) -> [f64; 3] {
         let h = &self.electrics.heating;
-        let (a, b, c) = (h.mixed(k, self.from, self.from), h.mixed(k, self.from, self.to), h.mixed(k, self.to, self.to));
+        let (a, b, c) =
+            (h.mixed(k, self.from, self.from), h.mixed(k, self.from, self.to), h.mixed(k, self.to, self.to));
         [a, 2.0 * (b - a) / self.dt, (a - 2.0 * b + c) / (self.dt * self.dt)]
     }
 

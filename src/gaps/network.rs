@@ -158,7 +158,8 @@ mod tests {
     /// Two ideal sources in parallel contradict each other and are refused by index.
     #[test]
     fn parallel_sources_are_refused() {
-        let circuit = Circuit { nodes: 2, resistors: vec![], sources: vec![(0, Some(1)), (1, Some(0))], grounds: vec![1] };
+        let circuit =
+            Circuit { nodes: 2, resistors: vec![], sources: vec![(0, Some(1)), (1, Some(0))], grounds: vec![1] };
         assert_eq!(circuit.solve(), Err(SourceLoop { source_index: 1 }));
     }
 }

@@ -126,8 +126,7 @@ impl System {
                 let m = approach.measure(q, self.model.linear);
                 let (da, db) = (Model::pose(dq, approach.a.body), Model::pose(dq, approach.b.body));
                 let g = &m.gradient;
-                capacitor.at(m.value).slope
-                    * (g.fixed_rows::<3>(0).dot(&da) + g.fixed_rows::<3>(3).dot(&db))
+                capacitor.at(m.value).slope * (g.fixed_rows::<3>(0).dot(&da) + g.fixed_rows::<3>(3).dot(&db))
             }
             Gap::Facing { ends, side, facing } => {
                 let c = facing.at(&self.ends(ends, *side, q));

@@ -93,7 +93,11 @@ impl Heating {
                 }
             }
         }
-        let node_rise = if free == 0 { share } else { conduction.lu().solve(&share).unwrap_or_else(|| DMatrix::zeros(free, heaters.len())) };
+        let node_rise = if free == 0 {
+            share
+        } else {
+            conduction.lu().solve(&share).unwrap_or_else(|| DMatrix::zeros(free, heaters.len()))
+        };
         let currents: Vec<DVector<f64>> =
             heaters.iter().map(|h| potentials.difference(h.a, h.b) / h.resistance).collect();
         let mut form = vec![0.0; heaters.len() * sources * sources];
@@ -243,7 +247,8 @@ mod tests {
     /// A heater without a path for its heat is refused.
     #[test]
     fn no_sink() {
-        let h = Heater { a: 0, b: 1, resistance: 1.0, conductance: 1.0, expansion: 0.0, ambient: 0.0, time_constant: 0.0 };
+        let h =
+            Heater { a: 0, b: 1, resistance: 1.0, conductance: 1.0, expansion: 0.0, ambient: 0.0, time_constant: 0.0 };
         let circuit = Circuit { nodes: 2, resistors: vec![(0, 1, 1.0)], sources: vec![(0, Some(1))], grounds: vec![1] };
         let refused = Heating::new(vec![h], &circuit.solve().unwrap(), 1, &[false, false]);
         assert_eq!(refused, Err(NoHeatSink { heater: 0 }));

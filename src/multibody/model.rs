@@ -260,10 +260,6 @@ fn locate(pattern: &Pattern, a: BodyId, b: BodyId) -> Place {
         BodyId::Free(k) => k,
     };
     let (a, b) = (index(a), index(b));
-    let block = if a == NONE || b == NONE || a == b {
-        NONE
-    } else {
-        pattern.block(a.max(b), a.min(b)).unwrap_or(NONE)
-    };
+    let block = if a == NONE || b == NONE || a == b { NONE } else { pattern.block(a.max(b), a.min(b)).unwrap_or(NONE) };
     Place { a, b, block }
 }

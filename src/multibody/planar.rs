@@ -45,9 +45,37 @@ pub fn rotate(theta: f64, v: Vector2<f64>) -> Vector2<f64> {
 /// (R(θ) − 1)·v without cancellation at small angles.
 #[inline]
 pub fn swing(theta: f64, v: Vector2<f64>) -> Vector2<f64> {
-    let half = (0.5 * theta).sin();
-    let (less, s) = (-2.0 * half * half, theta.sin());
-    Vector2::new(less * v.x - s * v.y, s * v.x + less * v.y)
+    HalfTurn::new(theta).swing(v)
+}
+
+/// Sine and cosine of half of a body's rotation.
+#[derive(Debug, Clone, Copy)]
+struct HalfTurn {
+    sin: f64,
+    cos: f64,
+}
+
+impl HalfTurn {
+    #[inline]
+    fn new(theta: f64) -> Self {
+        let (sin, cos) = (0.5 * theta).sin_cos();
+        Self { sin, cos }
+    }
+
+    /// (R(θ) − 1)·v without cancellation at small angles.
+    #[inline]
+    fn swing(&self, v: Vector2<f64>) -> Vector2<f64> {
+        let (less, s) = (-2.0 * self.sin * self.sin, 2.0 * self.sin * self.cos);
+        Vector2::new(less * v.x - s * v.y, s * v.x + less * v.y)
+    }
+
+    /// R((θₐ + θ_b)/2)·v.
+    #[inline]
+    fn mean(&self, other: &Self, v: Vector2<f64>) -> Vector2<f64> {
+        let c = self.cos * other.cos - self.sin * other.sin;
+        let s = self.sin * other.cos + self.cos * other.sin;
+        Vector2::new(c * v.x - s * v.y, s * v.x + c * v.y)
+    }
 }
 
 /// Displacement of the point at `arm` on a body at pose `q` [m].
@@ -105,9 +133,12 @@ impl JointFrame {
     /// Exact strains at two poses. `second` is Q.
     #[inline]
     pub fn kinematics(&self, qa: &Pose, qb: &Pose, second: &Matrix2<f64>) -> JointKinematics {
-        let (ra, rb) = (rotate(qa.z, self.arm_a), rotate(qb.z, self.arm_b));
-        let opening = Vector2::new(qb.x - qa.x, qb.y - qa.y) + swing(qb.z, self.arm_b) - swing(qa.z, self.arm_a);
-        let e1 = rotate(0.5 * (qa.z + qb.z), self.axis);
+        // one sine and cosine of half an angle for each body serve everything: R − 1 of the body, and R of the mean
+        let (a, b) = (HalfTurn::new(qa.z), HalfTurn::new(qb.z));
+        let (swing_a, swing_b) = (a.swing(self.arm_a), b.swing(self.arm_b));
+        let (ra, rb) = (self.arm_a + swing_a, self.arm_b + swing_b);
+        let opening = Vector2::new(qb.x - qa.x, qb.y - qa.y) + swing_b - swing_a;
+        let e1 = a.mean(&b, self.axis);
         let e2 = turn(e1);
         let (g, p) = (opening.dot(&e2), qb.z - qa.z);
         let bent = second * Vector2::new(g, p);

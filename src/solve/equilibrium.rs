@@ -124,14 +124,7 @@ impl Equilibrium {
     }
 
     /// Puts the tangent prediction for a step from `s` into `trial` and its increment into `step`.
-    fn predict(
-        &mut self,
-        system: &System,
-        path: &dyn LoadPath,
-        s: f64,
-        ds: f64,
-        q: &[Pose],
-    ) -> Result<(), SolveError> {
+    fn predict(&mut self, system: &System, path: &dyn LoadPath, s: f64, ds: f64, q: &[Pose]) -> Result<(), SolveError> {
         path.at(s, &mut self.drive);
         path.slope(s, &mut self.slope);
         system.tangent(q, &self.drive, &mut self.tangent, &mut self.residual);
@@ -199,6 +192,7 @@ impl Equilibrium {
         done: &mut Path,
     ) -> Result<(), SolveError> {
         path.at(s, &mut self.drive);
+        self.disturb(system, q);
         // no step longer than a twentieth of the smallest gap
         let longest = 0.05 * system.length_scale;
         let mut damping = 0.0;
@@ -207,14 +201,7 @@ impl Equilibrium {
             system.tangent(q, &self.drive, &mut self.tangent, &mut self.residual);
             let first_damping = 1e-6 * mean_ratio(system, &self.tangent);
             loop {
-                if damping > 0.0 {
-                    for (j, block) in self.tangent.diagonal.iter_mut().enumerate() {
-                        let m = fall_mass(system, j);
-                        for i in 0..3 {
-                            block[(i, i)] += damping * m[i];
-                        }
-                    }
-                }
+                self.add_damping(system, damping);
                 system.model.project_matrix(&mut self.tangent);
                 let stable = matches!(self.tangent.factor(&system.model.pattern), Ok(i) if i.negative == 0);
                 if stable {
@@ -242,10 +229,56 @@ impl Equilibrium {
         Err(self.lost(system, s, done.iterations))
     }
 
+    /// Moves `q` a little along its softest direction. A bifurcation (a straight beam that buckles) leaves the system
+    /// balanced on an unstable branch, from which nothing would fall; this is the imperfection that every real part has.
+    fn disturb(&mut self, system: &System, q: &mut [Pose]) {
+        let mut damping = 0.0;
+        for _ in 0..200 {
+            system.tangent(q, &self.drive, &mut self.tangent, &mut self.residual);
+            let first = 1e-6 * mean_ratio(system, &self.tangent);
+            self.add_damping(system, damping);
+            system.model.project_matrix(&mut self.tangent);
+            if matches!(self.tangent.factor(&system.model.pattern), Ok(i) if i.negative == 0) {
+                break;
+            }
+            damping = if damping == 0.0 { first } else { 3.0 * damping };
+        }
+        // inverse iteration from a fixed vector without symmetry
+        for (j, x) in self.step.iter_mut().enumerate() {
+            let m = fall_mass(system, j);
+            *x = Pose::new(m.x, m.y * (1.0 + 0.37 * ((j * 7) % 5) as f64), m.z / system.length_scale);
+        }
+        for _ in 0..3 {
+            system.model.project(&mut self.step);
+            self.tangent.solve(&system.model.pattern, &mut self.step);
+            let scale = 1e-3 * system.length_scale / size(system, &self.step);
+            for (j, x) in self.step.iter_mut().enumerate() {
+                self.trial[j] = *x * scale;
+                *x = fall_mass(system, j).component_mul(&self.trial[j]);
+            }
+        }
+        if self.trial.iter().all(|x| x.iter().all(|v| v.is_finite())) {
+            for (q, x) in q.iter_mut().zip(&self.trial) {
+                *q += x;
+            }
+        }
+    }
+
+    /// `tangent += damping · mass-like weights`.
+    fn add_damping(&mut self, system: &System, damping: f64) {
+        if damping > 0.0 {
+            for (j, block) in self.tangent.diagonal.iter_mut().enumerate() {
+                let m = fall_mass(system, j);
+                for i in 0..3 {
+                    block[(i, i)] += damping * m[i];
+                }
+            }
+        }
+    }
+
     fn lost(&self, system: &System, share: f64, iterations: usize) -> SolveError {
-        let worst = (0..self.residual.len()).max_by(|&a, &b| {
-            self.residual[a].amax().total_cmp(&self.residual[b].amax())
-        });
+        let worst =
+            (0..self.residual.len()).max_by(|&a, &b| self.residual[a].amax().total_cmp(&self.residual[b].amax()));
         let worst = worst.unwrap_or(0);
         SolveError::Lost {
             share,

@@ -35,15 +35,12 @@ impl Harmonic {
     ///
     /// # Errors
     /// [`SolveError::Singular`] at an undamped resonance.
-    pub fn factor(
-        &mut self,
-        system: &System,
-        stiffness: &BlockMatrix<f64, 3>,
-        omega: f64,
-    ) -> Result<(), SolveError> {
+    pub fn factor(&mut self, system: &System, stiffness: &BlockMatrix<f64, 3>, omega: f64) -> Result<(), SolveError> {
         let model = &system.model;
-        let blend = |k: &nalgebra::Matrix3<f64>, c: &nalgebra::Matrix3<f64>| k.zip_map(c, |k, c| Complex::new(k, omega * c));
-        for (out, (k, c)) in self.matrix.diagonal.iter_mut().zip(stiffness.diagonal.iter().zip(&self.damping.diagonal)) {
+        let blend =
+            |k: &nalgebra::Matrix3<f64>, c: &nalgebra::Matrix3<f64>| k.zip_map(c, |k, c| Complex::new(k, omega * c));
+        for (out, (k, c)) in self.matrix.diagonal.iter_mut().zip(stiffness.diagonal.iter().zip(&self.damping.diagonal))
+        {
             *out = blend(k, c);
         }
         for (out, (k, c)) in self.matrix.below.iter_mut().zip(stiffness.below.iter().zip(&self.damping.below)) {

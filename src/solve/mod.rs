@@ -32,7 +32,9 @@ pub enum SolveError {
         direction: &'static str,
     },
     /// Load steps became too small and no other equilibrium was found.
-    #[error("equilibrium lost at {share:.6} of the load after {iterations} iterations (residual {residual:.3e} at \"{body}\")")]
+    #[error(
+        "equilibrium lost at {share:.6} of the load after {iterations} iterations (residual {residual:.3e} at \"{body}\")"
+    )]
     Lost {
         /// Share of the load path that was reached [1].
         share: f64,
@@ -44,7 +46,9 @@ pub enum SolveError {
         body: String,
     },
     /// The integrator's steps became too small.
-    #[error("step size fell to {dt:.3e} s at {t:.6e} s after {rejected} rejections in a row; worst body \"{body}\" in {direction}")]
+    #[error(
+        "step size fell to {dt:.3e} s at {t:.6e} s after {rejected} rejections in a row; worst body \"{body}\" in {direction}"
+    )]
     StepTooSmall {
         /// Time reached since the start of the step [s].
         t: f64,
@@ -64,9 +68,6 @@ pub const DIRECTIONS: [&str; 3] = ["along x", "along y", "about z"];
 
 impl SolveError {
     pub(crate) fn singular(system: &crate::gaps::System, pivot: ZeroPivot) -> Self {
-        Self::Singular {
-            body: system.model.bodies[pivot.body].name.clone(),
-            direction: DIRECTIONS[pivot.direction],
-        }
+        Self::Singular { body: system.model.bodies[pivot.body].name.clone(), direction: DIRECTIONS[pivot.direction] }
     }
 }

@@ -150,7 +150,9 @@ impl Device for Plate {
         reply.di_dv = vec![0.0; 4];
         for n in 0..2 {
             reply.charges.push(f.capacitance[n] * v[n]);
-            reply.dq_dv.extend((0..2).map(|k| v[n] * f.gradient[n] * dx[k] + if n == k { f.capacitance[n] } else { 0.0 }));
+            reply
+                .dq_dv
+                .extend((0..2).map(|k| v[n] * f.gradient[n] * dx[k] + if n == k { f.capacitance[n] } else { 0.0 }));
         }
         reply.outputs = vec![state.x];
         reply.doutputs_dv = dx.to_vec();

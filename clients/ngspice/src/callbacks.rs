@@ -186,8 +186,7 @@ fn register(key: usize, instance: Instance) {
     registry.epochs += 1;
     registry.stopped = false;
     trace::line(format_args!("open {} epoch {} {:?}", instance.name(), registry.epochs, instance.description()));
-    let entry =
-        Entry { key, epoch: registry.epochs, instance, voltages: Vec::new(), previous: History::default() };
+    let entry = Entry { key, epoch: registry.epochs, instance, voltages: Vec::new(), previous: History::default() };
     match registry.entries.iter_mut().find(|e| e.key == key) {
         Some(old) => *old = entry,
         None => registry.entries.push(entry),

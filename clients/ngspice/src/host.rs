@@ -108,9 +108,7 @@ pub(crate) unsafe fn reserve(doubles: usize) {
 /// To be called from within a load.
 pub(crate) unsafe fn memory(point: c_int) -> *mut f64 {
     // SAFETY: as above; the memory is an array of doubles.
-    unsafe {
-        CORE.function::<unsafe extern "C" fn(c_int, c_int) -> *mut c_void>(slot::ANALOG_GET_PTR)(0, point).cast()
-    }
+    unsafe { CORE.function::<unsafe extern "C" fn(c_int, c_int) -> *mut c_void>(slot::ANALOG_GET_PTR)(0, point).cast() }
 }
 
 /// Prints a message, with the name of the instance, where this host prints.

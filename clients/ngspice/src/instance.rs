@@ -206,7 +206,9 @@ impl Instance {
             }
             // The host shortens the step and asks again, by as much as it takes.
             Status::NeedDt(_) if step > HOPELESS * self.longest => return Outcome::Retry,
-            Status::NeedDt(bound) => format!("the model needs steps below {bound:e} s, and even {step:e} s is too long"),
+            Status::NeedDt(bound) => {
+                format!("the model needs steps below {bound:e} s, and even {step:e} s is too long")
+            }
             Status::Fail(why) => why.clone(),
         };
         self.failures += 1;
@@ -226,8 +228,7 @@ impl Instance {
         if let Some(h) = dt {
             let companion = Companion::new(h, previous.step);
             for (n, current) in answer.currents.iter_mut().enumerate() {
-                *current +=
-                    companion.current(reply.charges[n], previous.charges[n], previous.charges_before[n]);
+                *current += companion.current(reply.charges[n], previous.charges[n], previous.charges_before[n]);
             }
             for (g, c) in answer.conductances.iter_mut().zip(&reply.dq_dv) {
                 *g += companion.slope * c;

@@ -46,13 +46,17 @@ pub struct Layout {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 pub enum LayoutError {
     /// The host wrote no sizes, or at no known place.
-    #[error("this ngspice has an unknown device table (instance size field at byte {offset:?}); known are ngspice 39 to 47")]
+    #[error(
+        "this ngspice has an unknown device table (instance size field at byte {offset:?}); known are ngspice 39 to 47"
+    )]
     Table {
         /// Where the size was found [byte].
         offset: Option<usize>,
     },
     /// The host's instances have a size that no known version has.
-    #[error("this ngspice has code model instances of {size} bytes; known are 152 (39 to 41), 160 (42 to 46) and 224 (47)")]
+    #[error(
+        "this ngspice has code model instances of {size} bytes; known are 152 (39 to 41), 160 (42 to 46) and 224 (47)"
+    )]
     Instance {
         /// Size of an instance [byte].
         size: i32,

@@ -124,8 +124,9 @@ fn compiled(file: &str, bundle: Bundle, options: &CompileOptions) -> Result<Arc<
     if let Some(kept) = models.iter().find(|k| k.bundle == bundle && k.options == *options) {
         return Ok(Arc::clone(&kept.model));
     }
-    let model =
-        compile(&bundle, options).map_err(|source| OpenError::Compile { file: file.to_owned(), source }).map(Arc::new)?;
+    let model = compile(&bundle, options)
+        .map_err(|source| OpenError::Compile { file: file.to_owned(), source })
+        .map(Arc::new)?;
     if models.len() == KEPT {
         models.remove(0);
     }

@@ -59,13 +59,8 @@ static MONITOR_KINDS: Kinds = Kinds([port::VOLTAGE, port::DIFF_VOLTAGE], [c"v".a
 fn declarations() -> &'static Declarations {
     static DECLARATIONS: OnceLock<Declarations> = OnceLock::new();
     DECLARATIONS.get_or_init(|| {
-        let zero = Bound42 {
-            flag: 0,
-            integer: 0,
-            real: 0.0,
-            complex: Complex { re: 0.0, im: 0.0 },
-            string: std::ptr::null(),
-        };
+        let zero =
+            Bound42 { flag: 0, integer: 0, real: 0.0, complex: Complex { re: 0.0, im: 0.0 }, string: std::ptr::null() };
         let none = Value { complex: Complex { re: 0.0, im: 0.0 } };
         // Lists are declared to code models as single values: only so may one be left out, and have any length. The
         // SPICE half of the declaration, by which the line is parsed, says that they are lists.

@@ -1,8 +1,8 @@
 //! The plug-in in ngspice, with a device whose answers are known in closed form: the same plate is written once in
 //! Rust behind the plug-in (`examples/analytic.rs`) and once with ngspice's own B-sources.
 
-use bimorph::cosim::{CosimError, CosimOptions};
 use crate::support::{analytic_deck, analytic_plugin, complex, complex_deviation, deviation, real, run, skipped};
+use bimorph::cosim::{CosimError, CosimOptions};
 
 fn options(deck: &str) -> CosimOptions {
     CosimOptions { deck: analytic_deck(deck), plugin: Some(analytic_plugin()), ..CosimOptions::default() }

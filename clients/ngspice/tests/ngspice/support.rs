@@ -7,7 +7,6 @@ use std::path::{Path, PathBuf};
 /// A deck's run: every plot of its raw file.
 pub(crate) struct Run {
     pub(crate) plots: Vec<Table>,
-
 }
 
 /// True, and said aloud, where ngspice is missing.

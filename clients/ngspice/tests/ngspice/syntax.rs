@@ -7,10 +7,11 @@ use bimorph::cosim::{self, CosimError, CosimOptions};
 fn refused(parameters: &str, instance: &str) -> Option<String> {
     let folder = tempfile::tempdir().unwrap();
     let deck = folder.path().join("deck.cir");
-    let text = format!("* syntax\nVd d 0 1\nVs s 0 1\n{instance}\nR1 x 0 1k\n.model m bimorph({parameters})\n.op\n.print op v(d)\n.end\n");
+    let text = format!(
+        "* syntax\nVd d 0 1\nVs s 0 1\n{instance}\nR1 x 0 1k\n.model m bimorph({parameters})\n.op\n.print op v(d)\n.end\n"
+    );
     std::fs::write(&deck, text).unwrap();
-    let options =
-        CosimOptions { deck, plugin: Some(analytic_plugin()), capture: true, ..CosimOptions::default() };
+    let options = CosimOptions { deck, plugin: Some(analytic_plugin()), capture: true, ..CosimOptions::default() };
     match cosim::run(&options) {
         Ok(_) => None,
         Err(CosimError::Stopped { reason, .. }) => Some(reason),
@@ -29,7 +30,10 @@ fn accepted_forms() {
     }
     for (parameters, instance) in [
         (r#"file="plate" ports=["drive" "sense"] monitors=["plate.x:1e6"]"#, PLAIN),
-        (r#"file="plate" monitors=["plate.x"] set=["w=2.1u" "F=0"] tol=1e-4 band=1e6 linear=true undamped=true"#, PLAIN),
+        (
+            r#"file="plate" monitors=["plate.x"] set=["w=2.1u" "F=0"] tol=1e-4 band=1e6 linear=true undamped=true"#,
+            PLAIN,
+        ),
         (r#"file="plate" monitors=["plate.x"] set=["w:2.1u" "mode:fast"] deadline=2"#, PLAIN),
         (r#"file="plate""#, "A1 %gd [d 0 s 0] null m\nR2 x d 1k"),
         (r#"file="plate""#, "A1 %g [d s] null m\nR2 x d 1k"),
@@ -49,10 +53,18 @@ fn refusals() {
     for (parameters, instance, want) in [
         (r#"monitors=["plate.x"]"#, PLAIN, "the .model line names no netlist; write file=\"NAME.net\""),
         (r#"file="plate" monitors=["plate.y"]"#, PLAIN, "\"plate\": no signal named \"plate.y\"; there is plate.x"),
-        (r#"file="plate" ports=["a"] monitors=["plate.x"]"#, PLAIN, "ports: the .model line names 1, but the instance connects 2"),
+        (
+            r#"file="plate" ports=["a"] monitors=["plate.x"]"#,
+            PLAIN,
+            "ports: the .model line names 1, but the instance connects 2",
+        ),
         (r#"file="plate""#, PLAIN, "monitors: the .model line names 0, but the instance connects 1"),
         (r#"file="plate" monitors=["plate.x"] tol=-1"#, PLAIN, "tol=-1 must be positive"),
-        (r#"file="plate" monitors=["plate.x"] set=["w"]"#, PLAIN, "set: \"w\" has no value; write set=[\"NAME=VALUE\" …]"),
+        (
+            r#"file="plate" monitors=["plate.x"] set=["w"]"#,
+            PLAIN,
+            "set: \"w\" has no value; write set=[\"NAME=VALUE\" …]",
+        ),
     ] {
         assert_eq!(refused(parameters, instance), Some(format!("{head}{want}")), "{parameters}");
     }
@@ -80,7 +92,6 @@ fn nothing_to_run() {
     let folder = tempfile::tempdir().unwrap();
     let deck = folder.path().join("deck.cir");
     std::fs::write(&deck, "* silent\nV1 a 0 1\nR1 a 0 1\n.tran 1u 10u\n.end\n").unwrap();
-    let options =
-        CosimOptions { deck, plugin: Some(analytic_plugin()), capture: true, ..CosimOptions::default() };
+    let options = CosimOptions { deck, plugin: Some(analytic_plugin()), capture: true, ..CosimOptions::default() };
     assert!(matches!(cosim::run(&options), Err(CosimError::NothingRun { .. })));
 }

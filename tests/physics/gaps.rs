@@ -1,0 +1,95 @@
+//! Combs, plates and facing beams.
+
+use crate::{balance, close, model, node};
+use bimorph::analysis::modes::modes;
+use bimorph::analysis::pull_in::pull_in;
+use bimorph::compile::CompileOptions;
+
+/// k = 1 N/m, m = 1e-10 kg, A = 1e-8 m², g = 2 µm.
+pub(crate) const PLATE: &str = "
+    anchor * [f] [l=1u w=1u h=1u]
+    mass2d * [m] [m=1e-10]
+    guide2d * [m] []
+    spring2d * [f m] [kx=1]
+    anchor * [e] [l=1u w=1u h=1u]
+    gap plategap2d * [m e] [A=1e-8 gap=2u]
+    eground * [e] []
+    drive port * [m e] []";
+
+/// Static pull-in of a lumped plate at √(8kg³/27εA) (Nathanson 1967), located to 1e-6; before it, the equilibrium solves
+/// kx = εAV²/2(g−x)².
+#[test]
+fn plate_pull_in() {
+    let compiled = model(PLATE, &CompileOptions::default());
+    let exact = (8.0 * 8e-18 / (27.0 * 8.854e-12 * 1e-8f64)).sqrt();
+    let found = pull_in(&compiled, None, 20.0).unwrap();
+    close(found.pull_in_v, exact, 1e-6);
+    let release = found.release_v.unwrap();
+    assert!(release < 0.5 * exact, "{release}");
+    for volts in [1.0, 4.0, 5.17] {
+        let x = node(&balance(&compiled, &[("drive", volts)]), "m").x;
+        close(x, 8.854e-12 * 1e-8 * volts * volts / (2.0 * (2e-6 - x).powi(2)), 1e-9);
+    }
+}
+
+/// Beyond pull-in the static analysis says so and shows the closed gap, not a number on the lost branch.
+#[test]
+fn beyond_pull_in_the_gap_is_closed() {
+    let result = balance(&model(PLATE, &CompileOptions::default()), &[("drive", 5.5)]);
+    assert!(result.pulled_in);
+    let distance = 2e-6 - node(&result, "m").x;
+    assert!((0.05e-6..0.1e-6).contains(&distance), "{distance:e}");
+}
+
+/// The bias softens the spring: ω² = (k − εAV²/(g−x)³)/m at 4 V.
+#[test]
+fn bias_softens_the_resonance() {
+    let compiled = model(PLATE, &CompileOptions::default());
+    let volts = [("drive".to_owned(), 4.0)];
+    let x = node(&balance(&compiled, &[("drive", 4.0)]), "m").x;
+    let softened = 1.0 - 8.854e-12 * 1e-8 * 16.0 / (2e-6 - x).powi(3);
+    let f = modes(&compiled, 1, &volts).unwrap().frequencies_hz[0];
+    close(f, (softened / 1e-10).sqrt() / std::f64::consts::TAU, 1e-9);
+}
+
+/// A comb pulls with ½V²·Nεh/g whatever its position while it is engaged.
+#[test]
+fn comb_force() {
+    let text = "
+        anchor * [f] [l=1u w=1u h=1u]
+        mass2d * [m] [m=1e-10]
+        guide2d * [m] []
+        spring2d * [f m] [kx=2]
+        anchor * [e] [l=1u w=1u h=1u]
+        comb2de p1 [m e] [N=50 gap=2u l=10u L=30u h=2u]
+        eground * [e] []
+        drive port * [m e] []";
+    let compiled = model(text, &CompileOptions::default());
+    for volts in [10.0, 40.0] {
+        let force = 0.5 * volts * volts * 50.0 * 8.854e-12 * 2e-6 / 2e-6;
+        let result = balance(&compiled, &[("drive", volts)]);
+        let x = node(&result, "m").x;
+        close(x, force / 2.0, 1e-9);
+        close(result.charges_c[0].1, 50.0 * 8.854e-12 * (10e-6 + x) * volts, 1e-9);
+    }
+}
+
+/// Facing cantilevers with the voltage on (SUGAR's gap2d between a moving and a fixed beam) pull in, and the parallel start
+/// agrees with the work-equivalent load: tip = p·l⁴/8EI for a uniform pressure in the limit of small voltage.
+#[test]
+fn facing_beams() {
+    let text = "
+        param V=0.1
+        anchor p1 [a] [l=5u w=5u]
+        gap2d p1 [a b c d] [l=100u w1=2u w2=2u gap=2u V=V]
+        anchor p1 [c] [l=5u w=5u]
+        anchor p1 [d] [l=5u w=5u]";
+    let compiled = model(text, &CompileOptions::default());
+    let fringe = 1.0 + 1.12 * 2.0 / 2.0;
+    let line = fringe * 8.854e-12 * 2e-6 * 0.01 / (2.0 * 4e-12);
+    let ei = 165e9 * 2e-6 * 8e-18 / 12.0;
+    let tip = node(&balance(&compiled, &[]), "b").y;
+    close(tip, -line * 1e-16 / (8.0 * ei), 1e-3);
+    let found = pull_in(&compiled, None, 200.0).unwrap();
+    assert!(found.pull_in_v > 1.0 && found.pull_in_v < 200.0, "{found:?}");
+}

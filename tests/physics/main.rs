@@ -1,0 +1,43 @@
+//! What the models compute, against closed forms and published or independently computed numbers.
+
+mod beams;
+mod electrothermal;
+mod gaps;
+mod motion;
+
+use bimorph::analysis::statics::{NodeMotion, StaticResult, static_equilibrium};
+use bimorph::compile::{CompileOptions, Compiled, compile};
+use bimorph::netlist::Bundle;
+
+/// Structural polysilicon with the constants of SUGAR's MUMPs process file, 2 µm thick.
+pub(crate) const POLY: &str = "
+process p1 = [ Poisson=0.3 Youngsmodulus=165e9 density=2300 viscosity=1.78e-5 fluid=2e-6 permittivity=8.854e-12
+  sheetresistance=20 stress=0 straingradient=0 thermalexpansion=2.33e-6 ambienttemperature=293 thermcond=41 h=2u ]
+";
+
+/// Compiles [`POLY`] followed by `text`.
+pub(crate) fn model(text: &str, options: &CompileOptions) -> Compiled {
+    let bundle = Bundle::from_text("model.net", &format!("{POLY}{text}"));
+    compile(&bundle, options).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// Small displacements, as SUGAR.
+pub(crate) fn linear() -> CompileOptions {
+    CompileOptions { linear: true, ..CompileOptions::default() }
+}
+
+/// Static equilibrium with voltages on ports.
+pub(crate) fn balance(compiled: &Compiled, volts: &[(&str, f64)]) -> StaticResult {
+    let volts: Vec<(String, f64)> = volts.iter().map(|(n, v)| ((*n).to_owned(), *v)).collect();
+    static_equilibrium(compiled, &volts).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// The motion of one node.
+pub(crate) fn node(result: &StaticResult, name: &str) -> NodeMotion {
+    result.nodes.iter().find(|(n, _)| n == name).unwrap_or_else(|| panic!("no node {name}")).1
+}
+
+/// Asserts `got` within `relative` of `want`.
+pub(crate) fn close(got: f64, want: f64, relative: f64) {
+    assert!((got / want - 1.0).abs() <= relative, "got {got:e}, want {want:e} within {relative:e}");
+}
