@@ -14,9 +14,9 @@ use std::rc::Rc;
 
 /// Blocks, conditions, loops and instances together may nest this deep while running: bounds the stack.
 const DEEPEST_RUN: usize = 400;
-/// Statements that one netlist may run: loops and recursion end here instead of never.
-const MOST_STATEMENTS: usize = 20_000_000;
-/// Elements and subnet instances that one netlist may build.
+/// Statements, operators and values that one netlist may run: loops and recursion end here instead of never.
+const MOST_STEPS: usize = 50_000_000;
+/// Elements and subnet instances that one netlist may build; nodes it may name.
 const MOST_ELEMENTS: usize = 300_000;
 
 /// A layer's entries, evaluated: its own before its parent's.
@@ -45,7 +45,8 @@ pub(crate) struct Elaborator<'p> {
     parameters: Vec<(String, Setting)>,
     /// Full names given so far, without the anonymous ones.
     pub(super) names: HashSet<String>,
-    statements: usize,
+    /// Statements and expressions run so far.
+    pub(super) steps: usize,
     pub(super) elements: usize,
     depth: usize,
     pub(super) stopped: bool,
@@ -73,7 +74,7 @@ impl<'p> Elaborator<'p> {
             drawing: Drawing::default(),
             parameters: Vec::new(),
             names: HashSet::new(),
-            statements: 0,
+            steps: 0,
             elements: 0,
             depth: 0,
             stopped: false,
@@ -166,15 +167,16 @@ impl<'p> Elaborator<'p> {
         }
     }
 
-    /// Counts a statement; false once the netlist has run too many.
+    /// Counts a statement; false once the netlist has run or built too much.
     fn may_go_on(&mut self) -> bool {
-        self.statements += 1;
-        if !self.stopped && (self.statements > MOST_STATEMENTS || self.elements > MOST_ELEMENTS) {
+        self.steps += 1;
+        let built = self.elements.max(self.drawing.structure.nodes.len());
+        if !self.stopped && (self.steps > MOST_STEPS || built > MOST_ELEMENTS) {
             self.stopped = true;
-            let message = if self.elements > MOST_ELEMENTS {
-                format!("the netlist builds more than {MOST_ELEMENTS} elements")
+            let message = if built > MOST_ELEMENTS {
+                format!("the netlist builds more than {MOST_ELEMENTS} elements or nodes")
             } else {
-                format!("the netlist runs more than {MOST_STATEMENTS} statements")
+                format!("the netlist runs more than {MOST_STEPS} steps")
             };
             self.sink.error("E046", Span::NOWHERE, message, "look for a loop or a subnet without end");
         }

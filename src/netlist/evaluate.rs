@@ -12,6 +12,7 @@ pub(crate) const PI_SLOT: Slot = Slot { global: true, index: 0 };
 
 impl<'p> Elaborator<'p> {
     pub(super) fn evaluate(&mut self, expr: &'p Expr) -> Result<Value, Reported> {
+        self.steps += 1;
         match &expr.kind {
             ExprKind::Number(x) => Ok(Value::Number(*x)),
             ExprKind::Text(text) => Ok(Value::Text(text.clone())),
