@@ -1,0 +1,54 @@
+"""Generates ``bimorph.v1`` from the repository's .proto files: by the build, or as ``python generate.py``.
+
+Nothing generated is kept in the repository. A source distribution carries the generated files instead of the .proto
+files, and then there is nothing left to do.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+PROTO = HERE.parent.parent / "proto"
+OUT = HERE / "src"
+PACKAGE = OUT / "bimorph" / "v1"
+
+
+def generate() -> None:
+    """Writes ``src/bimorph/v1``."""
+    sources = sorted(PROTO.glob("bimorph/v1/*.proto"))
+    if not sources:
+        if (PACKAGE / "service_pb2_grpc.py").exists():
+            return
+        raise RuntimeError(f"no .proto files in {PROTO}, and no generated code in {PACKAGE}")
+    from grpc_tools import protoc
+
+    PACKAGE.mkdir(parents=True, exist_ok=True)
+    options = [f"--python_out={OUT}", f"--pyi_out={OUT}", f"--grpc_python_out={OUT}"]
+    code = protoc.main(["protoc", f"-I{PROTO}", *options, *map(str, sources)])
+    if code != 0:
+        raise RuntimeError(f"protoc failed with code {code}")
+    (PACKAGE / "__init__.py").write_text('"""Generated messages and stubs of the protocol."""\n')
+    for source in sources:
+        # Only one file has a service; the stubs of the others are empty.
+        if source.stem != "service":
+            (PACKAGE / f"{source.stem}_pb2_grpc.py").unlink(missing_ok=True)
+
+
+try:
+    from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+except ImportError:
+    pass
+else:
+
+    class GenerateHook(BuildHookInterface):
+        """Runs before a wheel or source distribution is put together."""
+
+        def initialize(self, version: str, build_data: dict) -> None:
+            """Generates the code."""
+            generate()
+
+
+if __name__ == "__main__":
+    sys.exit(generate())

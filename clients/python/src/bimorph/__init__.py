@@ -1,0 +1,62 @@
+"""Client of the Bimorph device-model server.
+
+``Client`` talks to a server, ``Model`` is a compiled netlist on it, ``Session`` one device with states that a circuit
+or a test bench steps. ``serve()`` starts a server for the time of a ``with`` block. All quantities are SI: m, rad, s,
+V, A, C, K, Hz.
+"""
+
+from .client import Client, Model
+from .errors import (
+    BimorphError,
+    Diagnostic,
+    InvalidRequest,
+    LimitExceeded,
+    NetlistError,
+    NoResult,
+    NotFound,
+    StepFailed,
+    Unavailable,
+    Violation,
+)
+from .netlist import Netlist
+from .results import (
+    ModesResult,
+    NodeMotion,
+    PullInResult,
+    StaticResult,
+    TransientResult,
+    TrialReply,
+)
+from .server import Server, serve
+from .session import Session
+from .sweep import Modes, PullIn, Row, Static, Table
+
+__all__ = [
+    "BimorphError",
+    "Client",
+    "Diagnostic",
+    "InvalidRequest",
+    "LimitExceeded",
+    "Model",
+    "Modes",
+    "ModesResult",
+    "Netlist",
+    "NetlistError",
+    "NoResult",
+    "NodeMotion",
+    "NotFound",
+    "PullIn",
+    "PullInResult",
+    "Row",
+    "Server",
+    "Session",
+    "Static",
+    "StaticResult",
+    "StepFailed",
+    "Table",
+    "TransientResult",
+    "TrialReply",
+    "Unavailable",
+    "Violation",
+    "serve",
+]

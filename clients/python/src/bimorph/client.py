@@ -1,0 +1,263 @@
+"""A server, and the models compiled on it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from types import TracebackType
+from typing import Any
+
+from . import sweep as sweeps
+from .channel import Channel
+from .errors import Diagnostic, InvalidRequest, NetlistError, Unavailable
+from .netlist import Netlist
+from .results import ModesResult, NodeMotion, PullInResult, StaticResult, TransientResult
+from .session import Session
+from .v1 import analysis_pb2, model_pb2, sweep_pb2
+
+Voltages = Mapping[str, float]
+"""Port voltages by name [V]; ports not named are at 0 V."""
+
+
+class Client:
+    """A server.
+
+    ``address`` is ``unix:///path`` or ``host:port``. ``timeout`` [s] bounds each unary call. The connection is made when
+    it is first needed, again in each process: a client may be used after a fork, and sent to worker processes.
+    """
+
+    def __init__(self, address: str, timeout: float = 120.0) -> None:
+        self._channel = Channel(address, timeout)
+
+    @property
+    def address(self) -> str:
+        """Address as given."""
+        return self._channel.address
+
+    def version(self) -> str:
+        """Version of the server."""
+        return str(self._channel.call("Info", model_pb2.InfoRequest()).version)
+
+    def compile(
+        self,
+        netlist: str | os.PathLike[str] | Netlist,
+        *,
+        set: Mapping[str, float | str] | None = None,
+        band: float | None = None,
+        tol: float | None = None,
+        linear: bool = False,
+        undamped: bool = False,
+        junctions: str = "",
+        include: Iterable[str | os.PathLike[str]] = (),
+    ) -> Model:
+        """Compiles a netlist (a path, or a :class:`Netlist`).
+
+        ``set`` overrides netlist parameters [SI]. ``band`` is the highest frequency to resolve [Hz], ``tol`` the relative
+        error aimed at [1], ``linear`` small displacements about the drawn geometry, ``undamped`` leaves out gas damping.
+
+        Raises :class:`NetlistError` with all diagnostics.
+        """
+        bundle = _bundle(netlist, include)
+        options = _options(set or {}, band, tol, linear, undamped, junctions)
+        request = model_pb2.CompileRequest(bundle=bundle, options=options)
+        try:
+            answer = self._channel.call("Compile", request)
+        except InvalidRequest as error:
+            # A status has no room for many diagnostics; Check gives all of them, as data.
+            checked = self._channel.call("Check", model_pb2.CheckRequest(bundle=bundle, options=options))
+            if checked.ok:
+                raise
+            diagnostics = [_diagnostic(d) for d in checked.diagnostics]
+            raise NetlistError(checked.rendered, error.violations, diagnostics) from None
+        return Model(self._channel, answer.model)
+
+    def sweep(
+        self,
+        netlist: str | os.PathLike[str] | Netlist,
+        parameters: Mapping[str, Sequence[float | str]],
+        analysis: sweeps.Analysis,
+        *,
+        set: Mapping[str, float | str] | None = None,
+        band: float | None = None,
+        tol: float | None = None,
+        linear: bool = False,
+        undamped: bool = False,
+        junctions: str = "",
+        include: Iterable[str | os.PathLike[str]] = (),
+        shard: tuple[int, int] = (0, 1),
+        progress: Callable[[int, int], object] | None = None,
+    ) -> sweeps.Table:
+        """Runs ``analysis`` on the full grid of ``parameters`` (netlist parameters [SI]), on all cores of the server.
+
+        ``shard`` (i, n) runs only points whose number modulo n is i. ``progress`` is told (points done, points).
+        """
+        request = sweep_pb2.SubmitSweepRequest(
+            bundle=_bundle(netlist, include),
+            options=_options(set or {}, band, tol, linear, undamped, junctions),
+            spec=sweeps.to_wire(parameters, analysis, shard),
+        )
+        return sweeps.run(self._channel, request, progress)
+
+    def close(self) -> None:
+        """Closes the connection. The client may be used again."""
+        self._channel.close()
+
+    def __enter__(self) -> Client:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {"address": self._channel.address, "timeout": self._channel.timeout}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self._channel = Channel(state["address"], state["timeout"])
+
+
+class Model:
+    """A compiled netlist on a server. Make one with :meth:`Client.compile`."""
+
+    def __init__(self, channel: Channel, description: Any) -> None:
+        self._channel = channel
+        self.id: str = description.id
+        """Hash of text and options."""
+        self.ports: tuple[str, ...] = tuple(description.ports)
+        """Ports, in netlist order."""
+        self.nodes: tuple[str, ...] = tuple(description.nodes)
+        """Mechanical nodes. Signals are ``NODE.x`` [m], ``NODE.y`` [m], ``NODE.rz`` [rad], and their rates."""
+        self.unknowns: int = description.unknowns
+        """Mechanical unknowns."""
+        self.parameters: dict[str, float | str] = {p.name: _setting_value(p) for p in description.parameters}
+        """Netlist parameters with the values they took [SI]."""
+        self.warnings: tuple[Diagnostic, ...] = tuple(_diagnostic(d) for d in description.warnings)
+        """Warnings of the netlist."""
+
+    def __repr__(self) -> str:
+        return f"Model({self.id[:8]}…, ports={list(self.ports)}, {self.unknowns} unknowns)"
+
+    def static(self, voltages: Voltages | None = None) -> StaticResult:
+        """Static equilibrium reached from rest at these port voltages [V]."""
+        request = analysis_pb2.StaticRequest(model=self.id, voltages=_named(voltages))
+        answer = self._channel.call("Static", request)
+        return StaticResult(
+            nodes={n.name: NodeMotion(n.x, n.y, n.rz) for n in answer.nodes},
+            temperatures_k=_dict(answer.temperatures_k),
+            currents_a=_dict(answer.currents_a),
+            charges_c=_dict(answer.charges_c),
+            pulled_in=answer.pulled_in,
+            unknowns=answer.unknowns,
+            iterations=answer.iterations,
+        )
+
+    def modes(self, count: int = 6, voltages: Voltages | None = None) -> ModesResult:
+        """The ``count`` lowest modes about the equilibrium at these port voltages [V]."""
+        request = analysis_pb2.ModesRequest(model=self.id, count=count, voltages=_named(voltages))
+        answer = self._channel.call("Modes", request)
+        shapes = [
+            {name: NodeMotion(x, y, rz) for name, x, y, rz in zip(answer.nodes, s.x, s.y, s.rz)}
+            for s in answer.shapes
+        ]
+        return ModesResult(list(answer.frequencies_hz), list(answer.residuals), shapes, answer.unknowns)
+
+    def pull_in(self, max_v: float, port: str = "") -> PullInResult:
+        """Pull-in and release voltage [V] of ``port`` (default: the first), looking up to ``max_v`` [V]."""
+        request = analysis_pb2.PullInRequest(model=self.id, port=port, max_v=max_v)
+        answer = self._channel.call("PullIn", request)
+        release = answer.release_v if answer.HasField("release_v") else None
+        return PullInResult(answer.port, answer.pull_in_v, release)
+
+    def transient(
+        self,
+        stop: float,
+        signals: Sequence[str],
+        *,
+        points: int = 201,
+        tol: float = 0.0,
+        voltages: Voltages | None = None,
+        release: Model | None = None,
+        progress: Callable[[float], object] | None = None,
+    ) -> TransientResult:
+        """Motion from 0 to ``stop`` [s] with port voltages held [V], at ``points`` equally spaced times.
+
+        ``release`` is a variant of the same netlist whose static equilibrium is the initial state; without it the part
+        starts at rest as drawn. ``tol`` is the relative error of a step [1], 0: the model's. ``progress`` is told the
+        fraction done.
+        """
+        request = analysis_pb2.TransientRequest(
+            model=self.id,
+            stop_s=stop,
+            signals=signals,
+            points=points,
+            tol=tol,
+            voltages=_named(voltages),
+            release_model=release.id if release else "",
+        )
+        t: list[float] = []
+        columns: list[list[float]] = [[] for _ in signals]
+        for event in self._channel.stream("Transient", request):
+            if progress is not None:
+                progress(event.progress)
+            if event.HasField("samples"):
+                t.extend(event.samples.t)
+                for column, more in zip(columns, event.samples.signals):
+                    column.extend(more.values)
+            if event.HasField("finished"):
+                end = event.finished
+                named = dict(zip(signals, columns))
+                units = dict(zip(signals, end.units))
+                return TransientResult(t, named, units, end.steps, end.rejected, end.unknowns)
+        raise Unavailable(f"server {self._channel.address}: the stream ended before the run did")
+
+    def session(
+        self, signals: Sequence[str] = (), ports: Sequence[str] = (), timeout: float = 60.0
+    ) -> Session:
+        """Opens a device to be stepped; use it in a ``with`` block.
+
+        ``signals`` are read with every reply. ``ports`` chooses ports and their order; those left out are held at 0 V.
+        ``timeout`` [s] bounds each call.
+        """
+        return Session(self._channel, self.id, tuple(ports), tuple(signals), timeout)
+
+
+def _bundle(netlist: str | os.PathLike[str] | Netlist, include: Iterable[str | os.PathLike[str]]) -> Any:
+    read = netlist if isinstance(netlist, Netlist) else Netlist.read(netlist, include)
+    return model_pb2.Bundle(root=read.root, files=dict(read.files))
+
+
+def _options(
+    settings: Mapping[str, float | str],
+    band: float | None,
+    tol: float | None,
+    linear: bool,
+    undamped: bool,
+    junctions: str,
+) -> Any:
+    return model_pb2.CompileOptions(
+        set=[sweeps.setting(name, value) for name, value in settings.items()],
+        band_hz=band,
+        tol=tol,
+        linear=linear,
+        undamped=undamped,
+        junctions=junctions,
+    )
+
+
+def _setting_value(setting: Any) -> float | str:
+    value: float | str = setting.number if setting.WhichOneof("value") == "number" else setting.text
+    return value
+
+
+def _diagnostic(d: Any) -> Diagnostic:
+    severity = "error" if d.severity == model_pb2.Diagnostic.SEVERITY_ERROR else "warning"
+    return Diagnostic(d.code, severity, d.file, d.line, d.column, d.message, d.help)
+
+
+def _named(voltages: Voltages | None) -> list[Any]:
+    return [analysis_pb2.Named(name=name, value=value) for name, value in (voltages or {}).items()]
+
+
+def _dict(named: Iterable[Any]) -> dict[str, float]:
+    return {n.name: n.value for n in named}

@@ -1,0 +1,111 @@
+"""Errors of the client, and how they come from gRPC statuses."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import grpc
+from google.rpc import error_details_pb2, status_pb2
+
+
+class BimorphError(Exception):
+    """Anything that went wrong, with the server's words."""
+
+
+@dataclass(frozen=True)
+class Violation:
+    """A field of a request that cannot be used."""
+
+    field: str
+    """Path of the field, or ``file:line:column`` in a netlist."""
+    description: str
+    """What is wrong, and what was expected."""
+
+
+@dataclass(frozen=True)
+class Diagnostic:
+    """A message about a place in a netlist."""
+
+    code: str
+    """Stable code such as ``E012``."""
+    severity: str
+    """``error`` or ``warning``."""
+    file: str
+    line: int
+    """From 1."""
+    column: int
+    """From 1, in characters."""
+    message: str
+    help: str
+    """A way out; may be empty."""
+
+
+class InvalidRequest(BimorphError):
+    """A request that means nothing; ``violations`` says which fields."""
+
+    def __init__(self, message: str, violations: Sequence[Violation] = ()) -> None:
+        super().__init__(message)
+        self.violations = tuple(violations)
+
+
+class NetlistError(InvalidRequest):
+    """A netlist with errors; its text is the rendered diagnostics."""
+
+    def __init__(self, message: str, violations: Sequence[Violation], diagnostics: Sequence[Diagnostic]) -> None:
+        super().__init__(message, violations)
+        self.diagnostics = tuple(diagnostics)
+
+
+class NotFound(BimorphError):
+    """A model, session, sweep or state that the server does not have (any more)."""
+
+
+class LimitExceeded(BimorphError):
+    """A request beyond a limit of the server."""
+
+
+class NoResult(BimorphError):
+    """An analysis without a result: no equilibrium, nothing pulls in, a step that failed."""
+
+
+class StepFailed(NoResult):
+    """A device that cannot take a step, however short."""
+
+
+class Unavailable(BimorphError):
+    """No server, a server that stops, or no answer in time."""
+
+
+_BY_CODE: dict[grpc.StatusCode, type[BimorphError]] = {
+    grpc.StatusCode.NOT_FOUND: NotFound,
+    grpc.StatusCode.RESOURCE_EXHAUSTED: LimitExceeded,
+    grpc.StatusCode.FAILED_PRECONDITION: NoResult,
+    grpc.StatusCode.UNAVAILABLE: Unavailable,
+    grpc.StatusCode.DEADLINE_EXCEEDED: Unavailable,
+}
+
+
+def from_rpc(error: grpc.RpcError, address: str) -> BimorphError:
+    """The error that a failed call stands for."""
+    code, text = error.code(), error.details() or ""
+    if code == grpc.StatusCode.INVALID_ARGUMENT:
+        return InvalidRequest(text, violations(error))
+    kind = _BY_CODE.get(code, BimorphError)
+    if kind is Unavailable:
+        text = f"server {address}: {text}"
+    elif kind is BimorphError:
+        text = f"{code.name.lower()}: {text}"
+    return kind(text)
+
+
+def violations(error: grpc.RpcError) -> list[Violation]:
+    """The field violations that came with a status."""
+    found = []
+    for key, value in error.trailing_metadata() or ():
+        if key == "grpc-status-details-bin":
+            for detail in status_pb2.Status.FromString(value).details:
+                bad = error_details_pb2.BadRequest()
+                if detail.Unpack(bad):
+                    found += [Violation(v.field, v.description) for v in bad.field_violations]
+    return found

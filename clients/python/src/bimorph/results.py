@@ -1,0 +1,109 @@
+"""What analyses give. All quantities are SI."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class NodeMotion:
+    """Displacement of a node from its drawn place."""
+
+    x: float
+    """[m]"""
+    y: float
+    """[m]"""
+    rz: float
+    """Rotation about z [rad]; in a mode shape [rad/m]."""
+
+
+@dataclass(frozen=True)
+class StaticResult:
+    """A static equilibrium."""
+
+    nodes: dict[str, NodeMotion]
+    """Every mechanical node, in netlist order."""
+    temperatures_k: dict[str, float]
+    """Mean temperature of every heated or prescribed beam [K]."""
+    currents_a: dict[str, float]
+    """Current into each port [A]."""
+    charges_c: dict[str, float]
+    """Charge on each port [C]."""
+    pulled_in: bool
+    """Whether the part pulled in on the way."""
+    unknowns: int
+    """Mechanical unknowns."""
+    iterations: int
+    """Newton iterations over all load steps."""
+
+
+@dataclass(frozen=True)
+class ModesResult:
+    """Undamped modes."""
+
+    frequencies_hz: list[float]
+    """Ascending [Hz]."""
+    residuals: list[float]
+    """Relative residual of each mode [1]."""
+    shapes: list[dict[str, NodeMotion]]
+    """For each mode, every node; largest translation 1."""
+    unknowns: int
+    """Mechanical unknowns."""
+
+
+@dataclass(frozen=True)
+class PullInResult:
+    """Where a gap closes and where it opens again."""
+
+    port: str
+    """What was raised."""
+    pull_in_v: float
+    """Fold on the way up [V]."""
+    release_v: float | None
+    """Where the closed gap lets go [V]; None when it stays stuck."""
+
+
+@dataclass(frozen=True)
+class TransientResult:
+    """Sampled signals."""
+
+    t: list[float]
+    """Times [s]."""
+    signals: dict[str, list[float]]
+    """Samples of each signal, in its unit."""
+    units: dict[str, str]
+    """Unit of each signal."""
+    steps: int
+    """Accepted steps."""
+    rejected: int
+    """Rejected steps."""
+    unknowns: int
+    """Mechanical unknowns."""
+
+
+@dataclass(frozen=True)
+class TrialReply:
+    """What a device answers to port voltages. Matrices are by name: ``di_dv["heat"]["sense"]``."""
+
+    token: int
+    """Names the new state; 0 when ``need_dt`` is set."""
+    t: float
+    """Time of the state [s]."""
+    currents: dict[str, float]
+    """Conduction current into each port [A]."""
+    charges: dict[str, float]
+    """Charge on each port [C]; the port current is the current plus the rate of this."""
+    di_dv: dict[str, dict[str, float]]
+    """∂current/∂voltage [S]."""
+    dq_dv: dict[str, dict[str, float]]
+    """∂charge/∂voltage [F], with the mechanical response over this step."""
+    outputs: dict[str, float]
+    """Opened signals, each in its unit."""
+    doutputs_dv: dict[str, dict[str, float]]
+    """∂output/∂voltage [unit/V]."""
+    dt_next: float
+    """Longest next step likely to be accepted [s]; infinite when the device does not care."""
+    jumped: bool
+    """A static trial passed a fold: pulled in, or let go."""
+    need_dt: float | None
+    """Set when the step was too long: ask again with at most this [s]. Nothing else holds then."""

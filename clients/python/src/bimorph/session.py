@@ -1,0 +1,210 @@
+"""One device, stepped over a stream."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import queue
+import threading
+from collections.abc import Iterator, Mapping
+from types import TracebackType
+from typing import Any
+
+import grpc
+
+from .channel import Channel
+from .errors import BimorphError, InvalidRequest, NotFound, StepFailed, Unavailable, from_rpc
+from .results import NodeMotion, TrialReply
+from .v1 import device_pb2
+
+_SHORTEST = 1e-9
+"""A step that would have to be shorter than this fraction of what was asked for has failed."""
+
+
+class Session:
+    """A device with states of its own. Make one with :meth:`Model.session`, use it in a ``with`` block.
+
+    A trial is a pure function of its parent state, its step and its voltages: trying leaves no trace, and the same trial
+    gives the same bits. ``accept`` makes a state the parent of the next trials; ``step`` does both.
+    """
+
+    def __init__(
+        self, channel: Channel, model: str, ports: tuple[str, ...], signals: tuple[str, ...], timeout: float
+    ) -> None:
+        self._channel = channel
+        self._timeout = timeout
+        self._pid = os.getpid()
+        self._requests: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self._replies: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self._call = channel.stub.Trial(self._outgoing())
+        threading.Thread(target=self._receive, args=(self._call,), daemon=True).start()
+        self.t = 0.0
+        """Time of the accepted state [s]."""
+        self.accepted: TrialReply | None = None
+        """The accepted state; None: the model at rest as drawn."""
+        self._voltages: dict[str, float] = {}
+        request = device_pb2.OpenRequest(model=model, ports=ports, signals=signals)
+        try:
+            opened = self._ask(device_pb2.DeviceRequest(open=request)).opened
+        except BaseException:
+            self.close()
+            raise
+        self.ports: tuple[str, ...] = tuple(opened.device.ports)
+        """Ports, in order."""
+        self.signals: dict[str, str] = {s.name: s.unit for s in opened.device.signals}
+        """Opened signals and their units."""
+        self.unknowns: int = opened.device.unknowns
+        """Mechanical unknowns."""
+        self._voltages = dict.fromkeys(self.ports, 0.0)
+
+    def trial(
+        self, voltages: Mapping[str, float], dt: float | None = None, *, parent: TrialReply | None = None
+    ) -> TrialReply:
+        """What the device answers at these port voltages [V]; ports not named keep their accepted voltage.
+
+        With ``dt`` [s]: the state that much later, the voltages going linearly to these. Without: the static equilibrium.
+        ``parent`` is the state to start from, by default the accepted one. A reply with ``need_dt`` asks for a shorter
+        step.
+        """
+        parent = parent or self.accepted
+        transient = dt is not None
+        t = (parent.t if parent else 0.0) + dt if dt is not None else self.t
+        request = device_pb2.TrialRequest(
+            mode=device_pb2.MODE_TRANSIENT if transient else device_pb2.MODE_STATIC,
+            parent=parent.token if parent else 0,
+            t=t,
+            dt=dt or 0.0,
+            voltages=self._vector(voltages),
+        )
+        return self._named(self._ask(device_pb2.DeviceRequest(trial=request)).trial, t)
+
+    def accept(self, reply: TrialReply, voltages: Mapping[str, float] | None = None) -> None:
+        """Makes a trial's state the one that later trials start from."""
+        if reply.need_dt is not None:
+            raise ValueError("a reply that asks for a shorter step has no state to accept")
+        self._put(device_pb2.DeviceRequest(accept=device_pb2.Accept(token=reply.token)))
+        self.accepted, self.t = reply, reply.t
+        if voltages is not None:
+            self._voltages = dict(zip(self.ports, self._vector(voltages)))
+
+    def operating_point(self, voltages: Mapping[str, float]) -> TrialReply:
+        """Static equilibrium at these port voltages [V], accepted, at t = 0."""
+        self.t = 0.0
+        reply = self.trial(voltages)
+        self.accept(reply, voltages)
+        return reply
+
+    def step(self, voltages: Mapping[str, float], dt: float) -> TrialReply:
+        """Goes ``dt`` [s] on, the voltages [V] going linearly to these, in as many steps as the device asks for."""
+        start = dict(self._voltages)
+        end = dict(zip(self.ports, self._vector(voltages)))
+        done, h = 0.0, 1.0
+        while True:
+            last = done + h >= 1.0
+            h = 1.0 - done if last else h
+            mix = {p: end[p] if last else start[p] + (end[p] - start[p]) * (done + h) for p in self.ports}
+            reply = self.trial(mix, h * dt)
+            if reply.need_dt is None:
+                self.accept(reply, mix)
+                if last:
+                    return reply
+                done += h
+                continue
+            h = min(reply.need_dt / dt, h / 2)
+            if h < _SHORTEST:
+                raise StepFailed(f"the device asks for steps below {h * dt:.3g} s at t = {self.t:.6g} s")
+
+    def linearize(self, omega: float, reply: TrialReply | None = None) -> dict[str, dict[str, complex]]:
+        """Port admittances [S] at angular frequency ``omega`` [rad/s] about a state, by default the accepted one."""
+        state = reply or self.accepted
+        if state is None:
+            raise ValueError("there is no accepted state; call operating_point first")
+        request = device_pb2.SmallSignalRequest(token=state.token, omega=omega)
+        answer = self._ask(device_pb2.DeviceRequest(linearize=request)).linearized
+        values = [complex(re, im) for re, im in zip(answer.admittance_re, answer.admittance_im)]
+        return _matrix(self.ports, self.ports, values)
+
+    def read(self, signal: str) -> float:
+        """Value of an opened signal in the accepted state, in its unit."""
+        if self.accepted is None:
+            raise ValueError("there is no accepted state; call operating_point or step first")
+        return self.accepted.outputs[signal]
+
+    def motion(self, node: str) -> NodeMotion:
+        """Displacement of a node in the accepted state; ``NODE.x``, ``.y`` and ``.rz`` must be among the signals."""
+        return NodeMotion(*(self.read(f"{node}.{axis}") for axis in ("x", "y", "rz")))
+
+    def close(self) -> None:
+        """Ends the stream; the server forgets the states."""
+        if self._pid == os.getpid():
+            self._requests.put(None)
+            self._call.cancel()
+
+    def __enter__(self) -> Session:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _vector(self, voltages: Mapping[str, float]) -> list[float]:
+        unknown = [name for name in voltages if name not in self.ports]
+        if unknown:
+            raise InvalidRequest(f"no port named {unknown[0]!r}; the session has {list(self.ports)}")
+        return [float(voltages.get(port, self._voltages[port])) for port in self.ports]
+
+    def _named(self, wire: Any, t: float) -> TrialReply:
+        if wire.status == device_pb2.TrialReply.STATUS_FAIL:
+            raise StepFailed(wire.reason)
+        need = wire.need_dt if wire.status == device_pb2.TrialReply.STATUS_NEED_DT else None
+        names = tuple(self.signals)
+        return TrialReply(
+            token=wire.token,
+            t=t,
+            currents=dict(zip(self.ports, wire.currents)),
+            charges=dict(zip(self.ports, wire.charges)),
+            di_dv=_matrix(self.ports, self.ports, wire.di_dv),
+            dq_dv=_matrix(self.ports, self.ports, wire.dq_dv),
+            outputs=dict(zip(names, wire.outputs)),
+            doutputs_dv=_matrix(names, self.ports, wire.doutputs_dv),
+            dt_next=wire.dt_next,
+            jumped=wire.jumped,
+            need_dt=need,
+        )
+
+    def _put(self, request: Any) -> None:
+        if self._pid != os.getpid():
+            raise BimorphError("a session does not survive a fork; open one in this process")
+        self._requests.put(request)
+
+    def _ask(self, request: Any) -> Any:
+        self._put(request)
+        try:
+            reply = self._replies.get(timeout=self._timeout)
+        except queue.Empty:
+            self.close()
+            raise Unavailable(f"server {self._channel.address}: no answer within {self._timeout} s") from None
+        if isinstance(reply, BimorphError):
+            self._replies.put(reply)
+            raise reply
+        if reply.WhichOneof("kind") == "fault":
+            kind = reply.fault.WhichOneof("kind")
+            raise (NotFound if kind == "unknown_token" else InvalidRequest)(reply.fault.message)
+        return reply
+
+    def _outgoing(self) -> Iterator[Any]:
+        return iter(self._requests.get, None)
+
+    def _receive(self, call: Any) -> None:
+        try:
+            for reply in call:
+                self._replies.put(reply)
+            self._replies.put(Unavailable(f"server {self._channel.address}: the stream has ended"))
+        except grpc.RpcError as error:
+            self._replies.put(from_rpc(error, self._channel.address))
+
+
+def _matrix(rows: tuple[str, ...], columns: tuple[str, ...], values: Any) -> dict[str, dict[str, Any]]:
+    flat = iter(values)
+    return {row: dict(zip(columns, itertools.islice(flat, len(columns)))) for row in rows}

@@ -1,0 +1,144 @@
+"""Sweeps: what to compute on a grid of parameters, and the table that comes back."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from .channel import Channel
+from .errors import BimorphError
+from .v1 import analysis_pb2, model_pb2, sweep_pb2
+
+
+@dataclass(frozen=True)
+class Static:
+    """Static equilibrium at each point."""
+
+    outputs: Sequence[str] = ()
+    """Columns: ``NODE.x`` [m], ``NODE.y`` [m], ``NODE.rz`` [rad], ``PORT.i`` [A], ``PORT.q`` [C], ``BEAM.T`` [K]."""
+    voltages: Mapping[str, float] = field(default_factory=dict)
+    """Port voltages [V]."""
+
+
+@dataclass(frozen=True)
+class Modes:
+    """Natural frequencies at each point: columns ``f1`` … [Hz]."""
+
+    count: int = 6
+    voltages: Mapping[str, float] = field(default_factory=dict)
+    """Port voltages of the operating point [V]."""
+
+
+@dataclass(frozen=True)
+class PullIn:
+    """Pull-in and release voltage at each point: columns ``pull_in`` and ``release`` [V]."""
+
+    max_v: float
+    """Highest voltage tried [V]."""
+    port: str = ""
+    """Port or netlist source; empty: the first."""
+
+
+Analysis = Static | Modes | PullIn
+
+
+@dataclass(frozen=True)
+class Row:
+    """One point of the grid."""
+
+    point: int
+    """Number in the full grid, from 0; the last parameter varies fastest."""
+    parameters: dict[str, float | str]
+    """Value of each parameter [SI]."""
+    results: dict[str, float]
+    """Results that exist at this point; empty when ``error`` is set."""
+    error: str
+    """Why the point has no result; empty when it has."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """Everything a sweep found, in grid order."""
+
+    parameters: list[str]
+    results: list[str]
+    units: dict[str, str]
+    """Unit of each result column."""
+    rows: list[Row]
+
+    def column(self, name: str) -> list[float | str | None]:
+        """One column; None where a point has no such value."""
+        return [row.parameters.get(name, row.results.get(name)) for row in self.rows]
+
+    def to_csv(self) -> str:
+        """CSV with the columns of ``bimorph sweep``: point, parameters, results with units, error."""
+        out = io.StringIO()
+        writer = csv.writer(out, lineterminator="\n")
+        writer.writerow(["point", *self.parameters, *(f"{r} [{self.units[r]}]" for r in self.results), "error"])
+        for row in self.rows:
+            values = [row.results.get(name, "") for name in self.results]
+            writer.writerow([row.point, *row.parameters.values(), *values, row.error])
+        return out.getvalue()
+
+
+def setting(name: str, value: float | str) -> Any:
+    """A named value as it travels."""
+    if isinstance(value, str):
+        return model_pb2.Setting(name=name, text=value)
+    return model_pb2.Setting(name=name, number=float(value))
+
+
+def to_wire(parameters: Mapping[str, Sequence[float | str]], analysis: Analysis, shard: tuple[int, int]) -> Any:
+    """A specification as it travels."""
+    axes = [
+        sweep_pb2.SweepParameter(
+            name=name, list=sweep_pb2.SettingList(values=[setting("", value) for value in values])
+        )
+        for name, values in parameters.items()
+    ]
+    spec = sweep_pb2.SweepSpec(parameters=axes, shard=shard[0], shards=shard[1])
+    if isinstance(analysis, PullIn):
+        spec.pull_in.CopyFrom(sweep_pb2.SweepPullIn(port=analysis.port, max_v=analysis.max_v))
+        return spec
+    voltages = [analysis_pb2.Named(name=name, value=value) for name, value in analysis.voltages.items()]
+    if isinstance(analysis, Static):
+        spec.static.CopyFrom(sweep_pb2.SweepStatic(outputs=analysis.outputs, voltages=voltages))
+    else:
+        spec.modes.CopyFrom(sweep_pb2.SweepModes(count=analysis.count, voltages=voltages))
+    return spec
+
+
+def run(channel: Channel, request: Any, progress: Callable[[int, int], object] | None) -> Table:
+    """Submits, watches to the end, fetches; whatever happens, the server is told to forget the sweep."""
+    sweep = channel.call("SubmitSweep", request).sweep
+    try:
+        for status in channel.stream("WatchSweep", sweep_pb2.WatchSweepRequest(sweep=sweep)):
+            if progress is not None:
+                progress(status.done, status.points)
+            if status.state in (sweep_pb2.SweepStatus.STATE_FAILED, sweep_pb2.SweepStatus.STATE_CANCELLED):
+                raise BimorphError(f"the sweep ended after {status.done} points: {status.message}")
+        return _fetch(channel, sweep)
+    finally:
+        try:
+            channel.call("CancelSweep", sweep_pb2.CancelSweepRequest(sweep=sweep))
+        except BimorphError:
+            pass
+
+
+def _fetch(channel: Channel, sweep: str) -> Table:
+    parameters: list[str] = []
+    results: list[str] = []
+    units: dict[str, str] = {}
+    rows: list[Row] = []
+    for chunk in channel.stream("FetchSweep", sweep_pb2.FetchSweepRequest(sweep=sweep)):
+        if chunk.parameters or chunk.results:
+            parameters, results = list(chunk.parameters), list(chunk.results)
+            units = dict(zip(results, chunk.units))
+        for row in chunk.rows:
+            values = [v.number if v.WhichOneof("value") == "number" else v.text for v in row.parameters]
+            present = {name: x for name, x in zip(results, row.results) if x == x}
+            rows.append(Row(row.point, dict(zip(parameters, values)), present, row.error))
+    return Table(parameters, results, units, rows)

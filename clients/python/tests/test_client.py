@@ -1,0 +1,190 @@
+"""The client against a real server. Reference numbers are the textbook's lumped plate: k, m, A, gap of conftest.PLATE."""
+
+from __future__ import annotations
+
+import math
+import multiprocessing
+import os
+import pickle
+from pathlib import Path
+
+import pytest
+from conftest import PLATE
+
+import bimorph
+
+EPS0 = 8.854e-12
+K, M, A, GAP = 1.0, 1e-10, 1e-8, 2e-6
+PULL_IN = math.sqrt(8 * K * GAP**3 / (27 * EPS0 * A))
+
+
+def closed_form(v: float) -> float:
+    """Displacement toward the fixed plate [m] where k x = ε A v² / 2 (g − x)², by bisection."""
+    low, high = 0.0, GAP / 3
+    for _ in range(200):
+        x = (low + high) / 2
+        low, high = (x, high) if K * x < EPS0 * A * v * v / (2 * (GAP - x) ** 2) else (low, x)
+    return low
+
+
+def test_a_model_describes_itself(client: bimorph.Client, plate: bimorph.Model) -> None:
+    """Ports, nodes and parameters come back by name, and the same text has the same id."""
+    assert plate.ports == ("drive",)
+    assert "m" in plate.nodes
+    assert plate.parameters == {"V": 0.0, "k": 1.0}
+    assert client.compile(bimorph.Netlist.text(PLATE, "plate.net")).id == plate.id
+    assert client.compile(bimorph.Netlist.text(PLATE, "plate.net"), set={"k": 2}).parameters["k"] == 2.0
+
+
+def test_static_follows_the_closed_form(plate: bimorph.Model) -> None:
+    """Equilibrium at 2 V, and the charge on the plates there."""
+    result = plate.static({"drive": 2.0})
+    x = closed_form(2.0)
+    assert result.nodes["m"].x == pytest.approx(x, rel=1e-6)
+    assert abs(result.charges_c["drive"]) == pytest.approx(EPS0 * A / (GAP - x) * 2.0, rel=1e-6)
+    assert not result.pulled_in
+
+
+def test_modes_and_pull_in(plate: bimorph.Model) -> None:
+    """f = √(k/m) / 2π, and V = √(8 k g³ / 27 ε A)."""
+    assert plate.modes(count=1).frequencies_hz[0] == pytest.approx(math.sqrt(K / M) / (2 * math.pi), rel=1e-9)
+    result = plate.pull_in(max_v=2 * PULL_IN)
+    assert result.pull_in_v == pytest.approx(PULL_IN, rel=1e-3)
+
+
+def test_transient_streams_its_samples(plate: bimorph.Model) -> None:
+    """Held at 1 V from rest, the plate swings about its equilibrium; progress never goes back."""
+    seen: list[float] = []
+    result = plate.transient(5e-5, ["m.x"], points=51, voltages={"drive": 1.0}, progress=seen.append)
+    assert len(result.t) == len(result.signals["m.x"]) == 51
+    assert result.units == {"m.x": "m"}
+    assert result.t[-1] == pytest.approx(5e-5)
+    assert max(result.signals["m.x"]) > closed_form(1.0)
+    assert seen == sorted(seen) and seen[-1] == 1.0
+
+
+def test_a_session_steps_and_reads(plate: bimorph.Model) -> None:
+    """A trial leaves no trace and repeats to the bit; a step moves the time; motion is read by node."""
+    with plate.session(signals=["m.x", "m.y", "m.rz"]) as session:
+        first = session.operating_point({"drive": 1.0})
+        assert session.motion("m").x == pytest.approx(closed_form(1.0), rel=1e-6)
+        assert session.signals["m.rz"] == "rad"
+        tried = session.trial({"drive": 1.5}, dt=1e-7)
+        session.trial({"drive": 0.3}, dt=2e-7)
+        assert session.trial({"drive": 1.5}, dt=1e-7) == tried
+        assert session.accepted == first
+        reply = session.step({"drive": 1.5}, dt=1e-6)
+        assert session.t == pytest.approx(1e-6)
+        assert reply.outputs["m.x"] > first.outputs["m.x"]
+        assert session.read("m.x") == reply.outputs["m.x"]
+        assert reply.dq_dv["drive"]["drive"] > 0
+
+
+def test_a_session_holds_still_at_equilibrium(plate: bimorph.Model) -> None:
+    """Steps at the voltage of the operating point do not move the plate."""
+    with plate.session(signals=["m.x"]) as session:
+        start = session.operating_point({"drive": 2.0}).outputs["m.x"]
+        for _ in range(20):
+            session.step({}, dt=1e-6)
+        assert session.read("m.x") == pytest.approx(start, rel=1e-6)
+
+
+def test_small_signals(plate: bimorph.Model) -> None:
+    """Far below resonance the admittance is jω dQ/dV of the static curve."""
+    with plate.session() as session:
+        session.operating_point({"drive": 1.0})
+        omega, h = 10.0, 1e-4
+        charge = [plate.static({"drive": v}).charges_c["drive"] for v in (1 - h, 1 + h)]
+        y = session.linearize(omega)["drive"]["drive"]
+        assert abs(y.imag) == pytest.approx(omega * abs(charge[1] - charge[0]) / (2 * h), rel=1e-5)
+
+
+def test_sweeps(client: bimorph.Client) -> None:
+    """A grid comes back in order; shards put together are the whole; a failed point has a reason and no number."""
+    netlist = bimorph.Netlist.text(PLATE, "plate.net")
+    axis = [0.5, 1.0, 2.0, 4.0]
+    done: list[int] = []
+    whole = client.sweep(netlist, {"k": axis}, bimorph.Modes(count=1), progress=lambda n, _: done.append(n))
+    expected = [math.sqrt(k / M) / (2 * math.pi) for k in axis]
+    assert whole.column("f1") == pytest.approx(expected, rel=1e-9)
+    assert whole.units == {"f1": "Hz"} and done[-1] == 4
+    parts = [client.sweep(netlist, {"k": axis}, bimorph.Modes(count=1), shard=(i, 3)) for i in range(3)]
+    rows = sorted((row for part in parts for row in part.rows), key=lambda row: row.point)
+    assert rows == whole.rows
+    failed = client.sweep(netlist, {"k": [1.0]}, bimorph.PullIn(max_v=PULL_IN / 2))
+    assert failed.rows[0].error and failed.rows[0].results == {}
+    assert failed.to_csv().startswith("point,k,")
+
+
+def test_includes_are_sent(client: bimorph.Client, tmp_path: Path) -> None:
+    """A netlist is read with the files it uses, which the server never opens."""
+    (tmp_path / "parts").mkdir()
+    (tmp_path / "parts" / "spring.net").write_text("spring2d * [f m] [kx=4]\n")
+    text = "".join(line for line in PLATE.splitlines(keepends=True) if not line.startswith("spring2d"))
+    (tmp_path / "top.net").write_text(text + "uses parts/spring.net\n")
+    model = client.compile(tmp_path / "top.net")
+    assert model.modes(count=1).frequencies_hz[0] == pytest.approx(math.sqrt(4 / M) / (2 * math.pi), rel=1e-9)
+
+
+def test_bad_netlists(client: bimorph.Client) -> None:
+    """Errors come with place, as data and as text."""
+    with pytest.raises(bimorph.NetlistError) as caught:
+        client.compile(bimorph.Netlist.text(PLATE + "nosuch * [m] []\n", "bad.net"))
+    places = [(d.file, d.line) for d in caught.value.diagnostics if d.severity == "error"]
+    assert ("bad.net", 11) in places
+    assert any(v.field.startswith("bad.net:11:") for v in caught.value.violations)
+    assert "nosuch" in str(caught.value)
+
+
+def test_other_refusals(client: bimorph.Client, plate: bimorph.Model) -> None:
+    """Unknown names, states and servers each have their error."""
+    with pytest.raises(bimorph.InvalidRequest, match="nosuch"):
+        plate.session(signals=["nosuch.x"])
+    with plate.session() as session, pytest.raises(bimorph.InvalidRequest, match="drive"):
+        session.trial({"nosuch": 1.0})
+    with pytest.raises(bimorph.InvalidRequest, match="stop_s"):
+        plate.transient(-1.0, ["m.x"])
+    with pytest.raises(bimorph.NoResult):
+        plate.pull_in(max_v=PULL_IN / 2)
+    with pytest.raises(bimorph.Unavailable, match="nonexistent"):
+        bimorph.Client("unix:///nonexistent/s", timeout=5).version()
+
+
+def _version(client: bimorph.Client, answers: "multiprocessing.SimpleQueue[str]") -> None:
+    answers.put(client.version())
+
+
+@pytest.mark.parametrize("method", ["fork", "spawn"])
+def test_a_client_survives_into_child_processes(client: bimorph.Client, method: str) -> None:
+    """A used client works in a forked and in a spawned child: the channel is made anew there."""
+    version = client.version()
+    context = multiprocessing.get_context(method)
+    answers = context.SimpleQueue()
+    child = context.Process(target=_version, args=(client, answers))
+    child.start()
+    child.join(60)
+    assert child.exitcode == 0
+    assert answers.get() == version == client.version()
+
+
+def test_clients_travel(client: bimorph.Client) -> None:
+    """A client can be sent to a worker."""
+    assert pickle.loads(pickle.dumps(client)).address == client.address
+
+
+def test_serve_stops_what_it_started(program: str) -> None:
+    """At the end of the block the process is gone, and its socket with it."""
+    with bimorph.serve(program) as server:
+        path = server.address.removeprefix("unix://")
+        assert server.client().version()
+        assert os.path.exists(path)
+    assert server.process.poll() is not None
+    assert not os.path.exists(path)
+
+
+def test_serve_says_why_it_does_not_start(tmp_path: Path) -> None:
+    """A missing program, and one that is something else."""
+    with pytest.raises(bimorph.Unavailable, match="nosuch"), bimorph.serve(str(tmp_path / "nosuch")):
+        pass
+    with pytest.raises(bimorph.Unavailable, match="did not start"), bimorph.serve("/bin/false"):
+        pass
