@@ -17,10 +17,9 @@ pub struct Limits {
     pub inline_unknowns: usize,
     /// Most compiled models kept, default 64; the one unused for longest is forgotten first.
     pub models: usize,
-    /// Most sessions open at once, default 256.
+    /// Most sessions open at once, default 256. Each holds a bounded number of states: the device forgets the least
+    /// recently used.
     pub sessions: usize,
-    /// Most trials of a session between two accepts, default 100 000: bounds the states it holds.
-    pub states_per_session: usize,
     /// Most points of one sweep, default 1 000 000.
     pub sweep_points: usize,
     /// Most sweeps kept, running or finished, default 16.
@@ -53,7 +52,6 @@ impl Default for Limits {
             inline_unknowns: 2_000,
             models: 64,
             sessions: 256,
-            states_per_session: 100_000,
             sweep_points: 1_000_000,
             sweeps: 16,
             transient_values: 100_000_000,
@@ -77,7 +75,6 @@ impl Limits {
             unknowns: self.unknowns as u64,
             models: self.models as u64,
             sessions: self.sessions as u64,
-            states_per_session: self.states_per_session as u64,
             sweep_points: self.sweep_points as u64,
             sweeps: self.sweeps as u64,
             transient_values: self.transient_values as u64,

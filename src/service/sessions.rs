@@ -9,7 +9,7 @@ use crate::device::{Device, DeviceError, OpenRequest, SmallSignal, Token, TrialR
 use proto::device_reply::Kind as ReplyKind;
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 use tonic::Status;
@@ -25,8 +25,6 @@ pub(super) struct Session {
     started: Instant,
     used_ms: AtomicU64,
     closed: AtomicBool,
-    trials: AtomicUsize,
-    most_trials: usize,
 }
 
 /// What a stream asks of its session.
@@ -66,7 +64,6 @@ impl Session {
     fn ask(&self, device: &mut dyn Device, question: Question) -> Option<ReplyKind> {
         let answer = match question {
             Question::Open(request) => {
-                self.trials.store(0, Ordering::Relaxed);
                 let request = OpenRequest { ports: request.ports, signals: request.signals };
                 device.open(&request).map(|description| {
                     let description = wire::description_to_wire(&description);
@@ -75,17 +72,12 @@ impl Session {
                 })
             }
             Question::Trial(request) => {
-                if self.trials.fetch_add(1, Ordering::Relaxed) >= self.most_trials {
-                    let got = "one more; accept a state now and then, or open again";
-                    return Some(refused(&status::limit("states_per_session", self.most_trials, got)));
-                }
                 let mut reply = TrialReply::default();
                 wire::trial_from_wire(&request)
                     .and_then(|trial| device.trial(&trial, &mut reply))
                     .map(|()| ReplyKind::Trial(wire::reply_to_wire(&mut reply)))
             }
             Question::Accept(token) => {
-                self.trials.store(0, Ordering::Relaxed);
                 device.accept(token);
                 return None;
             }
@@ -181,8 +173,6 @@ impl Sessions {
             started: Instant::now(),
             used_ms: AtomicU64::new(0),
             closed: AtomicBool::new(false),
-            trials: AtomicUsize::new(0),
-            most_trials: limits.states_per_session,
         });
         let mut open = self.open.lock().unwrap_or_else(PoisonError::into_inner);
         open.retain(|_, session| !session.is_closed());

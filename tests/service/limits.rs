@@ -1,7 +1,7 @@
 //! Each limit is answered with RESOURCE_EXHAUSTED and its name; what was idle too long is forgotten.
 
 use super::running::{block_on, compiled, start, wire_bundle};
-use bimorph::device::{Device, DeviceError, Mode, OpenRequest, Trial, TrialReply};
+use bimorph::device::{Device, Mode, OpenRequest, Trial, TrialReply};
 use bimorph::service::limits::Limits;
 use bimorph::service::proto;
 use std::time::Duration;
@@ -59,26 +59,6 @@ fn large_models_are_refused() {
     let request = proto::CompileRequest { bundle: wire_bundle(), options: None };
     let status = block_on(async { server.client().await.compile(request).await }).expect_err("too many");
     exhausted(&status, "unknowns");
-}
-
-/// Trials without accepts are bounded, and an accept makes room.
-#[test]
-fn states_are_bounded_and_accepts_make_room() {
-    let server = start("127.0.0.1:0", Limits { states_per_session: 3, ..Limits::default() });
-    let mut device = server.device();
-    device.open(&OpenRequest::default()).expect("opens");
-    let mut reply = TrialReply::default();
-    let mut try_one = |device: &mut bimorph::service::client::RemoteDevice, v: f64| {
-        let trial = Trial { mode: Mode::Static, parent: None, t: 0.0, dt: 0.0, voltages: &[v, 0.0] };
-        device.trial(&trial, &mut reply).map(|()| reply.token)
-    };
-    for v in [1.0, 2.0, 3.0] {
-        try_one(&mut device, v).expect("has room");
-    }
-    let full = try_one(&mut device, 4.0).expect_err("is full");
-    assert!(matches!(&full, DeviceError::Remote { reason, .. } if reason.contains("states_per_session")), "{full}");
-    device.accept(bimorph::device::Token(1));
-    try_one(&mut device, 4.0).expect("has room again");
 }
 
 /// The model unused for longest goes first.

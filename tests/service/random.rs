@@ -11,7 +11,7 @@ use tokio_stream::StreamExt;
 
 fn server() -> &'static Running {
     static SERVER: OnceLock<Running> = OnceLock::new();
-    SERVER.get_or_init(|| start("127.0.0.1:0", Limits { states_per_session: 8, ..Limits::default() }))
+    SERVER.get_or_init(|| start("127.0.0.1:0", Limits::default()))
 }
 
 fn number() -> impl Strategy<Value = f64> {

@@ -20,6 +20,8 @@ T = TypeVar("T")
 _OPTIONS = [
     ("grpc.max_receive_message_length", 64 << 20),
     ("grpc.max_send_message_length", 64 << 20),
+    # For a Unix socket gRPC would send the escaped path as HTTP authority, which the server's HTTP layer refuses.
+    ("grpc.default_authority", "localhost"),
     # Channels to one address share a connection otherwise, and a forked child would get its parent's.
     ("grpc.use_local_subchannel_pool", 1),
 ]
