@@ -171,6 +171,9 @@ fn subnets() {
     let endless = only("subnet s [a] [] [ s * [a] [] ]\ns * [q] []");
     assert_eq!((endless.code.as_str(), endless.line), ("E052", 1));
     assert!(endless.message.contains("calls itself without end"), "{endless:?}");
+    // SUGAR's library holds such a gap2dV.
+    let library = only("subnet gap2dV [a b c d] [V=*] [ gap2dV parent [a b c d] [V=V] ]\ngap2dV p1 [a b c d] [V=1]");
+    assert!(library.help.starts_with("remove this subnet: the element `gap2dV` is built in"), "{library:?}");
 }
 
 /// Recursion that doubles, and loops that never seem to end, stop with a message.

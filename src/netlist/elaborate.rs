@@ -15,7 +15,7 @@ use std::rc::Rc;
 /// Blocks, conditions, loops and instances together may nest this deep while running: bounds the stack.
 const DEEPEST_RUN: usize = 400;
 /// Statements, operators and values that one netlist may run: loops and recursion end here instead of never.
-const MOST_STEPS: usize = 50_000_000;
+const MOST_STEPS: usize = 30_000_000;
 /// Elements and subnet instances that one netlist may build; nodes it may name.
 const MOST_ELEMENTS: usize = 300_000;
 

@@ -158,7 +158,12 @@ impl<'p> Elaborator<'p> {
             self.stopped = true;
             let message =
                 format!("subnet instances nest more than {DEEPEST_INSTANCE} deep: `{model}` calls itself without end");
-            return Err(self.sink.error("E052", element.model.span, message, "end the recursion with an `if`"));
+            let help = if elements::model(model).is_some() {
+                format!("remove this subnet: the element `{model}` is built in")
+            } else {
+                "end the recursion with an `if`".to_owned()
+            };
+            return Err(self.sink.error("E052", element.model.span, message, help));
         }
         elements::stray_actuals(model, given, subnet.formals.iter().map(|f| &*f.name.name), self.sink);
         let layer_values = layer.map_or_else(|| Ok(Rc::new(Vec::new())), |layer| self.layer(layer))?;
