@@ -2,5 +2,7 @@
 
 mod analytic;
 mod models;
+#[cfg(feature = "remote")]
+mod remote;
 mod support;
 mod syntax;

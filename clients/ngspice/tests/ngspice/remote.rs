@@ -1,0 +1,159 @@
+//! The same decks with the model on a server, and what happens when the server goes away.
+
+use crate::support::{deck, run, skipped};
+use bimorph::cosim::{CosimError, CosimOptions};
+use bimorph::service::server::{self, ServeOptions};
+use std::io::{Read, Write};
+use std::os::unix::net::{UnixListener, UnixStream};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, mpsc};
+use std::thread;
+use tempfile::TempDir;
+use tokio::sync::oneshot;
+
+/// A server on a Unix socket, stopped when dropped.
+struct Serving {
+    folder: TempDir,
+    stop: Option<oneshot::Sender<()>>,
+    thread: Option<thread::JoinHandle<()>>,
+}
+
+impl Serving {
+    fn start() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let (stop, stopped) = oneshot::channel::<()>();
+        let (ready, is_ready) = mpsc::channel();
+        let listen = vec![format!("unix://{}", folder.path().join("server").display()).parse().unwrap()];
+        let options =
+            ServeOptions { listen, ready: Box::new(move |_| ready.send(()).unwrap()), ..ServeOptions::default() };
+        let thread = thread::spawn(move || {
+            let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build().unwrap();
+            runtime.block_on(server::run(options, async { drop(stopped.await) })).unwrap();
+        });
+        is_ready.recv().unwrap();
+        Self { folder, stop: Some(stop), thread: Some(thread) }
+    }
+
+    fn socket(&self) -> PathBuf {
+        self.folder.path().join("server")
+    }
+}
+
+impl Drop for Serving {
+    fn drop(&mut self) {
+        drop(self.stop.take());
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+/// What a line between client and server does after so many bytes of replies.
+#[derive(Clone, Copy, PartialEq)]
+enum Fate {
+    /// The connection breaks and nothing listens any more, as when the server is killed.
+    Cut,
+    /// Replies no longer arrive, as when the server hangs.
+    Mute,
+}
+
+/// Forwards `at` to `server` until `after` bytes of replies.
+fn line(at: &Path, server: PathBuf, fate: Fate, after: usize) {
+    let listener = UnixListener::bind(at).unwrap();
+    let (at, count) = (at.to_owned(), Arc::new(AtomicUsize::new(0)));
+    let over = Arc::new(AtomicBool::new(false));
+    thread::spawn(move || {
+        for client in listener.incoming() {
+            let (Ok(client), Ok(to_server)) = (client, UnixStream::connect(&server)) else { return };
+            if fate == Fate::Cut && over.load(Ordering::SeqCst) {
+                return;
+            }
+            let (mut up, mut up_to) = (client.try_clone().unwrap(), to_server.try_clone().unwrap());
+            thread::spawn(move || {
+                let _ = std::io::copy(&mut up, &mut up_to);
+            });
+            let (mut down, mut down_to) = (to_server, client);
+            let (count, over, at) = (Arc::clone(&count), Arc::clone(&over), at.clone());
+            thread::spawn(move || {
+                let mut bytes = [0; 4096];
+                while let Ok(n @ 1..) = down.read(&mut bytes) {
+                    if count.fetch_add(n, Ordering::SeqCst) + n < after {
+                        let _ = down_to.write_all(&bytes[..n]);
+                    } else if fate == Fate::Cut {
+                        over.store(true, Ordering::SeqCst);
+                        let _ = std::fs::remove_file(&at);
+                        let _ = down_to.shutdown(std::net::Shutdown::Both);
+                        let _ = down.shutdown(std::net::Shutdown::Both);
+                    }
+                }
+            });
+        }
+    });
+}
+
+fn on(socket: &Path, name: &str) -> CosimOptions {
+    CosimOptions { deck: deck(name), remote: Some(format!("unix://{}", socket.display())), ..CosimOptions::default() }
+}
+
+/// In process and on a server the waveforms are the same to the last bit.
+#[test]
+fn a_server_gives_the_same_bits() {
+    if skipped() {
+        return;
+    }
+    let server = Serving::start();
+    let here = run(CosimOptions { deck: deck("comb_edges.cir"), ..CosimOptions::default() }).unwrap();
+    let there = run(on(&server.socket(), "comb_edges.cir")).unwrap();
+    assert_eq!(here.plots, there.plots);
+}
+
+/// The run stops with an error that names the instance and the address; `deadline` is 2 s in this deck.
+fn stops(fate: Fate) {
+    let server = Serving::start();
+    let folder = tempfile::tempdir().unwrap();
+    let socket = folder.path().join("line");
+    line(&socket, server.socket(), fate, 20_000);
+    match run(on(&socket, "comb_remote.cir")) {
+        Err(CosimError::Stopped { reason, .. }) => {
+            let head = format!("instance a1: server unix://{}: ", socket.display());
+            assert!(reason.starts_with(&head), "{reason}");
+        }
+        Err(other) => panic!("{other}"),
+        Ok(_) => panic!("the run went on without its server"),
+    }
+}
+
+/// A server killed in the middle of a transient ends it.
+#[test]
+fn a_killed_server_ends_the_run() {
+    if !skipped() {
+        stops(Fate::Cut);
+    }
+}
+
+/// A server that no longer answers ends it at the deadline.
+#[test]
+fn a_mute_server_ends_the_run() {
+    if !skipped() {
+        stops(Fate::Mute);
+    }
+}
+
+/// Without a server the run does not start, and the message names the instance and the address.
+#[test]
+fn no_server() {
+    if skipped() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let socket = folder.path().join("nobody");
+    match run(on(&socket, "comb_edges.cir")) {
+        Err(CosimError::Stopped { reason, .. }) => {
+            let head = format!("instance a1 (model comb): server unix://{}: ", socket.display());
+            assert!(reason.starts_with(&head), "{reason}");
+        }
+        Err(other) => panic!("{other}"),
+        Ok(_) => panic!("the run went on without a server"),
+    }
+}
