@@ -65,6 +65,21 @@ pub(crate) mod code {
     pub(crate) const ITERLIM: c_int = 103;
 }
 
+/// What is read of a circuit (`CKTcircuit`).
+pub(crate) mod circuit {
+    /// Offset of the present step [byte].
+    pub(crate) const DELTA: usize = 88;
+    /// Offsets at which the mode may stand: up to ngspice 45, and from 46 on [byte].
+    pub(crate) const MODES: [usize; 2] = [392, 400];
+
+    /// Whether a word is the mode of a DC sweep: that bit alone of the DC kinds, one stage of initialisation, and
+    /// nothing that is no mode bit.
+    pub(crate) fn is_sweep(word: u64) -> bool {
+        const ALL: u64 = 0x13f73;
+        word & !ALL == 0 && word & 0x73 == 0x40 && (word & 0x3f00).count_ones() == 1
+    }
+}
+
 /// Slots of the host's function table. These have the same place from ngspice 39 to 47.
 pub(crate) mod slot {
     pub(crate) const SETUP: usize = 3;

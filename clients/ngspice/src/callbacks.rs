@@ -1,58 +1,19 @@
 //! The functions ngspice calls: setup, load, accept, truncation, and the model itself.
 //!
 //! Each passes the call on to the host's own code model support and adds what Bimorph needs around it. None lets a
-//! panic out. Instances are found by the address of their connections, which stays the same as long as they live.
+//! panic out.
 
-use crate::abi::{self, Model, code};
-use crate::call::{self, Call, MONITORS, PORTS};
-use crate::history::{self, History};
-use crate::instance::{Instance, Outcome, Question};
-use crate::model_card::ModelCard;
+use crate::abi::{self, Model, circuit as at, code};
+use crate::call::Call;
+use crate::instance::Outcome;
+use crate::opening::open_all;
+use crate::registry::{close, registry};
+use crate::respond::respond;
 use crate::table::LAYOUT;
-use crate::{host, opener, panics, trace};
+use crate::{host, panics, trace};
 use std::ffi::{c_int, c_void};
 use std::io::Write;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::{Path, PathBuf};
-use std::sync::{Mutex, MutexGuard, PoisonError};
-
-/// Where a circuit keeps its present step [byte].
-const CIRCUIT_DELTA: usize = 88;
-
-/// An instance with what its calls reuse.
-struct Entry {
-    key: usize,
-    epoch: u64,
-    instance: Instance,
-    voltages: Vec<f64>,
-    previous: History,
-}
-
-struct Registry {
-    entries: Vec<Entry>,
-    epochs: u64,
-    /// The step the circuit takes in this load [s].
-    delta: f64,
-    /// Whether every instance has answered in this load.
-    good: bool,
-    /// Set when the analysis must end: no device is asked any more.
-    stopped: bool,
-    /// Name of the instance being asked.
-    asked: String,
-}
-
-static REGISTRY: Mutex<Registry> = Mutex::new(Registry {
-    entries: Vec::new(),
-    epochs: 0,
-    delta: 0.0,
-    good: true,
-    stopped: false,
-    asked: String::new(),
-});
-
-fn registry() -> MutexGuard<'static, Registry> {
-    REGISTRY.lock().unwrap_or_else(PoisonError::into_inner)
-}
 
 /// Runs a callback; a panic in it becomes an error code.
 fn guarded(body: impl FnOnce() -> c_int) -> c_int {
@@ -133,66 +94,6 @@ pub(crate) unsafe extern "C" fn setup(
     })
 }
 
-/// Opens each instance of each model.
-///
-/// # Safety
-/// `model` heads the host's list of models; each is set up.
-unsafe fn open_all(mut model: *mut Model) -> Result<(), String> {
-    let remote = std::env::var("BIMORPH_REMOTE").ok();
-    // SAFETY: the lists end in null; names are strings of the host.
-    unsafe {
-        while let Some(this) = model.as_ref() {
-            let mut instance = this.instances;
-            while let Some(at) = instance.as_ref() {
-                let name = call::text(at.name).unwrap_or_default();
-                let card = ModelCard::new(&call::card(this.param, this.num_param), remote.clone());
-                let (ports, monitors) = (call::size(at.conn, PORTS), call::size(at.conn, MONITORS));
-                let directory = deck_directory(at.conn);
-                let opened = card.map_err(|e| e.to_string()).and_then(|mut card| {
-                    card.check_counts(ports, monitors).map_err(|e| e.to_string())?;
-                    open(&name, &mut card, ports, directory.as_deref())
-                });
-                let model_name = call::text(this.name).unwrap_or_default();
-                let opened = opened.map_err(|e| format!("instance {name} (model {model_name}): {e}"))?;
-                register(at.conn as usize, opened);
-                instance = at.next;
-            }
-            model = this.next;
-        }
-    }
-    Ok(())
-}
-
-fn open(name: &str, card: &mut ModelCard, ports: usize, directory: Option<&Path>) -> Result<Instance, String> {
-    let device = opener::open(card, directory).map_err(|e| e.to_string())?;
-    trace::line(format_args!("{name}: {card:?}, deck in {directory:?}"));
-    Instance::open(name, device, &card.ports, ports, &card.monitors).map_err(|e| format!("\"{}\": {e}", card.file))
-}
-
-/// The deck's directory: from whoever started ngspice, or from the host.
-///
-/// # Safety
-/// `conn` points to the connections of an instance that the host has set up.
-unsafe fn deck_directory(conn: *mut *mut abi::Connection) -> Option<PathBuf> {
-    if let Some(path) = std::env::var_os("BIMORPH_DECK_DIR") {
-        return Some(path.into());
-    }
-    // SAFETY: by contract; the slot is that of this host.
-    unsafe { LAYOUT.get()?.deck_path_slot(call::partial_at_80(conn)).and_then(|slot| host::deck_directory(slot)) }
-}
-
-fn register(key: usize, instance: Instance) {
-    let registry = &mut *registry();
-    registry.epochs += 1;
-    registry.stopped = false;
-    trace::line(format_args!("open {} epoch {} {:?}", instance.name(), registry.epochs, instance.description()));
-    let entry = Entry { key, epoch: registry.epochs, instance, voltages: Vec::new(), previous: History::default() };
-    match registry.entries.iter_mut().find(|e| e.key == key) {
-        Some(old) => *old = entry,
-        None => registry.entries.push(entry),
-    }
-}
-
 /// Closes the instances of these models: states and connections to servers end with the analysis.
 pub(crate) unsafe extern "C" fn unsetup(model: *mut Model, circuit: *mut c_void) -> c_int {
     guarded(|| {
@@ -223,10 +124,6 @@ pub(crate) unsafe extern "C" fn delete(instance: *mut abi::Instance) -> c_int {
     })
 }
 
-fn close(key: usize) {
-    registry().entries.retain(|e| e.key != key);
-}
-
 /// Loads the matrix: the host calls [`evaluate`] for each instance.
 ///
 /// Where one has no answer this ends Newton's iteration, and ngspice tries a shorter step or another way to the
@@ -237,8 +134,12 @@ pub(crate) unsafe extern "C" fn load(model: *mut Model, circuit: *mut c_void) ->
         {
             let mut registry = registry();
             registry.good = true;
-            // SAFETY: the step stands at this place of the circuit from 39 to 47.
-            registry.delta = unsafe { *circuit.cast::<u8>().add(CIRCUIT_DELTA).cast::<f64>() };
+            // SAFETY: a circuit is larger than this from 39 to 47, and the step stands at the same place in all.
+            unsafe {
+                let circuit = circuit.cast::<u8>();
+                registry.delta = *circuit.add(at::DELTA).cast::<f64>();
+                registry.sweep = at::MODES.iter().any(|&mode| at::is_sweep(*circuit.add(mode).cast::<u64>()));
+            }
         }
         // SAFETY: passed on; the registry is not locked while the host calls back.
         let result = unsafe { host::load(model, circuit) };
@@ -303,73 +204,4 @@ pub(crate) unsafe extern "C" fn evaluate(data: *mut c_void) {
         // SAFETY: this is within a load.
         unsafe { host::message(&format!("Error: bimorph: {text}")) };
     }
-}
-
-/// Answers a call.
-fn respond(call: &Call<'_>, registry: &mut Registry) -> Outcome {
-    let delta = registry.delta;
-    let Some(entry) = registry.entries.iter_mut().find(|e| e.key == call.key()) else {
-        return Outcome::Stop("an instance was not set up".into());
-    };
-    registry.asked.push_str(entry.instance.name());
-    let question = call.question(delta);
-    let ports = call.size(PORTS);
-    let doubles = history::len(ports);
-    if call.init() {
-        // SAFETY: this is the instance's first call in a load.
-        unsafe { host::reserve(doubles) };
-    }
-    let from = c_int::from(!matches!(question, Question::SmallSignal { .. }));
-    // SAFETY: this is within a load; the memory has the size that was reserved.
-    let recalled = unsafe { host::memory(from).as_ref().map(|m| std::slice::from_raw_parts(m, doubles)) };
-    let Some(recalled) = recalled else {
-        return Outcome::Stop("ngspice gave no state memory".into());
-    };
-    history::read(recalled, entry.epoch, &mut entry.previous);
-    call.voltages(&mut entry.voltages);
-    let outcome = entry.instance.ask(question, &entry.voltages, &entry.previous);
-    if outcome == Outcome::Solved {
-        match question {
-            Question::SmallSignal { .. } => write_gains(call, &entry.instance),
-            _ => write_answer(call, entry, doubles),
-        }
-    }
-    if trace::on() {
-        trace_call(entry, question, &outcome);
-    }
-    outcome
-}
-
-fn write_answer(call: &Call<'_>, entry: &Entry, doubles: usize) {
-    let (answer, ports) = (entry.instance.answer(), call.size(PORTS));
-    for n in 0..ports {
-        call.set(PORTS, n, answer.currents[n], &answer.conductances[n * ports..(n + 1) * ports]);
-    }
-    for n in 0..call.size(MONITORS) {
-        call.set(MONITORS, n, answer.monitors[n], &answer.monitor_gains[n * ports..(n + 1) * ports]);
-    }
-    // SAFETY: this is within a load; this point's memory has the size that was reserved, and no other view of it.
-    let memory = unsafe { host::memory(0).as_mut().map(|m| std::slice::from_raw_parts_mut(m, doubles)) };
-    if let (Some(memory), Some(token)) = (memory, answer.token) {
-        history::write(memory, entry.epoch, token, answer.step, &answer.charges, &entry.previous.charges);
-    }
-}
-
-fn write_gains(call: &Call<'_>, instance: &Instance) {
-    let (small, ports) = (instance.small_signal(), call.size(PORTS));
-    for n in 0..ports {
-        call.set_gains(PORTS, n, small.admittance[n * ports..(n + 1) * ports].iter().copied());
-    }
-    for (n, monitor) in instance.monitors().iter().enumerate() {
-        let row = &small.outputs[n * ports..(n + 1) * ports];
-        call.set_gains(MONITORS, n, row.iter().map(|[re, im]| [monitor.scale * re, monitor.scale * im]));
-    }
-}
-
-fn trace_call(entry: &Entry, question: Question, outcome: &Outcome) {
-    let (name, answer) = (entry.instance.name(), entry.instance.answer());
-    trace::line(format_args!(
-        "{name} {question:?} parent {:?} v {:?} -> {outcome:?} token {:?} i {:?} q {:?} monitors {:?}",
-        entry.previous.token, entry.voltages, answer.token, answer.currents, answer.charges, answer.monitors
-    ));
 }

@@ -11,9 +11,9 @@
 //! # Layout
 //! What ngspice's memory looks like: `abi` the structures, [`layout`] which host this is, `table` what the plug-in
 //! declares, `exports` the symbols, `host` the host's functions, `call` one call's data. Between the two sides stand
-//! `callbacks`. What does not know ngspice: [`model_card`], [`settings`] and `names` the `.model` line, [`opener`] from line to
-//! device, [`instance`] questions and outcomes, [`companion`] charges to currents, [`history`] what an accepted point
-//! leaves behind.
+//! `callbacks`, `opening` and `respond`, with the `registry` of instances. What does not know ngspice: [`model_card`],
+//! [`settings`] and `names` the `.model` line, [`opener`] from line to device, [`instance`] questions and outcomes,
+//! [`companion`] charges to currents, [`history`] what an accepted point leaves behind.
 //!
 //! This is the only crate of the project with `unsafe` code; each block says why it holds.
 
@@ -32,7 +32,10 @@ pub mod layout;
 pub mod model_card;
 mod names;
 pub mod opener;
+mod opening;
 mod panics;
+mod registry;
+mod respond;
 pub mod settings;
 mod table;
 mod trace;

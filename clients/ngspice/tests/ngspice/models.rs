@@ -111,3 +111,20 @@ fn runs_are_repeatable() {
     let (a, b) = (run(options("comb_edges.cir")).unwrap(), run(options("comb_edges.cir")).unwrap());
     assert_eq!(a.plots, b.plots);
 }
+
+/// A sweep follows its branch: downwards the plate stays pulled in where upwards it is not, and lets go in the end. An
+/// operating point in the same run starts from rest whatever the sweep left behind.
+#[test]
+fn sweeps_follow_their_branch() {
+    if skipped() {
+        return;
+    }
+    let run = run(options("plate_hysteresis.cir")).unwrap();
+    let plot = run.plot("DC");
+    let (v, x) = (real(plot, "v(v-sweep)"), real(plot, "v(x)"));
+    let at = |volts: f64| x[v.iter().position(|v| (v - volts).abs() < 1e-6).unwrap()];
+    assert!(at(6.0) > 1.5 && at(5.0) > 1.5, "{} um at 6 V, {} um at 5 V", at(6.0), at(5.0));
+    assert!(at(0.0).abs() < 1e-6, "{} um at 0 V", at(0.0));
+    let op = real(run.plot("Operating"), "v(x)")[0];
+    assert!(op < 0.6667, "{op} um at the operating point");
+}

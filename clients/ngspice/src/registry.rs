@@ -1,0 +1,76 @@
+//! The instances ngspice has set up, and what they share during a load.
+
+use crate::history::History;
+use crate::instance::Instance;
+use crate::trace;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// An instance with what its calls reuse.
+pub(crate) struct Entry {
+    key: usize,
+    /// Names the run its records belong to.
+    pub(crate) epoch: u64,
+    /// The device.
+    pub(crate) instance: Instance,
+    /// Port voltages of the call.
+    pub(crate) voltages: Vec<f64>,
+    /// The last accepted point.
+    pub(crate) previous: History,
+}
+
+/// Every instance, and what concerns the load under way.
+pub(crate) struct Registry {
+    /// Instances that are set up.
+    pub(crate) entries: Vec<Entry>,
+    epochs: u64,
+    /// The step the circuit takes in this load [s].
+    pub(crate) delta: f64,
+    /// A sweep, whose points follow each other's branch; an operating point starts from rest.
+    pub(crate) sweep: bool,
+    /// Whether every instance has answered in this load.
+    pub(crate) good: bool,
+    /// Set when the analysis must end: no device is asked any more.
+    pub(crate) stopped: bool,
+    /// Name of the instance being asked.
+    pub(crate) asked: String,
+}
+
+static REGISTRY: Mutex<Registry> = Mutex::new(Registry {
+    entries: Vec::new(),
+    epochs: 0,
+    delta: 0.0,
+    sweep: false,
+    good: true,
+    stopped: false,
+    asked: String::new(),
+});
+
+/// The registry, for as long as the guard lives: never while the host may call back.
+pub(crate) fn registry() -> MutexGuard<'static, Registry> {
+    REGISTRY.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Puts an opened instance in; it replaces the one before it.
+pub(crate) fn register(key: usize, instance: Instance) {
+    let registry = &mut *registry();
+    registry.epochs += 1;
+    registry.stopped = false;
+    trace::line(format_args!("open {} epoch {} {:?}", instance.name(), registry.epochs, instance.description()));
+    let entry = Entry { key, epoch: registry.epochs, instance, voltages: Vec::new(), previous: History::default() };
+    match registry.entries.iter_mut().find(|e| e.is(key)) {
+        Some(old) => *old = entry,
+        None => registry.entries.push(entry),
+    }
+}
+
+/// Takes an instance out.
+pub(crate) fn close(key: usize) {
+    registry().entries.retain(|e| !e.is(key));
+}
+
+impl Entry {
+    /// Whether this is the instance whose connections stand at `key`: that address stays as long as it lives.
+    pub(crate) fn is(&self, key: usize) -> bool {
+        self.key == key
+    }
+}
