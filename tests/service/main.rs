@@ -9,3 +9,4 @@ mod listening;
 mod random;
 mod refusals;
 mod running;
+mod same_bits;

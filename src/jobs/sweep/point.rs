@@ -2,8 +2,8 @@
 
 use super::{SweepAnalysis, SweepSpec};
 use crate::analysis::{modes, pull_in, statics};
-use crate::compile::{CompileOptions, Compiled, compile};
-use crate::netlist::{Bundle, Setting};
+use crate::compile::{CompileError, CompileOptions, Compiled, compile};
+use crate::netlist::{Bundle, Setting, Severity};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// A result: its column, its unit, and its value; none: the quantity does not exist at this point.
@@ -37,8 +37,20 @@ fn solve(
     let mut options = options.clone();
     options.set.retain(|(name, _)| settings.iter().all(|(swept, _)| swept != name));
     options.set.extend_from_slice(settings);
-    let compiled = compile(bundle, &options).map_err(|error| error.to_string())?;
+    let compiled = compile(bundle, &options).map_err(|error| brief(&error))?;
     analyse(&compiled, &spec.analysis)
+}
+
+/// A table has one line for an error: of a netlist's, the first with its place.
+fn brief(error: &CompileError) -> String {
+    let CompileError::Netlist(diagnostics) = error else { return error.to_string() };
+    let mut errors = diagnostics.items.iter().filter(|d| d.severity == Severity::Error);
+    let Some(first) = errors.next() else { return "the netlist has errors".to_owned() };
+    let more = match errors.count() {
+        0 => String::new(),
+        n => format!(" (and {n} more)"),
+    };
+    format!("{}:{}:{}: {} {}{more}", first.file, first.line, first.column, first.code, first.message)
 }
 
 fn analyse(compiled: &Compiled, analysis: &SweepAnalysis) -> Result<Vec<Value>, String> {

@@ -1,0 +1,175 @@
+//! A model on a server and the same model in process give the same bits: trials, small signals, analyses and sweeps.
+
+use super::running::{DEADLINE, PLATE, Running, bundle, start_with};
+use bimorph::analysis::transient::{TransientOptions, transient};
+use bimorph::analysis::{modes::modes, pull_in::pull_in, statics::static_equilibrium};
+use bimorph::compile::{CompileOptions, Compiled, compile};
+use bimorph::device::local::LocalDevice;
+use bimorph::device::{Device, Mode, OpenRequest, SmallSignal, Status, Token, Trial, TrialReply};
+use bimorph::jobs::sweep::{self, Shard, SweepAnalysis, SweepSpec};
+use bimorph::netlist::Bundle;
+use bimorph::service::client::{Client, RemoteDevice, RemoteTransient};
+use bimorph::service::limits::Limits;
+use std::sync::Arc;
+
+/// A heated beam between anchors, its middle over an electrode: heat, motion and charge in one small model.
+const BANK: &str = "param w=2u
+process p1 = [ Youngsmodulus=165e9 density=2300 h=2u thermalexpansion=2.7e-6 thermcond=34 ambienttemperature=300 ]
+anchor p1 [a] []
+left  beam2det p1 [a m] [l=200u w=w oz=deg(3) R=1k tau=5u]
+right beam2det p1 [m b] [l=200u w=w oz=-deg(3) R=1k tau=5u]
+anchor p1 [b] []
+plategap2d * [m e] [A=1e-8 gap=5u oz=deg(90) permittivity=8.854e-12]
+anchor p1 [e] []
+eground * [b] []
+heat port * [a b] []
+sense port * [e b] []
+";
+
+fn local_server(limits: Limits) -> Running {
+    start_with("127.0.0.1:0", limits, |compiled| Box::new(LocalDevice::new(compiled)))
+}
+
+fn compiled(bundle: &Bundle) -> Arc<Compiled> {
+    Arc::new(compile(bundle, &CompileOptions::default()).unwrap_or_else(|error| panic!("{error}")))
+}
+
+/// Drives a device as a circuit would, with rejected attempts in between, and writes down all it said.
+fn drive(device: &mut dyn Device, ports: usize, signals: &[&str]) -> Vec<String> {
+    let mut said = Vec::new();
+    let signals = signals.iter().map(|&signal| signal.to_owned()).collect();
+    said.push(format!("{:?}", device.open(&OpenRequest { ports: vec![], signals })));
+    let mut ask = |device: &mut dyn Device, mode, parent, dt: f64, v: f64| -> Option<Token> {
+        let voltages = vec![v; ports];
+        let mut reply = TrialReply::default();
+        let outcome = device.trial(&Trial { mode, parent, t: dt, dt, voltages: &voltages }, &mut reply);
+        said.push(format!("{outcome:?} {reply:?}"));
+        reply.token.filter(|_| reply.status == Status::Ok)
+    };
+    let mut state = ask(device, Mode::Static, None, 0.0, 0.5);
+    for k in 0..40 {
+        let v = 0.5 + 0.05 * f64::from(k);
+        // An attempt that the circuit rejects, then a shorter one that it takes.
+        ask(device, Mode::Transient, state, 4e-7, v + 0.3);
+        let next = ask(device, Mode::Transient, state, 1e-7, v);
+        if let Some(token) = next {
+            device.accept(token);
+            state = next;
+        }
+    }
+    // Longer than any part of this size can follow in one step, and a state that is not held.
+    ask(device, Mode::Transient, state, 1.0, 2.0);
+    ask(device, Mode::Transient, Some(Token(17)), 1e-7, 1.0);
+    let mut small = SmallSignal::default();
+    for omega in [0.0, 1e5, 6e6] {
+        let outcome = state.map(|token| device.linearize(token, omega, &mut small));
+        said.push(format!("{outcome:?} {small:?}"));
+    }
+    said
+}
+
+fn compare(limits: Limits, netlist: &Bundle, ports: usize, signals: &[&str]) {
+    let server = local_server(limits);
+    let mut remote = RemoteDevice::connect(&server.address.uri(), netlist, &CompileOptions::default(), DEADLINE)
+        .unwrap_or_else(|error| panic!("{error}"));
+    let here = drive(&mut LocalDevice::new(compiled(netlist)), ports, signals);
+    let there = drive(&mut remote, ports, signals);
+    assert!(here.iter().filter(|said| said.contains("token: Some")).count() > 40, "{here:#?}");
+    for (here, there) in here.iter().zip(&there) {
+        // Debug output of a double is the shortest text that reads back to the same bits.
+        assert_eq!(here, there);
+    }
+}
+
+/// A circuit's run over the wire is the same run, to the bit, rejected steps, faults and small signals included.
+#[test]
+fn trials_have_the_same_bits() {
+    compare(Limits::default(), &bundle(), 1, &["m.x", "m.vx"]);
+}
+
+/// The same for a model with heat and a second port.
+#[test]
+fn trials_of_a_heated_beam_have_the_same_bits() {
+    compare(Limits::default(), &Bundle::from_text("bank.net", BANK), 2, &["m.x", "m.y"]);
+}
+
+/// The same when the model counts as large and is stepped on threads of its own.
+#[test]
+fn trials_on_other_threads_have_the_same_bits() {
+    compare(Limits { inline_unknowns: 0, ..Limits::default() }, &bundle(), 1, &["m.x"]);
+}
+
+/// Every analysis over the wire is the analysis in process.
+#[test]
+fn analyses_have_the_same_bits() {
+    let server = local_server(Limits::default());
+    let mut client = Client::connect(&server.address.uri(), DEADLINE).expect("connects");
+    let model = client.compile(&bundle(), &CompileOptions::default()).expect("compiles");
+    let here = compiled(&bundle());
+    let volts = [("drive".to_owned(), 2.0)];
+    assert_eq!(client.statics(&model, &volts).expect("an answer"), static_equilibrium(&here, &volts).expect("one"));
+    assert_eq!(client.modes(&model, 1, &volts).expect("an answer"), modes(&here, 1, &volts).expect("one"));
+    assert_eq!(client.pull_in(&model, None, 10.0).expect("an answer"), pull_in(&here, None, 10.0).expect("one"));
+
+    let options = TransientOptions {
+        stop: 2e-5,
+        signals: vec!["m.x".into(), "m.vx".into()],
+        points: 101,
+        tol: 1e-4,
+        voltages: volts.to_vec(),
+        release: None,
+    };
+    let local = transient(&here, &options, &mut |_, _| {}, &mut |_| true).expect("runs");
+    let remote = RemoteTransient {
+        stop: options.stop,
+        signals: options.signals.clone(),
+        points: options.points,
+        tol: options.tol,
+        voltages: options.voltages.clone(),
+        release: None,
+    };
+    let mut told = 0.0;
+    let there = client.transient(&model, &remote, &mut |fraction| {
+        assert!(fraction >= told);
+        told = fraction;
+        true
+    });
+    assert_eq!(there.expect("runs"), local);
+}
+
+/// A sweep over the wire, on one thread and on several, whole and in shards, is one table.
+#[test]
+fn sweeps_have_the_same_bits() {
+    let server = local_server(Limits::default());
+    let mut client = Client::connect(&server.address.uri(), DEADLINE).expect("connects");
+    let netlist =
+        Bundle::from_text("plate.net", &PLATE.replace("kx=1", "kx=k").replace("param V=0", "param V=0\nparam k=1"));
+    let spec = |threads, shard| SweepSpec {
+        parameters: vec!["k=0.5:4:3".parse().expect("an axis"), "V=0,1".parse().expect("an axis")],
+        analysis: SweepAnalysis::PullIn { port: None, max: 9.0 },
+        shard,
+        threads,
+    };
+    let options = CompileOptions::default();
+    let run = |threads, shard| {
+        let spec = spec(Some(threads), shard);
+        sweep::run(&spec, &netlist, &options, &|_| true).expect("a table")
+    };
+    let whole = run(1, Shard::default());
+    assert_eq!(whole.rows.len(), 6);
+    assert!(whole.failed() < 6 && whole.failed() > 0, "stiff springs do not pull in below 9 V: {}", whole.to_csv());
+    assert_eq!(run(5, Shard::default()), whole);
+    let parts: Vec<_> = (0..3).flat_map(|index| run(2, Shard { index, count: 3 }).rows).collect();
+    let mut parts: Vec<_> = parts.into_iter().collect();
+    parts.sort_by_key(|row| row.point);
+    assert_eq!(parts, whole.rows);
+    let mut told = 0;
+    let remote = client.sweep(&spec(None, Shard::default()), &netlist, &options, &mut |progress| {
+        told = progress.done;
+        true
+    });
+    assert_eq!(remote.expect("a table"), whole);
+    assert_eq!(told, 6);
+    let stopped = client.sweep(&spec(None, Shard::default()), &netlist, &options, &mut |_| false);
+    assert!(stopped.is_err() || stopped.is_ok_and(|table| table == whole), "cancelled, or already done");
+}
