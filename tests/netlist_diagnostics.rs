@@ -196,7 +196,7 @@ fn settings() {
     assert_eq!(
         found,
         [
-            ("E048", 0, "the netlist has no parameter `gab` to set", "did you mean `gap`?"),
+            ("E048", 0, "the netlist has no parameter `gab` to set", "did you mean `gap`? its parameters are gap"),
             ("E048", 0, "the netlist has no parameter `x` to set", "its parameters are gap"),
         ]
     );

@@ -35,6 +35,19 @@ fn found_beside_the_including_file() {
     assert_eq!(parameters, ["d Number(2.0)", "a Number(1.0)", "r Number(1.0)"]);
 }
 
+/// Of two files of one spelled name the first that the text meets counts, also when that is inside another file.
+#[test]
+fn first_met_counts() {
+    let folder = folder(&[
+        ("root.net", "uses lib/a.net\nuses x.net"),
+        ("lib/a.net", "uses x.net"),
+        ("lib/x.net", "param x=1"),
+        ("x.net", "param x=2"),
+    ]);
+    let bundle = Bundle::read(&folder.path().join("root.net"), &[]).expect("readable");
+    assert_eq!(parameters(&bundle), [("x".to_owned(), Setting::Number(1.0))]);
+}
+
 /// The include folders are searched in their order, after the file's own folder.
 #[test]
 fn include_folders() {

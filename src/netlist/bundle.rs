@@ -29,28 +29,10 @@ impl Bundle {
     /// The root cannot be read. A missing include is no error here: [`load`](super::load) reports it with its place.
     pub fn read(path: &Path, include: &[PathBuf]) -> Result<Self, std::io::Error> {
         let root = path.display().to_string();
-        let mut files = BTreeMap::from([(root.clone(), text_of(path)?)]);
-        let own = path.canonicalize().ok();
-        let mut waiting = vec![(root.clone(), folder_of(path), 0)];
-        while let Some((name, folder, depth)) = waiting.pop() {
-            for spelled in uses_of(&files[&name]) {
-                if files.contains_key(&spelled) || files.len() > MOST_INCLUDES + 1 || depth > DEEPEST_INCLUDE {
-                    continue;
-                }
-                let places = [folder.clone(), PathBuf::new()];
-                let found = places.iter().chain(include).map(|place| place.join(&spelled)).find(|file| file.is_file());
-                let Some(file) = found else { continue };
-                // The root under another spelling stays out: `load` says that the netlist includes itself.
-                if own.is_some() && file.canonicalize().ok() == own {
-                    continue;
-                }
-                if let Ok(text) = text_of(&file) {
-                    files.insert(spelled.clone(), text);
-                    waiting.push((spelled, folder_of(&file), depth + 1));
-                }
-            }
-        }
-        Ok(Self { root, files })
+        let files = BTreeMap::from([(root.clone(), text_of(path)?)]);
+        let mut reader = Reader { files, own: path.canonicalize().ok(), include };
+        reader.includes_of(&root, &folder_of(path), 0);
+        Ok(Self { root, files: reader.files })
     }
 
     /// A bundle of one file.
@@ -63,6 +45,35 @@ impl Bundle {
     pub fn with_file(mut self, name: &str, text: &str) -> Self {
         self.files.insert(name.to_owned(), text.to_owned());
         self
+    }
+}
+
+/// Reads includes depth first, in the order in which the parser meets them.
+struct Reader<'a> {
+    files: BTreeMap<String, String>,
+    /// The root, to know it under another spelling.
+    own: Option<PathBuf>,
+    include: &'a [PathBuf],
+}
+
+impl Reader<'_> {
+    fn includes_of(&mut self, name: &str, folder: &Path, depth: usize) {
+        for spelled in uses_of(&self.files[name]) {
+            // One more than allowed on each count, so that `load` sees that there are too many.
+            if self.files.contains_key(&spelled) || self.files.len() > MOST_INCLUDES + 1 || depth > DEEPEST_INCLUDE {
+                continue;
+            }
+            let places = [folder, Path::new("")].into_iter().chain(self.include.iter().map(PathBuf::as_path));
+            let Some(file) = places.map(|place| place.join(&spelled)).find(|file| file.is_file()) else { continue };
+            // The root under another spelling stays out: `load` says that the netlist includes itself.
+            if self.own.is_some() && file.canonicalize().ok() == self.own {
+                continue;
+            }
+            if let Ok(text) = text_of(&file) {
+                self.files.insert(spelled.clone(), text);
+                self.includes_of(&spelled, &folder_of(&file), depth + 1);
+            }
+        }
     }
 }
 

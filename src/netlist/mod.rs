@@ -94,11 +94,13 @@ fn check_settings(program: &Program, set: &[(String, Setting)], sink: &mut Sink)
         if known.contains(&name.as_str()) {
             continue;
         }
-        let otherwise = match known.as_slice() {
+        let mut help = match known.as_slice() {
             [] => "the netlist has no `param`".to_owned(),
             names => format!("its parameters are {}", names.join(" ")),
         };
-        let help = suggest::did_you_mean(name, known.iter().copied(), &otherwise);
+        if let Some(meant) = suggest::nearest(name, known.iter().copied()) {
+            help = format!("did you mean `{meant}`? {help}");
+        }
         sink.error("E048", Span::NOWHERE, format!("the netlist has no parameter `{name}` to set"), help);
     }
 }
