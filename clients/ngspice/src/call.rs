@@ -1,6 +1,6 @@
 //! ngspice's memory, read and written: parameters at setup, inputs and outputs at each call.
 
-use crate::abi::{self, Circuit, Complex, Connection, Parameter, Tail, Value, analysis, port_data};
+use crate::abi::{Circuit, Complex, Connection, Instance, Model, Parameter, Tail, Value, analysis, port_data};
 use crate::instance::Question;
 use crate::layout::Layout;
 use crate::model_card::RawCard;
@@ -51,6 +51,20 @@ pub(crate) unsafe fn card(param: *mut *mut Parameter, count: c_int) -> RawCard {
         undamped: flag(8),
         deadline: real(9),
     }
+}
+
+/// The instances of a list of models, in the host's order.
+///
+/// # Safety
+/// `model` heads the host's list of models, which stays as it is as long as the iterator lives.
+pub(crate) unsafe fn instances<'a>(model: *mut Model) -> impl Iterator<Item = (&'a Model, &'a Instance)> {
+    // SAFETY: by contract; both lists end in null.
+    let models = std::iter::successors(unsafe { model.as_ref() }, |m| unsafe { m.next.as_ref() });
+    models.flat_map(|m| {
+        // SAFETY: as above.
+        let first = unsafe { m.instances.as_ref() };
+        std::iter::successors(first, |i| unsafe { i.next.as_ref() }).map(move |i| (m, i))
+    })
 }
 
 /// Ports of a connection; 0 where it is `null`.
@@ -159,7 +173,7 @@ impl Call<'_> {
             std::slice::from_raw_parts_mut(row, self.size(PORTS))
         };
         for (gain, [re, im]) in row.iter_mut().zip(gains) {
-            *gain = abi::Complex { re, im };
+            *gain = Complex { re, im };
         }
     }
 }

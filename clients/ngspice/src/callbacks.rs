@@ -4,7 +4,7 @@
 //! panic out.
 
 use crate::abi::{self, Model, circuit as at, code};
-use crate::call::Call;
+use crate::call::{self, Call};
 use crate::instance::Outcome;
 use crate::opening::open_all;
 use crate::registry::{close, registry};
@@ -97,17 +97,9 @@ pub(crate) unsafe extern "C" fn setup(
 /// Closes the instances of these models: states and connections to servers end with the analysis.
 pub(crate) unsafe extern "C" fn unsetup(model: *mut Model, circuit: *mut c_void) -> c_int {
     guarded(|| {
-        let mut next = model;
-        // SAFETY: the host's lists, as in `open_all`.
+        // SAFETY: the host's lists; then passed on.
         unsafe {
-            while let Some(this) = next.as_ref() {
-                let mut instance = this.instances;
-                while let Some(at) = instance.as_ref() {
-                    close(at.conn as usize);
-                    instance = at.next;
-                }
-                next = this.next;
-            }
+            call::instances(model).for_each(|(_, instance)| close(instance.conn as usize));
             host::unsetup(model, circuit)
         }
     })
@@ -155,7 +147,10 @@ pub(crate) unsafe extern "C" fn trunc(model: *mut Model, circuit: *mut c_void, s
     guarded(|| {
         // SAFETY: passed on.
         let result = unsafe { host::trunc(model, circuit, step) };
-        for entry in &registry().entries {
+        let mut registry = registry();
+        // SAFETY: the host's lists.
+        for (_, instance) in unsafe { call::instances(model) } {
+            let Some(entry) = registry.find(instance.conn as usize) else { continue };
             let bound = entry.instance.step_bound().max(KEEPS * entry.instance.answer().step);
             // SAFETY: the host passes a place for the bound.
             unsafe { *step = (*step).min(bound) };
@@ -165,10 +160,14 @@ pub(crate) unsafe extern "C" fn trunc(model: *mut Model, circuit: *mut c_void, s
 }
 
 /// A point was accepted.
-pub(crate) unsafe extern "C" fn accept(_circuit: *mut c_void, _model: *mut Model) -> c_int {
+pub(crate) unsafe extern "C" fn accept(_circuit: *mut c_void, model: *mut Model) -> c_int {
     guarded(|| {
-        for entry in &mut registry().entries {
-            entry.instance.accept();
+        let mut registry = registry();
+        // SAFETY: the host's lists.
+        for (_, instance) in unsafe { call::instances(model) } {
+            if let Some(entry) = registry.find(instance.conn as usize) {
+                entry.instance.accept();
+            }
         }
         code::OK
     })
@@ -185,7 +184,7 @@ pub(crate) unsafe extern "C" fn evaluate(data: *mut c_void) {
             registry.good = false;
             return None;
         }
-        registry.asked.clear();
+        registry.asked = call.key();
         Some(respond(&call, &mut registry))
     }));
     let outcome = match outcome {
@@ -197,7 +196,9 @@ pub(crate) unsafe extern "C" fn evaluate(data: *mut c_void) {
     registry.good = false;
     if let Outcome::Stop(text) = outcome {
         registry.stopped = true;
-        let reason = format!("instance {}: {text}", registry.asked);
+        let asked = registry.asked;
+        let name = registry.find(asked).map_or("?", |entry| entry.instance.name());
+        let reason = format!("instance {name}: {text}");
         drop(registry);
         record_failure(&reason);
         trace::line(format_args!("stop: {reason}"));

@@ -13,28 +13,27 @@ use std::path::{Path, PathBuf};
 ///
 /// # Safety
 /// `model` heads the host's list of models; each is set up.
-pub(crate) unsafe fn open_all(mut model: *mut Model) -> Result<(), String> {
+pub(crate) unsafe fn open_all(model: *mut Model) -> Result<(), String> {
     let remote = std::env::var("BIMORPH_REMOTE").ok();
-    // SAFETY: the lists end in null; names are strings of the host.
-    unsafe {
-        while let Some(this) = model.as_ref() {
-            let mut instance = this.instances;
-            while let Some(at) = instance.as_ref() {
-                let name = call::text(at.name).unwrap_or_default();
-                let card = ModelCard::new(&call::card(this.param, this.num_param), remote.clone());
-                let (ports, monitors) = (call::size(at.conn, PORTS), call::size(at.conn, MONITORS));
-                let directory = deck_directory(at.conn);
-                let opened = card.map_err(|e| e.to_string()).and_then(|mut card| {
-                    card.check_counts(ports, monitors).map_err(|e| e.to_string())?;
-                    open(&name, &mut card, ports, directory.as_deref())
-                });
-                let model_name = call::text(this.name).unwrap_or_default();
-                let opened = opened.map_err(|e| format!("instance {name} (model {model_name}): {e}"))?;
-                register(at.conn as usize, opened);
-                instance = at.next;
-            }
-            model = this.next;
-        }
+    // SAFETY: the host's lists and strings, by contract.
+    for (model, instance) in unsafe { call::instances(model) } {
+        // SAFETY: as above; the host has set up the connections.
+        let (name, model_name, raw, ports, monitors, directory) = unsafe {
+            (
+                call::text(instance.name).unwrap_or_default(),
+                call::text(model.name).unwrap_or_default(),
+                call::card(model.param, model.num_param),
+                call::size(instance.conn, PORTS),
+                call::size(instance.conn, MONITORS),
+                deck_directory(instance.conn),
+            )
+        };
+        let card = ModelCard::new(&raw, remote.clone()).and_then(|c| c.check_counts(ports, monitors).map(|()| c));
+        let opened = card
+            .map_err(|e| e.to_string())
+            .and_then(|mut card| open(&name, &mut card, ports, directory.as_deref()))
+            .map_err(|e| format!("instance {name} (model {model_name}): {e}"))?;
+        register(instance.conn as usize, opened);
     }
     Ok(())
 }

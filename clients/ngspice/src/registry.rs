@@ -20,8 +20,7 @@ pub(crate) struct Entry {
 
 /// Every instance, and what concerns the load under way.
 pub(crate) struct Registry {
-    /// Instances that are set up.
-    pub(crate) entries: Vec<Entry>,
+    entries: Vec<Entry>,
     epochs: u64,
     /// The step the circuit takes in this load [s].
     pub(crate) delta: f64,
@@ -31,8 +30,8 @@ pub(crate) struct Registry {
     pub(crate) good: bool,
     /// Set when the analysis must end: no device is asked any more.
     pub(crate) stopped: bool,
-    /// Name of the instance being asked.
-    pub(crate) asked: String,
+    /// Key of the instance being asked.
+    pub(crate) asked: usize,
 }
 
 static REGISTRY: Mutex<Registry> = Mutex::new(Registry {
@@ -42,7 +41,7 @@ static REGISTRY: Mutex<Registry> = Mutex::new(Registry {
     sweep: false,
     good: true,
     stopped: false,
-    asked: String::new(),
+    asked: 0,
 });
 
 /// The registry, for as long as the guard lives: never while the host may call back.
@@ -57,7 +56,7 @@ pub(crate) fn register(key: usize, instance: Instance) {
     registry.stopped = false;
     trace::line(format_args!("open {} epoch {} {:?}", instance.name(), registry.epochs, instance.description()));
     let entry = Entry { key, epoch: registry.epochs, instance, voltages: Vec::new(), previous: History::default() };
-    match registry.entries.iter_mut().find(|e| e.is(key)) {
+    match registry.find(key) {
         Some(old) => *old = entry,
         None => registry.entries.push(entry),
     }
@@ -65,12 +64,12 @@ pub(crate) fn register(key: usize, instance: Instance) {
 
 /// Takes an instance out.
 pub(crate) fn close(key: usize) {
-    registry().entries.retain(|e| !e.is(key));
+    registry().entries.retain(|e| e.key != key);
 }
 
-impl Entry {
-    /// Whether this is the instance whose connections stand at `key`: that address stays as long as it lives.
-    pub(crate) fn is(&self, key: usize) -> bool {
-        self.key == key
+impl Registry {
+    /// The instance whose connections stand at `key`: that address stays the same as long as it lives.
+    pub(crate) fn find(&mut self, key: usize) -> Option<&mut Entry> {
+        self.entries.iter_mut().find(|e| e.key == key)
     }
 }

@@ -10,10 +10,9 @@ use std::ffi::c_int;
 /// Answers a call.
 pub(crate) fn respond(call: &Call<'_>, registry: &mut Registry) -> Outcome {
     let (delta, sweep) = (registry.delta, registry.sweep);
-    let Some(entry) = registry.entries.iter_mut().find(|e| e.is(call.key())) else {
+    let Some(entry) = registry.find(call.key()) else {
         return Outcome::Stop("an instance was not set up".into());
     };
-    registry.asked.push_str(entry.instance.name());
     let question = call.question(delta);
     let ports = call.size(PORTS);
     let doubles = history::len(ports);

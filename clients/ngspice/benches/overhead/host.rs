@@ -29,6 +29,10 @@ unsafe extern "C" fn message(_: *mut c_char) -> c_int {
     0
 }
 
+unsafe extern "C" fn deck_path() -> *const c_char {
+    std::ptr::null()
+}
+
 /// Keeps `value` for the rest of the process: a host's structures outlive every call.
 fn keep<T>(value: T) -> *mut T {
     Box::leak(Box::new(value))
@@ -55,6 +59,7 @@ impl Host {
         core[23] = reserve as *const c_void;
         core[24] = memory as *const c_void;
         core[35] = message as *const c_void;
+        core[45] = deck_path as *const c_void;
         let mut parameters: Vec<*mut [u64; 4]> = (0..10).map(|_| keep([pair(1, 0), 0, 0, 0])).collect();
         let text = keep([c"none".as_ptr() as u64, 0]);
         // SAFETY: `file` is given, the first of the ten parameters.

@@ -127,3 +127,30 @@ fn noise_after_a_transient_runs() {
     let report = bimorph::cosim::run(&options).unwrap();
     assert!(report.output.contains("length(frequency) = 6"), "{}", report.output);
 }
+
+/// What one circuit's devices ask for does not reach into another circuit of the same ngspice: after a part that bears
+/// 50 ns steps, a part that bears any takes as many points as before it.
+#[test]
+fn circuits_do_not_share_bounds() {
+    if skipped() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    for (name, file) in [("free.cir", "plate"), ("short.cir", "plate.short")] {
+        let text = std::fs::read_to_string(analytic_deck("short.cir")).unwrap();
+        std::fs::write(folder.path().join(name), text.replace("plate.short", file)).unwrap();
+    }
+    std::fs::copy(analytic_deck("drive.inc"), folder.path().join("drive.inc")).unwrap();
+    let at = folder.path().display();
+    let control = format!(
+        "* three circuits\n.control\nsource {at}/free.cir\nrun\nprint length(time)\nsource {at}/short.cir\nrun\nprint \
+         length(time)\nsource {at}/free.cir\nrun\nprint length(time)\nquit\n.endc\n.end\n"
+    );
+    let deck = folder.path().join("all.cir");
+    std::fs::write(&deck, control).unwrap();
+    let report = bimorph::cosim::run(&CosimOptions { deck, capture: true, ..options("plate.cir") }).unwrap();
+    let lengths: Vec<_> = report.output.lines().filter(|l| l.starts_with("length(time)")).collect();
+    assert_eq!(lengths.len(), 3, "{}", report.output);
+    assert_ne!(lengths[0], lengths[1]);
+    assert_eq!(lengths[0], lengths[2]);
+}
