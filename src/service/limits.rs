@@ -28,7 +28,8 @@ pub struct Limits {
     pub transient_values: usize,
     /// Most modes of one request, default 1 000.
     pub modes: usize,
-    /// Analyses computed at once, default the number of cores; others wait their turn.
+    /// Analyses computed at once, default the number of cores; others wait their turn. As many compilations and openings
+    /// have places of their own, so that long transients do not keep a circuit from starting.
     pub analyses: usize,
     /// Most connections at once, default 512; further ones are closed as they come.
     pub connections: usize,
@@ -36,8 +37,11 @@ pub struct Limits {
     pub streams_per_connection: u32,
     /// Longest unary call [s], default 120 s; then DEADLINE_EXCEEDED.
     pub request_timeout: Duration,
-    /// A session or a finished sweep untouched for this long is forgotten, default 10 min.
+    /// A session without a stream, or a finished sweep, untouched for this long is forgotten, default 10 min.
     pub idle: Duration,
+    /// A session on an open stream untouched for this long is forgotten, default 12 h: a circuit may be paused for lunch,
+    /// but a client that vanished without a word must not stay for ever.
+    pub stream_idle: Duration,
     /// After the signal to stop, open streams may go on for this long, default 5 s; then they end with UNAVAILABLE, and
     /// connections that do not close are cut.
     pub drain: Duration,
@@ -61,6 +65,7 @@ impl Default for Limits {
             streams_per_connection: 128,
             request_timeout: Duration::from_secs(120),
             idle: Duration::from_secs(600),
+            stream_idle: Duration::from_secs(12 * 3600),
             drain: Duration::from_secs(5),
         }
     }

@@ -31,7 +31,10 @@ pub(super) struct Shared {
     pub(super) models: Models,
     pub(super) sessions: Sessions,
     pub(super) sweeps: Sweeps,
+    /// Places for analyses, which may take long.
     pub(super) work: Work,
+    /// Places for what a circuit waits for before it can start.
+    pub(super) desk: Work,
     pub(super) shutdown: Shutdown,
 }
 
@@ -87,7 +90,7 @@ impl proto::bimorph_server::Bimorph for Calls {
     async fn check(&self, request: Request<proto::CheckRequest>) -> Reply<proto::CheckResponse> {
         let request = request.into_inner();
         let (bundle, options) = self.netlist(request.bundle, request.options)?;
-        let answer = self.0.work.run(move || Ok(check(&bundle, &options))).await?;
+        let answer = self.0.desk.run(move || Ok(check(&bundle, &options))).await?;
         Ok(Response::new(answer))
     }
 
@@ -96,7 +99,7 @@ impl proto::bimorph_server::Bimorph for Calls {
         let (bundle, options) = self.netlist(request.bundle, request.options)?;
         let shared = Arc::clone(&self.0);
         let job = move || shared.models.compile(bundle, options, &shared.limits, shared.make);
-        let model = self.0.work.run(job).await?;
+        let model = self.0.desk.run(job).await?;
         Ok(Response::new(proto::CompileResponse { model: Some(model.description.clone()) }))
     }
 
@@ -119,7 +122,7 @@ impl proto::bimorph_server::Bimorph for Calls {
                 _ => Err(status::fault()),
             }
         };
-        self.0.work.run(job).await.map(Response::new)
+        self.0.desk.run(job).await.map(Response::new)
     }
 
     type TrialStream = TrialStream;
@@ -132,7 +135,7 @@ impl proto::bimorph_server::Bimorph for Calls {
         let request = request.into_inner();
         let session = self.0.sessions.get(&request.session)?;
         let job = move || session.linearize(Token(request.token), &request.omega);
-        let points = self.0.work.run(job).await?;
+        let points = self.0.desk.run(job).await?;
         Ok(Response::new(proto::LinearizeResponse { points }))
     }
 

@@ -126,6 +126,7 @@ pub async fn run_with(
     let instance = RandomState::new().hash_one(std::process::id()) as u32;
     let shared = Arc::new(Shared {
         work: Work::new(limits.analyses, limits.request_timeout, signals.clone()),
+        desk: Work::new(limits.analyses, limits.request_timeout, signals.clone()),
         limits,
         make,
         models: Models::default(),
@@ -212,10 +213,12 @@ pub fn run_until_signal(options: ServeOptions) -> Result<(), ServeError> {
 /// Forgets what was not used for [`Limits::idle`], for as long as the server runs.
 async fn expire(shared: Arc<Shared>) {
     let idle = shared.limits.idle;
-    let mut ticks = tokio::time::interval((idle / 4).clamp(Duration::from_millis(10), Duration::from_secs(30)));
+    let mut ticks = tokio::time::interval(
+        (idle.min(shared.limits.stream_idle) / 4).clamp(Duration::from_millis(10), Duration::from_secs(30)),
+    );
     loop {
         ticks.tick().await;
-        let (sessions, sweeps) = (shared.sessions.expire(idle), shared.sweeps.expire(idle));
+        let (sessions, sweeps) = (shared.sessions.expire(&shared.limits), shared.sweeps.expire(idle));
         if sessions + sweeps > 0 {
             tracing::info!(sessions, sweeps, open = shared.sessions.len(), "forgot what was idle");
         }

@@ -9,7 +9,7 @@ use crate::device::{Device, DeviceError, OpenRequest, SmallSignal, Token, TrialR
 use proto::device_reply::Kind as ReplyKind;
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 use tonic::Status;
@@ -25,6 +25,8 @@ pub(super) struct Session {
     started: Instant,
     used_ms: AtomicU64,
     closed: AtomicBool,
+    /// Streams that hold this session.
+    streams: AtomicUsize,
 }
 
 /// What a stream asks of its session.
@@ -118,6 +120,17 @@ impl Session {
         self.closed.store(true, Ordering::Relaxed);
     }
 
+    /// A stream takes hold of this session.
+    pub(super) fn hold(&self) {
+        self.streams.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// A stream lets go of it.
+    pub(super) fn release(&self) {
+        self.touch();
+        self.streams.fetch_sub(1, Ordering::Relaxed);
+    }
+
     fn touch(&self) {
         self.used_ms.store(self.age_ms(), Ordering::Relaxed);
     }
@@ -173,6 +186,7 @@ impl Sessions {
             started: Instant::now(),
             used_ms: AtomicU64::new(0),
             closed: AtomicBool::new(false),
+            streams: AtomicUsize::new(0),
         });
         let mut open = self.open.lock().unwrap_or_else(PoisonError::into_inner);
         open.retain(|_, session| !session.is_closed());
@@ -196,12 +210,13 @@ impl Sessions {
         session.inspect(|session| session.close()).is_some()
     }
 
-    /// Forgets sessions that were not used for `idle`; how many.
-    pub(super) fn expire(&self, idle: Duration) -> usize {
+    /// Forgets sessions that were not used for long; how many.
+    pub(super) fn expire(&self, limits: &Limits) -> usize {
         let mut open = self.open.lock().unwrap_or_else(PoisonError::into_inner);
         let before = open.len();
         open.retain(|_, session| {
-            let keep = session.idle() < idle;
+            let held = session.streams.load(Ordering::Relaxed) > 0;
+            let keep = session.idle() < if held { limits.stream_idle } else { limits.idle };
             if !keep {
                 session.close();
             }

@@ -78,7 +78,9 @@ impl TrialStream {
         }
         self.leave();
         let model = self.shared.models.get(&open.model)?;
-        self.session = Some(self.shared.sessions.create(&model, self.shared.make, &self.shared.limits)?);
+        let session = self.shared.sessions.create(&model, self.shared.make, &self.shared.limits)?;
+        session.hold();
+        self.session = Some(session);
         self.owned = true;
         Ok(())
     }
@@ -88,6 +90,7 @@ impl TrialStream {
             Ok(session) => {
                 self.leave();
                 let opened = session.opened();
+                session.hold();
                 self.session = Some(session);
                 ReplyKind::Opened(opened)
             }
@@ -96,8 +99,11 @@ impl TrialStream {
     }
 
     fn leave(&mut self) {
-        if let Some(session) = self.session.take().filter(|_| self.owned) {
-            self.shared.sessions.close(session.id());
+        if let Some(session) = self.session.take() {
+            session.release();
+            if self.owned {
+                self.shared.sessions.close(session.id());
+            }
         }
         self.owned = false;
     }

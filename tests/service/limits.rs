@@ -1,11 +1,14 @@
 //! Each limit is answered with RESOURCE_EXHAUSTED and its name; what was idle too long is forgotten.
 
-use super::running::{block_on, compiled, start, wire_bundle};
+use super::running::{block_on, compiled, start, start_with, wire_bundle};
+use bimorph::device::local::LocalDevice;
 use bimorph::device::{Device, Mode, OpenRequest, Trial, TrialReply};
 use bimorph::service::limits::Limits;
 use bimorph::service::proto;
 use std::time::Duration;
 use tonic::{Code, Status};
+
+const AT_REST: Trial<'_> = Trial { mode: Mode::Static, parent: None, t: 0.0, dt: 0.0, voltages: &[1.0, 0.0] };
 
 fn exhausted(status: &Status, name: &str) {
     assert_eq!(status.code(), Code::ResourceExhausted, "{status:?}");
@@ -83,19 +86,59 @@ fn the_oldest_model_goes_first() {
     });
 }
 
-/// An idle session is forgotten; a remote device notices, and opens anew.
+/// A session without a stream is forgotten when it was idle for long, one on a stream is not.
 #[test]
 fn idle_sessions_are_forgotten() {
     let server = start("127.0.0.1:0", Limits { idle: Duration::from_millis(40), ..Limits::default() });
     let mut device = server.device();
     device.open(&OpenRequest::default()).expect("opens");
-    let trial = Trial { mode: Mode::Static, parent: None, t: 0.0, dt: 0.0, voltages: &[1.0, 0.0] };
-    let mut reply = TrialReply::default();
+    block_on(async {
+        let mut client = server.client().await;
+        let model = compiled(&mut client).await;
+        let opened = client.open(proto::OpenRequest { model, ..Default::default() }).await.expect("opens");
+        tokio::time::sleep(Duration::from_millis(300)).await;
+        let close = proto::CloseRequest { session: opened.into_inner().session };
+        assert_eq!(client.close(close).await.expect_err("is forgotten").code(), Code::NotFound);
+    });
+    device.trial(&AT_REST, &mut TrialReply::default()).expect("the stream has kept its session");
+}
+
+/// Even on a stream a session does not stay for ever; a remote device notices, and opens anew.
+#[test]
+fn sessions_of_vanished_clients_are_forgotten() {
+    let server = start("127.0.0.1:0", Limits { stream_idle: Duration::from_millis(40), ..Limits::default() });
+    let mut device = server.device();
+    device.open(&OpenRequest::default()).expect("opens");
     std::thread::sleep(Duration::from_millis(300));
-    let gone = device.trial(&trial, &mut reply).expect_err("is forgotten");
+    let gone = device.trial(&AT_REST, &mut TrialReply::default()).expect_err("is forgotten");
     assert!(gone.to_string().contains("no session"), "{gone}");
     device.open(&OpenRequest::default()).expect("opens anew");
-    device.trial(&trial, &mut reply).expect("answers");
+    device.trial(&AT_REST, &mut TrialReply::default()).expect("answers");
+}
+
+/// Analyses that take every place do not keep a circuit from compiling and opening.
+#[test]
+fn analyses_do_not_block_circuits() {
+    let limits = Limits { analyses: 1, request_timeout: Duration::from_millis(500), ..Limits::default() };
+    let server = start_with("127.0.0.1:0", limits, |compiled| Box::new(LocalDevice::new(compiled)));
+    block_on(async {
+        let mut client = server.client().await;
+        let model = compiled(&mut client).await;
+        // Its reader is slow on purpose, so it keeps its place.
+        let request = proto::TransientRequest {
+            model: model.clone(),
+            stop_s: 1e-3,
+            signals: vec!["m.x".into(); 300],
+            points: 300_000,
+            ..Default::default()
+        };
+        let _running = client.transient(request).await.expect("starts");
+        let late = client.r#static(proto::StaticRequest { model: model.clone(), voltages: vec![] }).await;
+        assert_eq!(late.expect_err("waits in vain").code(), Code::DeadlineExceeded);
+        let options = Some(proto::CompileOptions { tol: Some(1e-4), ..Default::default() });
+        client.compile(proto::CompileRequest { bundle: wire_bundle(), options }).await.expect("compiles");
+        client.open(proto::OpenRequest { model, ..Default::default() }).await.expect("opens");
+    });
 }
 
 /// A thousand sessions one after another leave nothing behind: the limit of four is never reached.
