@@ -68,7 +68,7 @@ pub fn pull_in(compiled: &Compiled, port: Option<&str>, max: f64) -> Result<Pull
 
     // beyond the fold: fall to contact, then come back down
     solver.options.stop_at_fold = false;
-    let (here, above) = (at(pull_in_v), at(pull_in_v * (1.0 + 1e-4)));
+    let (here, above) = (at(pull_in_v), at(1.01 * pull_in_v));
     let fallen = solver.follow(system, &SourcePath::new(electrics, &here, &above, [1.0, 1.0]), &mut q);
     let release_v = match fallen {
         Ok(_) if system.in_contact(&q) => {

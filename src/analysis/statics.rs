@@ -3,6 +3,7 @@ use super::signal::{Signal, View};
 use super::{AnalysisError, PortVoltages};
 use crate::compile::Compiled;
 use crate::multibody::planar::Pose;
+use crate::solve::SolveError;
 use crate::solve::equilibrium::{Equilibrium, EquilibriumOptions, Path};
 use crate::solve::path::SourcePath;
 use serde::Serialize;
@@ -31,6 +32,8 @@ pub struct StaticResult {
     pub charges_c: Vec<(String, f64)>,
     /// True when the part pulled in on the way.
     pub pulled_in: bool,
+    /// Motions that nothing resists noticeably and no load excites; they are held where they are.
+    pub free_motions: Vec<String>,
     /// Mechanical unknowns.
     pub unknowns: usize,
     /// Newton iterations over all load steps.
@@ -72,6 +75,7 @@ pub fn static_equilibrium(compiled: &Compiled, voltages: &PortVoltages) -> Resul
         currents_a: (0..electrics.ports).map(|p| (port(p), current(p))).collect(),
         charges_c: (0..electrics.ports).map(|p| (port(p), charge(p))).collect(),
         pulled_in: point.path.fold.is_some(),
+        free_motions: point.free_motions,
         unknowns: system.model.unknowns(),
         iterations: point.path.iterations,
     })
@@ -85,6 +89,7 @@ pub(crate) struct OperatingPoint {
     pub(crate) rise: Vec<f64>,
     pub(crate) volts: Vec<f64>,
     pub(crate) path: Path,
+    pub(crate) free_motions: Vec<String>,
 }
 
 /// The equilibrium reached from rest.
@@ -97,10 +102,16 @@ pub(crate) fn operating_point(compiled: &Compiled, voltages: &PortVoltages) -> R
     let mut solver = Equilibrium::new(system, EquilibriumOptions::default());
     let loads = SourcePath::new(electrics, &rest, &sources, [0.0, 1.0]);
     let path = solver.follow(system, &loads, &mut q).map_err(AnalysisError::from)?;
+    // a part that hangs on nothing is a slip of the pen, also where no load finds out; one that hangs on so little that
+    // rounding hides it is not
+    if let Some(&loose) = solver.held().iter().find(|p| !system.model.grounded(p.body)) {
+        return Err(SolveError::singular(system, loose).into());
+    }
+    let free_motions = solver.held().iter().map(|&p| SolveError::singular(system, p).to_string()).collect();
     let mut drive = electrics.drive();
     let mut rise = vec![0.0; electrics.heating.heaters.len()];
     electrics.steady(&sources, &mut rise, &mut drive);
-    Ok(OperatingPoint { q, sources, rise, volts: drive.volts, path })
+    Ok(OperatingPoint { q, sources, rise, volts: drive.volts, path, free_motions })
 }
 
 /// The source vector for voltages by port name.

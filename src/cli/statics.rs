@@ -42,6 +42,7 @@ struct Document<'a> {
     currents_a: Named<'a, f64>,
     charges_c: Named<'a, f64>,
     pulled_in: bool,
+    free_motions: &'a [String],
     unknowns: usize,
     iterations: usize,
     port_voltages_v: Named<'a, f64>,
@@ -63,6 +64,7 @@ impl Static {
             currents_a: Named(&result.currents_a),
             charges_c: Named(&result.charges_c),
             pulled_in: result.pulled_in,
+            free_motions: &result.free_motions,
             unknowns: result.unknowns,
             iterations: result.iterations,
             port_voltages_v: Named(&self.ports),
@@ -136,6 +138,9 @@ fn text(compiled: &Compiled, result: &StaticResult) -> String {
     }
     if result.pulled_in {
         text.push_str("\npulled in on the way to these voltages\n");
+    }
+    for motion in &result.free_motions {
+        let _ = writeln!(text, "\nheld, because no load excites it: {motion}");
     }
     let _ = write!(text, "\n{} Newton iterations, {}", result.iterations, report::footing(compiled, result.unknowns));
     text

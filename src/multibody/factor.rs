@@ -32,8 +32,8 @@ pub struct BlockMatrix<T: Scalar, const N: usize> {
     scale: Vec<SVector<f64, N>>,
 }
 
-/// A pivot smaller than this share of its diagonal entry is taken for zero. Soft MEMS suspensions reach 1e-10.
-const LOST: f64 = 1e-13;
+/// A pivot smaller than this share of its diagonal entry is taken for zero. Soft MEMS suspensions reach 1e-9.
+const LOST: f64 = 1e-11;
 
 /// Where a factorization met a pivot that is zero or not finite.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -72,13 +72,35 @@ impl<T: Scalar, const N: usize> BlockMatrix<T, N> {
     /// # Errors
     /// [`ZeroPivot`] where a pivot vanishes against the entries it came from, or is not finite.
     pub fn factor(&mut self, pattern: &Pattern) -> Result<Inertia, ZeroPivot> {
+        self.eliminate(pattern, |pivot| Err(pivot))
+    }
+
+    /// Like [`BlockMatrix::factor`], but a direction whose pivot vanishes is held instead: it gets the pivot it had before
+    /// elimination, and goes to `held`. A solution then stands for a structure with free motions that no load excites.
+    ///
+    /// # Errors
+    /// [`ZeroPivot`] where there is nothing to hold on to: a zero diagonal entry, or a pivot that is not finite.
+    pub fn factor_holding(&mut self, pattern: &Pattern, held: &mut Vec<ZeroPivot>) -> Result<Inertia, ZeroPivot> {
+        held.clear();
+        self.eliminate(pattern, |pivot| {
+            held.push(pivot);
+            Ok(())
+        })
+    }
+
+    fn eliminate(
+        &mut self,
+        pattern: &Pattern,
+        mut vanished: impl FnMut(ZeroPivot) -> Result<(), ZeroPivot>,
+    ) -> Result<Inertia, ZeroPivot> {
         let mut inertia = Inertia::default();
         for (scale, block) in self.scale.iter_mut().zip(&self.diagonal) {
             *scale = SVector::from_fn(|i, _| block[(i, i)].modulus());
         }
         for j in 0..pattern.bodies() {
-            let inverse = invert(&self.diagonal[j], &self.scale[j], &mut inertia)
-                .map_err(|direction| ZeroPivot { body: j, direction })?;
+            let inverse = invert(&self.diagonal[j], &self.scale[j], &mut inertia, &mut |direction| {
+                vanished(ZeroPivot { body: j, direction })
+            })?;
             self.diagonal[j] = inverse;
             let column = pattern.column(j);
             let mut target = pattern.targets(j).iter();
@@ -134,12 +156,13 @@ impl<T: Scalar, const N: usize> BlockMatrix<T, N> {
 
 /// Inverse of a symmetric block by L·D·Lᵀ; adds the pivots' signs to `inertia`.
 ///
-/// Only the lower triangle is read. The error is the direction whose pivot vanished.
+/// Only the lower triangle is read. `vanished` decides about a direction whose pivot vanished: an error, or to hold it.
 fn invert<T: Scalar, const N: usize>(
     a: &SMatrix<T, N, N>,
     scale: &SVector<f64, N>,
     inertia: &mut Inertia,
-) -> Result<SMatrix<T, N, N>, usize> {
+    vanished: &mut dyn FnMut(usize) -> Result<(), ZeroPivot>,
+) -> Result<SMatrix<T, N, N>, ZeroPivot> {
     let mut l = SMatrix::<T, N, N>::identity();
     let mut pivot = SVector::<T, N>::zeros();
     for j in 0..N {
@@ -148,7 +171,8 @@ fn invert<T: Scalar, const N: usize>(
             d -= l[(j, k)] * l[(j, k)] * pivot[k];
         }
         if d.modulus() <= LOST * scale[j] || !d.is_finite() {
-            return Err(j);
+            vanished(j)?;
+            d = T::from_real(scale[j]);
         }
         if d.real() < 0.0 {
             inertia.negative += 1;

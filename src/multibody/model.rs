@@ -188,6 +188,29 @@ impl Model {
         self.bodies.iter().map(|b| b.free.map_or(3.0, |p| p.trace()).round() as usize).sum()
     }
 
+    /// True when joints connect a body to ground.
+    pub fn grounded(&self, body: usize) -> bool {
+        let mut reached = vec![false; self.bodies.len()];
+        let mut stack = vec![body];
+        reached[body] = true;
+        let touching = |k: usize| self.joints.iter().filter(move |j| j.a == BodyId::Free(k) || j.b == BodyId::Free(k));
+        while let Some(k) = stack.pop() {
+            for joint in touching(k) {
+                for end in [joint.a, joint.b] {
+                    match end {
+                        BodyId::Ground => return true,
+                        BodyId::Free(next) if !reached[next] => {
+                            reached[next] = true;
+                            stack.push(next);
+                        }
+                        BodyId::Free(_) => {}
+                    }
+                }
+            }
+        }
+        false
+    }
+
     /// Where a pair's blocks lie.
     pub(crate) fn place(&self, a: BodyId, b: BodyId) -> Place {
         locate(&self.pattern, a, b)

@@ -1,8 +1,8 @@
 //! Static equilibrium r(q, drive(s)) = 0 along a path of loads, s from 0 to 1.
 //!
 //! Each step predicts along the tangent, then corrects by Newton. It is accepted only when the corrector converges, ends on
-//! a stable equilibrium (no negative pivot), and corrects less than it predicted: a Newton iteration that wandered to
-//! another branch corrects more. Otherwise the step is halved. Where steps vanish the path has a fold: pull-in, release or
+//! a stable equilibrium (no negative pivot), and corrects at most half of what it predicted: a Newton iteration that
+//! wandered to another branch corrects more. Otherwise the step is halved. Where steps vanish the path has a fold: pull-in, release or
 //! snap-through. From there the system falls, as an overdamped motion, to the next stable equilibrium, and the path goes on
 //! from that; the fold's place is reported.
 //!
@@ -14,6 +14,7 @@ use super::SolveError;
 use super::path::LoadPath;
 use crate::gaps::{Drive, System};
 use crate::multibody::BlockMatrix;
+use crate::multibody::factor::ZeroPivot;
 use crate::multibody::planar::Pose;
 
 /// How an equilibrium is searched. `Default` is the only place where the numbers stand.
@@ -25,6 +26,8 @@ pub struct EquilibriumOptions {
     pub iterations: usize,
     /// Smallest load step before a fold is declared, default 1e-7 of the path. Smaller: folds located more sharply.
     pub smallest_step: f64,
+    /// How far past a fold the fall begins, default 1e-2 of the path. Smaller: closer to the fold, and slower.
+    pub past_fold: f64,
     /// Steps of a fall after a fold, default 4000.
     pub fall_steps: usize,
     /// Stop at the first fold instead of falling, default false.
@@ -33,7 +36,14 @@ pub struct EquilibriumOptions {
 
 impl Default for EquilibriumOptions {
     fn default() -> Self {
-        Self { tolerance: 1e-10, iterations: 12, smallest_step: 1e-7, fall_steps: 4000, stop_at_fold: false }
+        Self {
+            tolerance: 1e-10,
+            iterations: 12,
+            smallest_step: 1e-7,
+            past_fold: 1e-2,
+            fall_steps: 4000,
+            stop_at_fold: false,
+        }
     }
 }
 
@@ -56,7 +66,10 @@ pub struct Equilibrium {
     tangent: BlockMatrix<f64, 3>,
     residual: Vec<Pose>,
     step: Vec<Pose>,
+    /// Where the tangent predicted the end of the step.
+    prediction: Vec<Pose>,
     trial: Vec<Pose>,
+    held: Vec<ZeroPivot>,
     drive: Drive,
     slope: Drive,
 }
@@ -75,10 +88,17 @@ impl Equilibrium {
             tangent: BlockMatrix::new(&system.model.pattern),
             residual: zeros.clone(),
             step: zeros.clone(),
+            prediction: zeros.clone(),
             trial: zeros,
+            held: Vec::new(),
             drive: system.electrics.drive(),
             slope: system.electrics.drive(),
         }
+    }
+
+    /// Free motions that the last factorization held, because no load excites them: (body, direction).
+    pub fn held(&self) -> &[ZeroPivot] {
+        &self.held
     }
 
     /// The factored tangent of the last equilibrium.
@@ -98,12 +118,14 @@ impl Equilibrium {
             let step = f64::min(ds, 1.0 - s);
             let to = if 1.0 - s - step < 1e-12 { 1.0 } else { s + step };
             self.predict(system, path, s, to - s, q)?;
-            match self.correct(system, path, to, q, &mut done)? {
+            match self.correct(system, path, to, &mut done) {
                 Corrected::Stable => {
                     q.copy_from_slice(&self.trial);
                     s = to;
                     ds = 2.0 * step;
                 }
+                // a free motion that a load excites never settles: there is no equilibrium to look for
+                Corrected::No if !self.held.is_empty() => return Err(SolveError::singular(system, self.held[0])),
                 Corrected::No if step > self.options.smallest_step => ds = 0.5 * step,
                 Corrected::No => {
                     done.fold.get_or_insert(s);
@@ -111,8 +133,8 @@ impl Equilibrium {
                         done.reached = s;
                         return Ok(done);
                     }
-                    // just past the fold, where the branch is gone
-                    let to = f64::min(s + 4.0 * self.options.smallest_step, 1.0);
+                    // a little past the fold, where the branch is gone; nearer to it the fall would take for ever
+                    let to = f64::min(s + self.options.past_fold, 1.0);
                     self.fall(system, path, to, q, &mut done)?;
                     s = to;
                     ds = 0.25;
@@ -129,7 +151,9 @@ impl Equilibrium {
         path.slope(s, &mut self.slope);
         system.tangent(q, &self.drive, &mut self.tangent, &mut self.residual);
         system.model.project_matrix(&mut self.tangent);
-        self.tangent.factor(&system.model.pattern).map_err(|p| SolveError::singular(system, p))?;
+        self.tangent
+            .factor_holding(&system.model.pattern, &mut self.held)
+            .map_err(|p| SolveError::singular(system, p))?;
         system.drive_force(q, &self.drive, &self.slope, &mut self.step);
         for (step, r) in self.step.iter_mut().zip(&self.residual) {
             *step = *step * -ds - r;
@@ -138,18 +162,12 @@ impl Equilibrium {
         for ((trial, q), step) in self.trial.iter_mut().zip(q).zip(&self.step) {
             *trial = q + step;
         }
+        self.prediction.copy_from_slice(&self.trial);
         Ok(())
     }
 
     /// Newton at `s` from the prediction in `trial`.
-    fn correct(
-        &mut self,
-        system: &System,
-        path: &dyn LoadPath,
-        s: f64,
-        q: &[Pose],
-        done: &mut Path,
-    ) -> Result<Corrected, SolveError> {
+    fn correct(&mut self, system: &System, path: &dyn LoadPath, s: f64, done: &mut Path) -> Corrected {
         let predicted = size(system, &self.step);
         path.at(s, &mut self.drive);
         let mut last = f64::INFINITY;
@@ -157,12 +175,14 @@ impl Equilibrium {
             done.iterations += 1;
             system.tangent(&self.trial, &self.drive, &mut self.tangent, &mut self.residual);
             system.model.project_matrix(&mut self.tangent);
-            let Ok(inertia) = self.tangent.factor(&system.model.pattern) else { return Ok(Corrected::No) };
+            let Ok(inertia) = self.tangent.factor_holding(&system.model.pattern, &mut self.held) else {
+                return Corrected::No;
+            };
             std::mem::swap(&mut self.step, &mut self.residual);
             self.tangent.solve(&system.model.pattern, &mut self.step);
             let correction = size(system, &self.step);
             if !correction.is_finite() || (correction > last && correction > 1e-3 * system.length_scale) {
-                return Ok(Corrected::No);
+                return Corrected::No;
             }
             last = correction;
             for (trial, step) in self.trial.iter_mut().zip(&self.step) {
@@ -171,15 +191,14 @@ impl Equilibrium {
             let reach = size(system, &self.trial).max(1e-6 * system.length_scale);
             if correction <= self.options.tolerance * reach {
                 if inertia.negative > 0 {
-                    return Ok(Corrected::No);
+                    return Corrected::No;
                 }
-                let moved = distance(system, &self.trial, q);
-                let tame = moved <= 3.0 * predicted + 1e-3 * system.length_scale
-                    && predicted <= 3.0 * moved + 1e-3 * system.length_scale;
-                return Ok(if tame { Corrected::Stable } else { Corrected::No });
+                let corrected = distance(system, &self.trial, &self.prediction);
+                let tame = corrected <= 0.5 * predicted + 1e-3 * system.length_scale;
+                return if tame { Corrected::Stable } else { Corrected::No };
             }
         }
-        Ok(Corrected::No)
+        Corrected::No
     }
 
     /// Lets the system fall at fixed loads, as an overdamped motion, to a stable equilibrium.
@@ -224,7 +243,7 @@ impl Equilibrium {
             if damping == 0.0 && moved <= self.options.tolerance * size(system, q).max(system.length_scale) {
                 return Ok(());
             }
-            damping = if damping <= first_damping { 0.0 } else { damping / 9.0 };
+            damping = if damping <= first_damping { 0.0 } else { damping / 4.0 };
         }
         Err(self.lost(system, s, done.iterations))
     }

@@ -91,5 +91,7 @@ fn facing_beams() {
     let tip = node(&balance(&compiled, &[]), "b").y;
     close(tip, -line * 1e-16 / (8.0 * ei), 1e-3);
     let found = pull_in(&compiled, None, 200.0).unwrap();
-    assert!(found.pull_in_v > 1.0 && found.pull_in_v < 200.0, "{found:?}");
+    // the tip lets go below the voltage at which it snapped, however close to the fold the fall began
+    let release = found.release_v.unwrap();
+    assert!(0.0 < release && release < 0.8 * found.pull_in_v, "{found:?}");
 }

@@ -20,6 +20,7 @@ pub fn static_to_wire(result: &StaticResult) -> proto::StaticResponse {
         currents_a: named(&result.currents_a),
         charges_c: named(&result.charges_c),
         pulled_in: result.pulled_in,
+        free_motions: result.free_motions.clone(),
         unknowns: result.unknowns as u64,
         iterations: result.iterations as u64,
     }
@@ -34,6 +35,7 @@ pub fn static_from_wire(wire: proto::StaticResponse) -> StaticResult {
         currents_a: pairs(wire.currents_a),
         charges_c: pairs(wire.charges_c),
         pulled_in: wire.pulled_in,
+        free_motions: wire.free_motions,
         unknowns: size(wire.unknowns),
         iterations: size(wire.iterations),
     }
