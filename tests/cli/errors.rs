@@ -85,6 +85,7 @@ fn options_that_mean_nothing() {
         ("plot gone.raw --out a.svg", "gone.raw"),
         ("plot c.net --out a.svg", "Title:"),
         ("serve --listen ftp://x", "unix:///path"),
+        ("serve --listen 0.0.0.0:0", "--insecure"),
         ("cosim gone.cir", "gone.cir"),
     ] {
         let message = fails(&bench, words);

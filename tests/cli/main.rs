@@ -4,3 +4,4 @@ mod analyses;
 mod bench;
 mod errors;
 mod outputs;
+mod service;

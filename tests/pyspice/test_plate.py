@@ -27,6 +27,7 @@ def deck(tmp_path):
 .model plate bimorph(file="{path}" ports=["drive"] monitors=["m.x:1e6"])
 A1 %gd [drive 0] %v [x] plate
 V1 drive 0 {source}
+.options reltol=1e-6
 {analysis}
 .end
 """

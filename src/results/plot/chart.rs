@@ -73,7 +73,7 @@ fn draw_panel(picture: &mut Picture, chart: &Chart, panel: &Panel, x_axis: &Axis
         (low.min(l), high.max(h))
     });
     let fixed = panel.unit.strip_prefix('[').and_then(|u| u.strip_suffix(']'));
-    let mut y_axis = axis(low, high, if fixed.is_some() { "" } else { &panel.unit }, 4, true);
+    let mut y_axis = axis(low, high, if fixed.is_some() { "" } else { &panel.unit }, 6, true);
     if let Some(unit) = fixed {
         y_axis.unit = unit.to_owned() + &y_axis.unit;
     }

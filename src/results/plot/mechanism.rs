@@ -217,7 +217,7 @@ fn draw_ports(picture: &mut Picture, structure: &Structure, view: &View) {
             let [x, y] = view.at(structure.nodes[node.0].position);
             picture.circle(x, y, 4.5, Paint { fill: "#ffffff", stroke: "#D55E00", width: 2.0, opacity: 1.0 });
             let (align, shift) = if x > WIDTH - 140.0 { (Align::End, -9.0) } else { (Align::Start, 9.0) };
-            picture.text(x + shift, y - 8.0, 13.0, align, "#D55E00", &port.name);
+            picture.label(x + shift, y - 8.0, 13.0, align, "#D55E00", &port.name);
         }
     }
 }

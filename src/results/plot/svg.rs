@@ -135,6 +135,13 @@ impl Picture {
         );
     }
 
+    /// A line of text that stays readable over a drawing: with a white edge.
+    pub fn label(&mut self, x: f64, y: f64, size: f64, align: Align, colour: &str, text: &str) {
+        let _ = write!(self.body, "<g stroke=\"#ffffff\" stroke-width=\"3\" paint-order=\"stroke\">");
+        self.text(x, y, size, align, colour, text);
+        let _ = writeln!(self.body, "</g>");
+    }
+
     /// The finished document, with a white ground.
     pub fn to_svg(&self) -> String {
         let (w, h) = (trim(self.width), trim(self.height));
