@@ -11,7 +11,9 @@
 //! knows the steps that were accepted.
 
 pub mod local;
+mod small_signal;
 pub mod states;
+mod trial;
 
 use serde::{Deserialize, Serialize};
 use thiserror::Error;

@@ -71,9 +71,9 @@ impl Circuit {
         }
         let mut row = vec![usize::MAX; self.nodes];
         let mut free = 0;
-        for node in 0..self.nodes {
-            if !fixed[node] {
-                row[node] = free;
+        for (row, fixed) in row.iter_mut().zip(&fixed) {
+            if !fixed {
+                *row = free;
                 free += 1;
             }
         }
@@ -105,9 +105,9 @@ impl Circuit {
         }
         let solution = if size == 0 { rhs } else { a.lu().solve(&rhs).ok_or(SourceLoop { source_index: 0 })? };
         let mut potential = DMatrix::zeros(self.nodes, count);
-        for node in 0..self.nodes {
-            if row[node] != usize::MAX {
-                potential.set_row(node, &solution.row(row[node]));
+        for (node, &row) in row.iter().enumerate() {
+            if row != usize::MAX {
+                potential.set_row(node, &solution.row(row));
             }
         }
         Ok(Potentials { potential, conductance: solution.rows(free, count).into_owned() })

@@ -130,9 +130,9 @@ impl Heating {
     pub fn mixed(&self, k: usize, u: &[f64], w: &[f64]) -> f64 {
         let s = self.sources;
         let mut sum = 0.0;
-        for i in 0..s {
+        for (i, u) in u.iter().enumerate() {
             let row = &self.form[(k * s + i) * s..(k * s + i + 1) * s];
-            sum += u[i] * row.iter().zip(w).map(|(q, w)| q * w).sum::<f64>();
+            sum += u * row.iter().zip(w).map(|(q, w)| q * w).sum::<f64>();
         }
         sum
     }

@@ -72,7 +72,7 @@ impl<T: Scalar, const N: usize> BlockMatrix<T, N> {
     /// # Errors
     /// [`ZeroPivot`] where a pivot vanishes against the entries it came from, or is not finite.
     pub fn factor(&mut self, pattern: &Pattern) -> Result<Inertia, ZeroPivot> {
-        self.eliminate(pattern, |pivot| Err(pivot))
+        self.eliminate(pattern, Err)
     }
 
     /// Like [`BlockMatrix::factor`], but a direction whose pivot vanishes is held instead: it gets the pivot it had before

@@ -164,8 +164,8 @@ impl Rodas4 {
         self.forcing_sensitivities(system, ramp, s, motion, ports);
         for i in 0..6 {
             self.at.copy(motion);
-            for j in 0..i {
-                self.at.add(A[i][j], &self.stages[j]);
+            for (stage, a) in self.stages[..i].iter().zip(A[i]) {
+                self.at.add(a, stage);
             }
             if i > 0 {
                 ramp.at(s + ALPHA[i] * h, &mut self.drive);
@@ -235,8 +235,8 @@ impl Rodas4 {
     ) {
         let port = &mut self.ports[p];
         port.at.copy(start);
-        for j in 0..i {
-            port.at.add(A[i][j], &port.stages[j]);
+        for (stage, a) in port.stages[..i].iter().zip(A[i]) {
+            port.at.add(a, stage);
         }
         ramp.sensitivity(s + ALPHA[i] * h, source, &mut self.change);
         let force = &mut self.scratch;

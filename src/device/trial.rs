@@ -1,0 +1,192 @@
+//! How a trial is answered: a static one by following the parent's equilibrium, a transient one by integrating from the
+//! parent's state; then currents, charges, outputs and their partials from what came out.
+
+use super::local::Session;
+use super::states::Snapshot;
+use super::{Status, Trial, TrialReply};
+use crate::analysis::signal::View;
+use crate::compile::Compiled;
+use crate::gaps::Ramp;
+use crate::multibody::planar::Pose;
+use crate::solve::adaptive::Advance;
+use crate::solve::path::SourcePath;
+
+/// Share of the compilation's tolerance that one internal step may use.
+const STEP_SHARE: f64 = 1e-2;
+/// Internal steps in one circuit step before the device asks for a shorter one.
+const MAX_INTERNAL_STEPS: usize = 64;
+/// Longest circuit step proposed, in internal steps: the circuit sees the motion only at its own time points, and its
+/// formula for the current of a moving charge is of second order.
+const PROPOSED_STEPS: f64 = 0.5;
+
+impl Session {
+    /// A static trial: from the parent's equilibrium along straight lines in voltage, or from rest.
+    pub(super) fn balance(
+        &mut self,
+        compiled: &Compiled,
+        request: &Trial<'_>,
+        parent: Option<&Snapshot>,
+        reply: &mut TrialReply,
+    ) {
+        let system = &compiled.parts.system;
+        let electrics = &system.electrics;
+        self.fill_sources(compiled, request.voltages);
+        let rest = vec![0.0; self.sources.len()];
+        let (from, load) = parent.map_or((rest.as_slice(), 0.0), |p| (p.sources.as_slice(), 1.0));
+        self.motion.q.copy_from_slice(parent.map_or(&self.zeros, |p| &p.q));
+        self.motion.v.fill(Pose::zeros());
+        let path = SourcePath::new(electrics, from, &self.sources, [load, 1.0]);
+        match self.equilibrium.follow(system, &path, &mut self.motion.q) {
+            Ok(found) => reply.jumped = found.fold.is_some(),
+            Err(error) => {
+                reply.status = Status::Fail(error.to_string());
+                return;
+            }
+        }
+        electrics.steady(&self.sources, &mut self.rise, &mut self.drive);
+        // ∂q/∂V = −K⁻¹·∂r/∂V with the factor that the last Newton iteration left
+        for (p, &port) in self.ports.iter().enumerate() {
+            self.unit.fill(0.0);
+            self.unit[port] = 1.0;
+            electrics.steady_slope(&self.sources, &self.unit, &mut self.change);
+            let s = &mut self.sensitivity[p];
+            system.drive_force(&self.motion.q, &self.drive, &self.change, &mut s.q);
+            for x in &mut s.q {
+                *x = -*x;
+            }
+            self.equilibrium.factor().solve(&system.model.pattern, &mut s.q);
+            s.v.fill(Pose::zeros());
+        }
+        self.answer(compiled, request, None, self.first_step, reply);
+    }
+
+    /// A transient trial: the motion over dt, sensitivities along.
+    pub(super) fn advance(
+        &mut self,
+        compiled: &Compiled,
+        request: &Trial<'_>,
+        parent: Option<&Snapshot>,
+        reply: &mut TrialReply,
+    ) {
+        let system = &compiled.parts.system;
+        self.fill_sources(compiled, request.voltages);
+        let from: Vec<f64> = match parent {
+            Some(p) => {
+                self.motion.q.copy_from_slice(&p.q);
+                self.motion.v.copy_from_slice(&p.v);
+                self.rise.copy_from_slice(&p.rise);
+                p.sources.clone()
+            }
+            None => {
+                self.motion.q.fill(Pose::zeros());
+                self.motion.v.fill(Pose::zeros());
+                self.rise.fill(0.0);
+                vec![0.0; self.sources.len()]
+            }
+        };
+        for s in &mut self.sensitivity {
+            s.q.fill(Pose::zeros());
+            s.v.fill(Pose::zeros());
+        }
+        let electrics = &system.electrics;
+        let ramp = Ramp { electrics, from: &from, to: &self.sources, rise: &self.rise, dt: request.dt };
+        let mut h = parent.map_or(self.first_step, |p| p.next_step);
+        let advanced = self.stepper.advance(
+            system,
+            &ramp,
+            &mut self.motion,
+            &self.ports,
+            &mut self.sensitivity,
+            &mut h,
+            STEP_SHARE * compiled.options.tol,
+            MAX_INTERNAL_STEPS,
+            &mut |_, _, _, _| true,
+        );
+        match advanced {
+            // the observer below never stops it
+            Ok(Advance::Done | Advance::Stopped) => {}
+            Ok(Advance::OutOfSteps(reached)) => {
+                reply.status = Status::NeedDt(f64::max(0.5 * reached, 1e-3 * request.dt));
+                return;
+            }
+            Err(error) => {
+                reply.status = Status::Fail(error.to_string());
+                return;
+            }
+        }
+        for k in 0..self.rise_slope.len() {
+            self.rise_slope[k] = ramp.rise_at(k, request.dt);
+        }
+        ramp.at(request.dt, &mut self.drive);
+        self.rise.copy_from_slice(&self.rise_slope);
+        self.answer(compiled, request, Some(&from), h, reply);
+        reply.dt_next = PROPOSED_STEPS * h;
+    }
+
+    /// Fills in the reply from `motion`, `rise`, `sources` and `sensitivity`, and stores the state. `from` holds the
+    /// sources at the start of a transient step.
+    fn answer(
+        &mut self,
+        compiled: &Compiled,
+        request: &Trial<'_>,
+        from: Option<&[f64]>,
+        next_step: f64,
+        reply: &mut TrialReply,
+    ) {
+        let system = &compiled.parts.system;
+        let electrics = &system.electrics;
+        let (ports, gaps) = (self.ports.len(), self.drive.volts.len());
+        let view = View { q: &self.motion.q, v: &self.motion.v, rise: &self.rise, volts: &self.drive.volts };
+        reply.currents.clear();
+        reply.charges.clear();
+        reply.di_dv.clear();
+        reply.outputs.clear();
+        for &port in &self.ports {
+            let row = electrics.conductance.row(port);
+            reply.currents.push(row.iter().zip(&self.sources).map(|(g, u)| g * u).sum());
+            reply.di_dv.extend(self.ports.iter().map(|&other| row[other]));
+            reply.charges.push(
+                (0..gaps).map(|g| electrics.gap_rows[(g, port)] * system.capacitance(g, view.q) * view.volts[g]).sum(),
+            );
+        }
+        reply.outputs.extend(self.signals.iter().map(|s| s.value(compiled, &view)));
+        reply.dq_dv.clear();
+        reply.dq_dv.resize(ports * ports, 0.0);
+        reply.doutputs_dv.clear();
+        reply.doutputs_dv.resize(self.signals.len() * ports, 0.0);
+        for (p, &port) in self.ports.iter().enumerate() {
+            let s = &self.sensitivity[p];
+            let gap_row: Vec<f64> = (0..gaps).map(|g| electrics.gap_rows[(g, port)]).collect();
+            for k in 0..self.rise_slope.len() {
+                self.rise_slope[k] = match from {
+                    None => {
+                        self.unit.fill(0.0);
+                        self.unit[port] = 1.0;
+                        2.0 * electrics.heating.mixed(k, &self.sources, &self.unit)
+                    }
+                    Some(from) => Ramp { electrics, from, to: &self.sources, rise: &self.rise, dt: request.dt }
+                        .rise_sensitivity(k, request.dt, port),
+                };
+            }
+            for (g, volts) in gap_row.iter().enumerate() {
+                let dq =
+                    system.capacitance(g, view.q) * volts + system.capacitance_slope(g, view.q, &s.q) * view.volts[g];
+                for (row, &other) in self.ports.iter().enumerate() {
+                    reply.dq_dv[row * ports + p] += electrics.gap_rows[(g, other)] * dq;
+                }
+            }
+            let change = View { q: &s.q, v: &s.v, rise: &self.rise_slope, volts: &gap_row };
+            for (row, signal) in self.signals.iter().enumerate() {
+                reply.doutputs_dv[row * ports + p] = signal.slope(compiled, &view, &change);
+            }
+        }
+        let snapshot = Snapshot {
+            q: self.motion.q.clone(),
+            v: self.motion.v.clone(),
+            rise: self.rise.clone(),
+            sources: self.sources.clone(),
+            next_step,
+        };
+        reply.token = Some(self.states.insert(request, snapshot));
+    }
+}
