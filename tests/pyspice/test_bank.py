@@ -1,10 +1,11 @@
 """The bank of the demonstration: a heater pulse moves the yoke, and the comb's current says so."""
 
+import pathlib
+
 import numpy as np
 import pytest
-from conftest import ROOT
 
-BANK = ROOT / "examples/bank/bank.net"
+BANK = pathlib.Path(__file__).resolve().parents[2] / "examples/bank/bank.net"
 
 
 def deck(drive: str, analysis: str) -> str:
