@@ -18,6 +18,9 @@ use std::time::{Duration, Instant};
 mod echo;
 
 const CALLS: usize = 20_000;
+/// Something that compiles; the echo device does not look at it.
+const NETLIST: &str =
+    "anchor * [f] [l=1u w=1u h=1u]\nspring2d * [f m] [kx=1]\nmass2d * [m] [m=1e-10]\nguide2d * [m] []\n";
 
 /// Serves until the process ends.
 fn serve(listen: &str) -> Address {
@@ -57,7 +60,7 @@ fn stream(criterion: &mut Criterion) {
     let dir = tempfile::tempdir().expect("a directory");
     let unix = format!("unix://{}", dir.path().join("b.sock").display());
     for (name, listen) in [("unix socket", unix.as_str()), ("tcp loopback", "127.0.0.1:0")] {
-        let bundle = Bundle::from_text("plate.net", "mass2d * [m] [m=1e-10]\nanchor * [m] [l=1u w=1u h=1u]\n");
+        let bundle = Bundle::from_text("plate.net", NETLIST);
         let uri = serve(listen).uri();
         let mut device = RemoteDevice::connect(&uri, &bundle, &CompileOptions::default(), Duration::from_secs(10))
             .expect("the server compiles");

@@ -31,8 +31,11 @@ pub struct ServeOptions {
     /// What clients may ask for.
     pub limits: Limits,
     /// Called once, when every address accepts connections, with the addresses as bound (port 0 replaced).
-    pub ready: Box<dyn FnOnce(&[Address]) + Send>,
+    pub ready: Ready,
 }
+
+/// Told the addresses of a server as bound.
+pub type Ready = Box<dyn FnOnce(&[Address]) + Send>;
 
 /// Makes the device of a session.
 pub type MakeDevice = fn(Arc<Compiled>) -> Box<dyn Device>;

@@ -98,7 +98,7 @@ impl Device for Echo {
         if !self.tokens.contains(&token.0) {
             return Err(DeviceError::UnknownToken(token));
         }
-        let entry = |k: usize| if k % (self.ports + 1) == 0 { [1e-3, omega * 1e-12] } else { [0.0, 0.0] };
+        let entry = |k: usize| if k.is_multiple_of(self.ports + 1) { [1e-3, omega * 1e-12] } else { [0.0, 0.0] };
         reply.admittance = (0..self.ports * self.ports).map(entry).collect();
         reply.outputs = vec![[0.0, 0.0]; self.signals * self.ports];
         Ok(())
