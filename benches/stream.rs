@@ -47,7 +47,7 @@ fn percentiles(name: &str, device: &mut RemoteDevice) {
     let mut times: Vec<Duration> = (0..CALLS)
         .map(|k| {
             let start = Instant::now();
-            trial(device, &mut reply, k as f64);
+            trial(device, &mut reply, (k % 7) as f64);
             start.elapsed()
         })
         .collect();
