@@ -75,7 +75,7 @@ impl Cosim {
             busy.finish_and_clear();
         }
         let report = match report {
-            Err(_) if interrupt::asked() => return Err(Failure::Interrupted),
+            Err(CosimError::Failed { .. }) if interrupt::asked_just_now() => return Err(Failure::Interrupted),
             other => other?,
         };
         eprintln!("{}: done in {:.2} s", self.deck.display(), start.elapsed().as_secs_f64());

@@ -3,6 +3,7 @@
 use bimorph::results::atomic;
 use std::process::exit;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 static ASKED: AtomicBool = AtomicBool::new(false);
 static POLLED: AtomicBool = AtomicBool::new(false);
@@ -32,6 +33,14 @@ pub(crate) fn listen() {
 pub(crate) fn asked() -> bool {
     POLLED.store(true, Ordering::SeqCst);
     ASKED.load(Ordering::SeqCst)
+}
+
+/// [`asked`] once more after a moment: a program that this one runs may hear Ctrl-C and end before it is noticed here.
+pub(crate) fn asked_just_now() -> bool {
+    asked() || {
+        std::thread::sleep(Duration::from_millis(100));
+        asked()
+    }
 }
 
 /// Ends the promise of [`asked`]: from here on Ctrl-C stops the process at once.

@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  bimorph plot bank.raw --out bank.png\n  \
     bimorph plot bank.raw --panel 'drive=v(heat)' --panel 'yoke [µm]=v(y)' --out bank.svg\n  \
-    bimorph plot bank.raw --mechanism bank.net --port heat=5 --out bank.png")]
+    bimorph plot bank.raw --mechanism bank.net --port heat=2.2 --out bank.png")]
 pub(crate) struct Plot {
     /// ngspice raw file, binary or ASCII
     file: PathBuf,

@@ -20,9 +20,9 @@ use std::fmt::Write;
 /// The equilibrium is the one reached from rest by raising all loads and voltages together. JSON: "nodes" holds x [m],
 /// y [m] and rz [rad] from the drawn place; "temperatures_k", "currents_a" and "charges_c" by name.
 #[derive(Debug, Args)]
-#[command(after_help = "Examples:\n  bimorph static bank.net --port heat=5\n  \
+#[command(after_help = "Examples:\n  bimorph static bank.net --port heat=2.2\n  \
                         bimorph static stage.net --set F=100u --json\n  \
-                        bimorph static bank.net --port heat=5 --out bank.svg     the mechanism, at rest and deflected")]
+                        bimorph static bank.net --port heat=2.2 --out bank.svg     the mechanism, at rest and deflected")]
 pub(crate) struct Static {
     #[command(flatten)]
     model: ModelArgs,

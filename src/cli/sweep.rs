@@ -17,7 +17,7 @@ use std::time::Duration;
 /// has its reason in the column "error". The shards of a sweep put together are the whole sweep.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
-    bimorph sweep bank.net --param w=1.8u:2.2u:21 --port heat=5 --signals yoke.y --out w.csv\n  \
+    bimorph sweep bank.net --param w=1.8u:2.2u:21 --port heat=2.2 --signals yoke.y --out w.csv\n  \
     bimorph sweep bank.net --param w=1.8u:2.2u:21 --param Lh=200u,206u --analysis modes --count 3\n  \
     bimorph sweep switch.net --param gap=1u:3u:201 --analysis pullin --shard 0/4 --out part0.csv\n  \
     bimorph sweep bank.net --param w=1.8u:2.2u:21 --to unix:///tmp/bimorph.sock")]

@@ -20,7 +20,7 @@ use serde::Serialize;
 /// JSON: "t" [s]; "signals": samples by name in SI; "units" by name; "counters": the work done.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
-    bimorph tran bank.net --stop 300u --port heat=5 --signals yoke.y,b1.hot.T --out heat.svg\n  \
+    bimorph tran bank.net --stop 300u --port heat=2.2 --signals yoke.y,b1.hot.T --out heat.svg\n  \
     bimorph tran stage.net --set F=100u --release F --stop 30u --undamped --signals c.x --json\n      \
     starts from the equilibrium under F = 100 µN and lets go at t = 0")]
 pub(crate) struct Tran {
