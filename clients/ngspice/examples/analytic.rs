@@ -148,11 +148,12 @@ impl Device for Plate {
         let dx = [f.by_voltage[0] * by_force, f.by_voltage[1] * by_force];
         reply.currents = vec![0.0; 2];
         reply.di_dv = vec![0.0; 4];
-        for n in 0..2 {
-            reply.charges.push(f.capacitance[n] * v[n]);
-            reply
-                .dq_dv
-                .extend((0..2).map(|k| v[n] * f.gradient[n] * dx[k] + if n == k { f.capacitance[n] } else { 0.0 }));
+        for (n, volts) in v.iter().enumerate() {
+            reply.charges.push(f.capacitance[n] * volts);
+            for (k, dx) in dx.iter().enumerate() {
+                let fixed = if n == k { f.capacitance[n] } else { 0.0 };
+                reply.dq_dv.push(fixed + volts * f.gradient[n] * dx);
+            }
         }
         reply.outputs = vec![state.x];
         reply.doutputs_dv = dx.to_vec();
@@ -175,10 +176,10 @@ impl Device for Plate {
         let size = re * re + im * im;
         let dx = f.by_voltage.map(|b| [b * re / size, -b * im / size]);
         *reply = SmallSignal::default();
-        for n in 0..2 {
+        for (n, volts) in v.iter().enumerate() {
             for (k, dx) in dx.iter().enumerate() {
                 let fixed = if n == k { f.capacitance[n] } else { 0.0 };
-                let q = [fixed + v[n] * f.gradient[n] * dx[0], v[n] * f.gradient[n] * dx[1]];
+                let q = [fixed + volts * f.gradient[n] * dx[0], volts * f.gradient[n] * dx[1]];
                 reply.admittance.push([-w * q[1], w * q[0]]);
             }
         }

@@ -89,11 +89,11 @@ pub(crate) mod slot {
     pub(crate) const ASK: usize = 7;
     pub(crate) const MODEL_ASK: usize = 8;
     pub(crate) const TRUNC: usize = 9;
-    pub(crate) const CONV_TEST: usize = 10;
     pub(crate) const DELETE: usize = 11;
     pub(crate) const MODEL_DELETE: usize = 12;
     pub(crate) const ANALOG_ALLOC: usize = 23;
     pub(crate) const ANALOG_GET_PTR: usize = 24;
+    pub(crate) const ANALOG_INTEGRATE: usize = 25;
     pub(crate) const MESSAGE_SEND: usize = 35;
 }
 

@@ -36,8 +36,9 @@ pub(crate) unsafe fn card(param: *mut *mut Parameter, count: c_int) -> RawCard {
     // SAFETY: these parameters are strings, and the host keeps strings ended by a zero byte.
     let string = |n, i| value(n, i).and_then(|v| unsafe { text(v.string) });
     let strings = |n| (0..slot(n).map_or(0, |p| p.size as usize)).filter_map(|i| string(n, i)).collect();
-    // SAFETY: these parameters are reals and booleans.
+    // SAFETY: these parameters are reals.
     let real = |n| value(n, 0).map(|v| unsafe { v.real });
+    // SAFETY: these parameters are booleans.
     let flag = |n| value(n, 0).map(|v| unsafe { v.flag } != 0);
     RawCard {
         file: string(0, 0),
@@ -58,12 +59,14 @@ pub(crate) unsafe fn card(param: *mut *mut Parameter, count: c_int) -> RawCard {
 /// # Safety
 /// `model` heads the host's list of models, which stays as it is as long as the iterator lives.
 pub(crate) unsafe fn instances<'a>(model: *mut Model) -> impl Iterator<Item = (&'a Model, &'a Instance)> {
-    // SAFETY: by contract; both lists end in null.
+    // SAFETY: by contract; the list ends in null.
     let models = std::iter::successors(unsafe { model.as_ref() }, |m| unsafe { m.next.as_ref() });
     models.flat_map(|m| {
         // SAFETY: as above.
         let first = unsafe { m.instances.as_ref() };
-        std::iter::successors(first, |i| unsafe { i.next.as_ref() }).map(move |i| (m, i))
+        // SAFETY: as above.
+        let next = |i: &&'a Instance| unsafe { i.next.as_ref() };
+        std::iter::successors(first, next).map(move |i| (m, i))
     })
 }
 

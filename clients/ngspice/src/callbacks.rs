@@ -62,10 +62,10 @@ pub(crate) unsafe extern "C" fn model_ask(
     guarded(|| unsafe { host::model_ask(circuit, model, index, value) })
 }
 
-/// Tests convergence.
-pub(crate) unsafe extern "C" fn convergence_test(model: *mut Model, circuit: *mut c_void) -> c_int {
-    // SAFETY: passed on.
-    guarded(|| unsafe { host::convergence_test(model, circuit) })
+/// Tests convergence. Derivatives are exact here, so the host's own test of voltages and currents is enough; its test of
+/// integrals would cost one more iteration at every point.
+pub(crate) unsafe extern "C" fn convergence_test(_model: *mut Model, _circuit: *mut c_void) -> c_int {
+    code::OK
 }
 
 /// Opens every instance, after the host's own setup. An error ends the run before it starts.
@@ -139,8 +139,9 @@ pub(crate) unsafe extern "C" fn load(model: *mut Model, circuit: *mut c_void) ->
     })
 }
 
-/// Bounds the next step by what the devices can bear. An answer that was given stands, so no step is rejected here:
-/// a device that needs a shorter step says so in its answer.
+/// Bounds the next step by the truncation error of the charges, as the host does for capacitors, and by what the devices
+/// can bear. An answer that was given stands, so a device rejects no step here: one that
+/// needs a shorter step says so in its answer.
 pub(crate) unsafe extern "C" fn trunc(model: *mut Model, circuit: *mut c_void, step: *mut f64) -> c_int {
     /// ngspice rejects a step when the next one would be less than this share of it, with a little to spare.
     const KEEPS: f64 = 0.91;

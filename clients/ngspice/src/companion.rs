@@ -11,6 +11,10 @@
 //! back over the corner would ring. The trapezoidal rule is not used: it remembers the current before the corner and
 //! ngspice does not tell a code model when it drops to first order.
 //!
+//! Around a source's corner ngspice takes steps of rounding, 10⁻¹⁸ s, over which a charge changes by no more than its own
+//! rounding. A point closer than [`shortest`] does not become q₁ or q₂: the next ones are differentiated across it. Its
+//! current is the slope so far, plus what the charge departs from that line over the shortest step.
+//!
 //! Reference — Hairer, Nørsett, Wanner, *Solving Ordinary Differential Equations I* (1993), III.5: variable-step BDF2
 //! is stable for ρ < 1 + √2.
 
@@ -18,6 +22,14 @@
 const RESTART_BELOW: f64 = 0.2;
 /// A step longer than this multiple of the one before it does, too: BDF2 is not stable beyond 1 + √2 [1].
 const RESTART_ABOVE: f64 = 2.4;
+
+/// Two points closer than this share of the time since the start tell no slope [1]: about 10⁶ roundings of the time.
+const RESOLUTION: f64 = 1e-10;
+
+/// The shortest step to differentiate over that ends at `t` [s].
+pub fn shortest(t: f64) -> f64 {
+    RESOLUTION * t
+}
 
 /// dq/dt = `slope`·q + `now`·q₁ + `before`·q₂, for every port of an instance alike.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -39,6 +51,11 @@ impl Companion {
         }
         let sum = 1.0 + rho;
         Self { slope: (sum + rho) / (sum * h), now: -sum / h, before: rho * rho / (sum * h) }
+    }
+
+    /// For a point closer than `shortest` [s].
+    pub fn unresolved(shortest: f64) -> Self {
+        Self { slope: 1.0 / shortest, now: -1.0 / shortest, before: 0.0 }
     }
 
     /// Displacement current [A] for the charges `q` now, `q1` and `q2` at the last two accepted points [C].
@@ -82,6 +99,12 @@ mod tests {
             assert!((c.slope + c.now + c.before).abs() * h < 1e-15);
             assert_eq!(c.current(1e-3, 1e-3, 1e-3), 0.0);
         }
+    }
+
+    /// A step of a few roundings of the time is too short; a step of a picosecond at 1 ms is not.
+    #[test]
+    fn steps_of_rounding_are_too_short() {
+        assert!(1e-18 < shortest(64e-6) && 1e-12 > shortest(1e-3) && 1e-15 > shortest(1e-15));
     }
 
     /// Halving the step quarters the error: second order on a smooth charge.

@@ -84,15 +84,6 @@ pub(crate) unsafe fn load(model: *mut Model, circuit: *mut c_void) -> c_int {
     unsafe { CORE.function::<OverModel>(slot::LOAD)(model, circuit) }
 }
 
-/// Tests convergence.
-///
-/// # Safety
-/// The arguments are those with which the host called the plug-in.
-pub(crate) unsafe fn convergence_test(model: *mut Model, circuit: *mut c_void) -> c_int {
-    // SAFETY: as above.
-    unsafe { CORE.function::<OverModel>(slot::CONV_TEST)(model, circuit) }
-}
-
 /// Reserves state memory for the instance being called.
 ///
 /// # Safety
@@ -109,6 +100,23 @@ pub(crate) unsafe fn reserve(doubles: usize) {
 pub(crate) unsafe fn memory(point: c_int) -> *mut f64 {
     // SAFETY: as above; the memory is an array of doubles.
     unsafe { CORE.function::<unsafe extern "C" fn(c_int, c_int) -> *mut c_void>(slot::ANALOG_GET_PTR)(0, point).cast() }
+}
+
+/// Tells the host that a double of this point's memory is an integral, so that its truncation error bounds the steps.
+/// The double is overwritten. False where the host does not take it now.
+///
+/// # Safety
+/// To be called from within a load of a transient; `at` lies in the memory of this point.
+pub(crate) unsafe fn integral(at: *mut f64) -> bool {
+    let mut partial = 0.0;
+    // SAFETY: as above; the host registers the place, and writes to it and to `partial`.
+    unsafe {
+        CORE.function::<unsafe extern "C" fn(f64, *mut f64, *mut f64) -> c_int>(slot::ANALOG_INTEGRATE)(
+            0.0,
+            at,
+            &mut partial,
+        ) == 0
+    }
 }
 
 /// Prints a message, with the name of the instance, where this host prints.

@@ -3,8 +3,8 @@
 //! Nothing here knows ngspice's memory; [`crate::call`] copies between the two. State that must follow accepted and
 //! rejected steps lives in a [`History`], which the host rolls back; what stays here is only a cache or a count.
 
-use crate::companion::Companion;
-use crate::history::History;
+use crate::companion::{Companion, shortest};
+use crate::history::{Base, History};
 use crate::settings::Monitor;
 use bimorph::device::{
     Description, Device, DeviceError, Mode, OpenRequest, SmallSignal, Status, Token, Trial, TrialReply,
@@ -60,6 +60,8 @@ pub struct Answer {
     pub conductances: Vec<f64>,
     /// Charges [C] (p).
     pub charges: Vec<f64>,
+    /// What the next step's charges will be differentiated from, if this point is accepted.
+    pub base: Base,
     /// Scaled monitors [V] (s).
     pub monitors: Vec<f64>,
     /// ∂monitor/∂voltage [1] (s×p).
@@ -159,7 +161,7 @@ impl Instance {
             }
             Question::Transient { t, dt } => {
                 let outcome = self.trial(Mode::Transient, t, dt, voltages, previous.token);
-                self.finish(outcome, Some(dt), previous)
+                self.finish(outcome, Some((t, dt)), previous)
             }
             Question::SmallSignal { omega } => self.linearize(omega, previous.token),
         }
@@ -191,17 +193,17 @@ impl Instance {
         }
     }
 
-    fn finish(&mut self, result: Result<(), DeviceError>, dt: Option<f64>, previous: &History) -> Outcome {
+    fn finish(&mut self, result: Result<(), DeviceError>, time: Option<(f64, f64)>, previous: &History) -> Outcome {
         if let Err(error) = result {
             return Outcome::Stop(error.to_string());
         }
-        let step = dt.unwrap_or(0.0);
+        let step = time.map_or(0.0, |(_, dt)| dt);
         let why = match &self.reply.status {
             Status::Ok => {
                 self.failures = 0;
                 self.longest = self.longest.max(step);
-                self.step_bound = if dt.is_some() { self.reply.dt_next } else { f64::INFINITY };
-                self.fill(dt, previous);
+                self.step_bound = if time.is_some() { self.reply.dt_next } else { f64::INFINITY };
+                self.fill(time, previous);
                 return Outcome::Solved;
             }
             // The host shortens the step and asks again, by as much as it takes.
@@ -212,27 +214,48 @@ impl Instance {
             Status::Fail(why) => why.clone(),
         };
         self.failures += 1;
-        let hopeless = dt.is_some() && step <= HOPELESS * self.longest;
+        let hopeless = time.is_some() && step <= HOPELESS * self.longest;
         if self.failures < ATTEMPTS && !hopeless { Outcome::Retry } else { Outcome::Stop(why) }
     }
 
     /// Turns the reply into what ngspice wants; charges into currents where time passes.
-    fn fill(&mut self, dt: Option<f64>, previous: &History) {
+    fn fill(&mut self, time: Option<(f64, f64)>, previous: &History) {
         let (reply, answer) = (&self.reply, &mut self.answer);
         let ports = reply.charges.len();
         answer.token = reply.token;
-        answer.step = dt.unwrap_or(0.0);
+        answer.step = time.map_or(0.0, |(_, dt)| dt);
         answer.charges.clone_from(&reply.charges);
         answer.currents.clone_from(&reply.currents);
         answer.conductances.clone_from(&reply.di_dv);
-        if let Some(h) = dt {
-            let companion = Companion::new(h, previous.step);
+        answer.base.clone_from(&previous.base);
+        let (base, old) = (&mut answer.base, &previous.base);
+        if let Some((t, dt)) = time {
+            let step = dt + old.skipped;
+            let (resolved, shortest) = (step >= shortest(t), shortest(t));
+            let companion = if resolved { Companion::new(step, old.step) } else { Companion::unresolved(shortest) };
             for (n, current) in answer.currents.iter_mut().enumerate() {
-                *current += companion.current(reply.charges[n], previous.charges[n], previous.charges_before[n]);
+                let (q, q1, q2) = (reply.charges[n], old.charges[n], old.charges_before[n]);
+                *current += if resolved {
+                    companion.current(q, q1, q2)
+                } else {
+                    let so_far = if old.step > 0.0 { (q1 - q2) / old.step } else { 0.0 };
+                    so_far + companion.slope * (q - q1 - so_far * step)
+                };
             }
             for (g, c) in answer.conductances.iter_mut().zip(&reply.dq_dv) {
                 *g += companion.slope * c;
             }
+            if resolved {
+                (base.step, base.skipped) = (step, 0.0);
+                base.charges_before.clone_from(&old.charges);
+                base.charges.clone_from(&reply.charges);
+            } else {
+                base.skipped = step;
+            }
+        } else {
+            (base.step, base.skipped) = (0.0, 0.0);
+            base.charges_before.clone_from(&reply.charges);
+            base.charges.clone_from(&reply.charges);
         }
         answer.monitors.clear();
         answer.monitor_gains.clear();

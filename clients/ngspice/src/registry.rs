@@ -16,6 +16,8 @@ pub(crate) struct Entry {
     pub(crate) voltages: Vec<f64>,
     /// The last accepted point.
     pub(crate) previous: History,
+    /// Whether the host knows the charges as integrals.
+    pub(crate) integrals: bool,
 }
 
 /// Every instance, and what concerns the load under way.
@@ -55,7 +57,14 @@ pub(crate) fn register(key: usize, instance: Instance) {
     registry.epochs += 1;
     registry.stopped = false;
     trace::line(format_args!("open {} epoch {} {:?}", instance.name(), registry.epochs, instance.description()));
-    let entry = Entry { key, epoch: registry.epochs, instance, voltages: Vec::new(), previous: History::default() };
+    let entry = Entry {
+        key,
+        epoch: registry.epochs,
+        instance,
+        voltages: Vec::new(),
+        previous: History::default(),
+        integrals: false,
+    };
     match registry.find(key) {
         Some(old) => *old = entry,
         None => registry.entries.push(entry),

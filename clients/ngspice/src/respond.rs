@@ -30,6 +30,10 @@ pub(crate) fn respond(call: &Call<'_>, registry: &mut Registry) -> Outcome {
     if question == Question::Static && !sweep {
         entry.previous.token = None;
     }
+    if matches!(question, Question::Transient { .. }) && !entry.integrals {
+        // SAFETY: this is within a load of a transient, and the charges lie within this point's memory.
+        entry.integrals = unsafe { (0..ports).all(|n| host::integral(host::memory(0).add(history::HEAD + n))) };
+    }
     call.voltages(&mut entry.voltages);
     let outcome = entry.instance.ask(question, &entry.voltages, &entry.previous);
     if outcome == Outcome::Solved {
@@ -55,7 +59,7 @@ fn write_answer(call: &Call<'_>, entry: &Entry, doubles: usize) {
     // SAFETY: this is within a load; this point's memory has the size that was reserved, and no other view of it.
     let memory = unsafe { host::memory(0).as_mut().map(|m| std::slice::from_raw_parts_mut(m, doubles)) };
     if let (Some(memory), Some(token)) = (memory, answer.token) {
-        history::write(memory, entry.epoch, token, answer.step, &answer.charges, &entry.previous.charges);
+        history::write(memory, entry.epoch, token, &answer.charges, &answer.base);
     }
 }
 
