@@ -45,6 +45,12 @@ pub enum AnalysisError {
         /// Which body and direction, and why.
         detail: String,
     },
+    /// An iteration did not settle.
+    #[error("not converged: {detail}")]
+    NotConverged {
+        /// What and how far.
+        detail: String,
+    },
     /// [`Watch`] said stop.
     #[error("cancelled")]
     Cancelled,

@@ -15,16 +15,19 @@ pub struct ModesResult {
     pub frequencies_hz: Vec<f64>,
     /// For each mode, the displacement of every mechanical node (largest translation 1), in netlist order.
     pub shapes: Vec<Vec<(String, NodeMotion)>>,
-    /// For each mode, ‖Kx − λMx‖ / ‖Kx‖ [1].
+    /// For each mode, the residual ‖x − λK⁻¹Mx‖ in the mass norm, about the relative error of its shape [1].
     pub residuals: Vec<f64>,
     /// Mechanical unknowns.
     pub unknowns: usize,
 }
 
+/// A mode with a larger residual is no mode.
+const WORST_RESIDUAL: f64 = 1e-2;
+
 /// The `count` lowest modes about the static equilibrium at these voltages.
 ///
 /// # Errors
-/// See [`AnalysisError`]; `Singular` also when a mode did not converge, so that no unconverged frequency is shown.
+/// See [`AnalysisError`]; `NotConverged` rather than a frequency that cannot be trusted.
 pub fn modes(compiled: &Compiled, count: usize, voltages: &PortVoltages) -> Result<ModesResult, AnalysisError> {
     let system = &compiled.parts.system;
     let mut drive = system.electrics.drive();
@@ -45,6 +48,21 @@ pub fn modes(compiled: &Compiled, count: usize, voltages: &PortVoltages) -> Resu
     let mut residual = q.clone();
     system.tangent(&q, &drive, &mut tangent, &mut residual);
     let found = lowest_modes(system, &tangent, count)?;
+    if let Some(k) = found.residuals.iter().position(|&r| r.is_nan() || r > WORST_RESIDUAL) {
+        return Err(AnalysisError::NotConverged {
+            detail: format!(
+                "mode {} of {} has a residual of {:.1e}: ask for fewer modes, or for fewer segments",
+                k + 1,
+                count,
+                found.residuals[k]
+            ),
+        });
+    }
+    if found.missed {
+        return Err(AnalysisError::NotConverged {
+            detail: format!("there are more than {count} modes below the highest one found; ask for more modes"),
+        });
+    }
     let shapes = found.shapes.iter().map(|x| shape(compiled, &q, x)).collect();
     Ok(ModesResult {
         frequencies_hz: found.lambda.iter().map(|&l| l.max(0.0).sqrt() / std::f64::consts::TAU).collect(),

@@ -32,8 +32,9 @@ pub struct BlockMatrix<T: Scalar, const N: usize> {
     scale: Vec<SVector<f64, N>>,
 }
 
-/// A pivot smaller than this share of its diagonal entry is taken for zero. Soft MEMS suspensions reach 1e-9.
-const LOST: f64 = 1e-11;
+/// A pivot smaller than this share of its diagonal entry is taken for zero. A beam cut into
+/// 10,000 segments reaches 2.5e-13.
+const LOST: f64 = 1e-13;
 
 /// Where a factorization met a pivot that is zero or not finite.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

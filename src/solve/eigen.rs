@@ -28,10 +28,11 @@ pub struct Modes {
     pub lambda: Vec<f64>,
     /// Shapes with xᵀMx = 1.
     pub shapes: Vec<Vec<Pose>>,
-    /// ‖Kx − λMx‖ / ‖Kx‖ of each mode.
+    /// ‖x − (λ − σ)(K − σM)⁻¹Mx‖ in the mass norm, relative: about the relative error of the shape; or how far the
+    /// Rayleigh quotients of K and of its factor differ, if that is more.
     pub residuals: Vec<f64>,
-    /// Modes below the highest one by its inertia; equals their number when none was missed.
-    pub sturm: usize,
+    /// The inertia below the highest mode counts more modes than were found.
+    pub missed: bool,
 }
 
 /// M^½·(K − σM)⁻¹·M^½ over flat vectors.
@@ -102,10 +103,10 @@ pub fn lowest_modes(system: &System, stiffness: &BlockMatrix<f64, 3>, count: usi
     }
     let root: Vec<Pose> = (0..system.bodies()).map(|j| model.mass(j).map(f64::sqrt)).collect();
     let n = 3 * root.len();
-    let count = count.min(model.unknowns());
+    let count = count.min(massive_directions(model));
     let operator = Operator { factor: &factor, pattern, model, root: &root };
     let (theta, vectors) = if n <= DENSE { dense(&operator, n, count) } else { lanczos(&operator, n, count) };
-    let mut found: Vec<(f64, Vec<Pose>)> = Vec::with_capacity(count);
+    let mut found: Vec<Vec<Pose>> = Vec::with_capacity(count);
     for (i, &theta) in theta.iter().enumerate() {
         if theta == 0.0 || !theta.is_finite() {
             continue;
@@ -121,28 +122,48 @@ pub fn lowest_modes(system: &System, stiffness: &BlockMatrix<f64, 3>, count: usi
         for x in &mut x {
             *x /= norm;
         }
-        found.push((shift + 1.0 / theta, x));
+        found.push(x);
     }
-    found.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut modes = Modes { lambda: Vec::new(), shapes: Vec::new(), residuals: Vec::new(), sturm: 0 };
-    for (_, x) in found {
-        let mut kx = vec![Pose::zeros(); root.len()];
-        k.multiply_add(pattern, &x, &mut kx);
-        let lambda = x.iter().zip(&kx).map(|(x, k)| x.dot(k)).sum::<f64>();
-        let norm = kx.iter().map(Pose::norm_squared).sum::<f64>().sqrt();
-        let rest = (0..root.len())
-            .map(|b| (kx[b] - model.mass(b).component_mul(&x[b]) * lambda).norm_squared())
-            .sum::<f64>()
-            .sqrt();
+    let mut modes = Modes { lambda: Vec::new(), shapes: Vec::new(), residuals: Vec::new(), missed: false };
+    for x in &found {
+        // Rayleigh quotient and residual of the inverse operator: stiff directions, which K would drown them in, are quiet
+        let mut y: Vec<Pose> = (x.iter().enumerate()).map(|(b, x)| model.mass(b).component_mul(x)).collect();
+        factor.solve(pattern, &mut y);
+        model.project(&mut y);
+        let theta = mass_product(model, x, &y);
+        for (y, x) in y.iter_mut().zip(x.iter()) {
+            *y -= x * theta;
+        }
+        // the quotient of K itself is the better value; where rounding has spoiled the factor the two part
+        let mut kx = vec![Pose::zeros(); x.len()];
+        k.multiply_add(pattern, x, &mut kx);
+        let lambda: f64 = x.iter().zip(&kx).map(|(x, k)| x.dot(k)).sum();
+        let inverse = shift + 1.0 / theta;
+        let apart = (lambda - inverse).abs() / (lambda.abs() + shift.abs());
         modes.lambda.push(lambda);
-        modes.shapes.push(x);
-        modes.residuals.push(if norm > 0.0 { rest / norm } else { 0.0 });
+        modes.residuals.push((mass_product(model, &y, &y).sqrt() / theta.abs()).max(apart));
     }
+    let mut order: Vec<usize> = (0..found.len()).collect();
+    order.sort_by(|&a, &b| modes.lambda[a].total_cmp(&modes.lambda[b]));
+    modes.lambda = order.iter().map(|&i| modes.lambda[i]).collect();
+    modes.residuals = order.iter().map(|&i| modes.residuals[i]).collect();
+    modes.shapes = order.iter().map(|&i| std::mem::take(&mut found[i])).collect();
     if let Some(&highest) = modes.lambda.last() {
-        let mut counted = shifted(model, stiffness, highest * (1.0 + 1e-6));
-        modes.sturm = counted.factor(pattern).map_or(0, |i| i.negative);
+        let mut counted = shifted(model, stiffness, highest * 0.99);
+        modes.missed = counted.factor(pattern).is_ok_and(|i| i.negative >= modes.lambda.len());
     }
     Ok(modes)
+}
+
+/// Free directions that carry mass: a model has as many modes. Inner bodies of a beam have no rotary inertia of their own.
+fn massive_directions(model: &Model) -> usize {
+    (model.bodies.iter())
+        .map(|b| {
+            let free = |i: usize| b.free.map_or(1.0, |p| p[(i, i)]);
+            let translations = if b.mass > 0.0 { (free(0) + free(1)).round() as usize } else { 0 };
+            translations + usize::from(b.inertia > 0.0 && free(2) > 0.5)
+        })
+        .sum()
 }
 
 /// K − σM, held directions projected.

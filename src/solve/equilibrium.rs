@@ -17,6 +17,9 @@ use crate::multibody::BlockMatrix;
 use crate::multibody::factor::ZeroPivot;
 use crate::multibody::planar::Pose;
 
+/// Corrections below this share of the displacement that no longer shrink are rounding.
+const STALLED: f64 = 1e-5;
+
 /// How an equilibrium is searched. `Default` is the only place where the numbers stand.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EquilibriumOptions {
@@ -184,12 +187,14 @@ impl Equilibrium {
             if !correction.is_finite() || (correction > last && correction > 1e-3 * system.length_scale) {
                 return Corrected::No;
             }
-            last = correction;
             for (trial, step) in self.trial.iter_mut().zip(&self.step) {
                 *trial -= step;
             }
             let reach = size(system, &self.trial).max(1e-6 * system.length_scale);
-            if correction <= self.options.tolerance * reach {
+            // converged, or as close as rounding lets it come: quadratic convergence that has come to a stand
+            let stalled = correction <= STALLED * reach && correction > 0.1 * last;
+            last = correction;
+            if correction <= self.options.tolerance * reach || stalled {
                 if inertia.negative > 0 {
                     return Corrected::No;
                 }
