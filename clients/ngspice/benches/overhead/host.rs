@@ -25,6 +25,9 @@ unsafe extern "C" fn memory(_: c_int, point: c_int) -> *mut c_void {
     // SAFETY: the plug-in asks for points 0 and 1, from the one thread of the bench.
     unsafe { (&raw mut (*MEMORY.load(Ordering::Relaxed))[point as usize]).cast() }
 }
+unsafe extern "C" fn integrate(_: f64, _: *mut f64, _: *mut f64) -> c_int {
+    0
+}
 unsafe extern "C" fn message(_: *mut c_char) -> c_int {
     0
 }
@@ -58,6 +61,7 @@ impl Host {
         core[3] = setup as *const c_void;
         core[23] = reserve as *const c_void;
         core[24] = memory as *const c_void;
+        core[25] = integrate as *const c_void;
         core[35] = message as *const c_void;
         core[45] = deck_path as *const c_void;
         let mut parameters: Vec<*mut [u64; 4]> = (0..10).map(|_| keep([pair(1, 0), 0, 0, 0])).collect();
