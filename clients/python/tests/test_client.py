@@ -48,7 +48,7 @@ def test_static_follows_the_closed_form(plate: bimorph.Model) -> None:
 def test_modes_and_pull_in(plate: bimorph.Model) -> None:
     """f = √(k/m) / 2π, and V = √(8 k g³ / 27 ε A)."""
     assert plate.modes(count=1).frequencies_hz[0] == pytest.approx(math.sqrt(K / M) / (2 * math.pi), rel=1e-9)
-    result = plate.pull_in(max_v=10.0)
+    result = plate.pull_in(max_v=2 * PULL_IN)
     assert result.pull_in_v == pytest.approx(PULL_IN, rel=1e-3)
 
 
