@@ -4,6 +4,7 @@ mod beams;
 mod electrothermal;
 mod gaps;
 mod motion;
+mod scenes;
 
 use bimorph::analysis::statics::{NodeMotion, StaticResult, static_equilibrium};
 use bimorph::compile::{CompileOptions, Compiled, compile};
