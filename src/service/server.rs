@@ -15,12 +15,14 @@ use crate::device::Device;
 use crate::device::local::LocalDevice;
 use std::future::Future;
 use std::hash::{BuildHasher, RandomState};
+use std::io::IsTerminal;
 use std::sync::Arc;
 use std::time::Duration;
 use thiserror::Error;
 use tokio::sync::{Semaphore, mpsc};
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::transport::Server;
+use tracing_subscriber::EnvFilter;
 
 /// What a server may be told.
 pub struct ServeOptions {
@@ -165,6 +167,7 @@ pub async fn run_with(
         () = shutdown => None,
     };
     health.set_not_serving::<BimorphServer<Calls>>().await;
+    tracing::info!(open = shared.sessions.len(), "stopping");
     signals.draining.cancel();
     shared.sweeps.cancel_all();
     while accepting.join_next().await.is_some() {}
@@ -176,6 +179,7 @@ pub async fn run_with(
         signal.cancel();
     }
     if ended.is_none() {
+        tracing::warn!("some clients did not let go; their connections are cut");
         ended = tokio::time::timeout(GRACE, &mut serving).await.ok();
     }
     expiry.abort();
@@ -183,10 +187,17 @@ pub async fn run_with(
 }
 
 /// [`run`] on threads of its own, until SIGINT or SIGTERM: what `bimorph serve` calls. A second signal stops at once.
+/// What happens is logged on standard error: warnings and faults, or what the environment variable `BIMORPH_LOG` says
+/// (`info`, `debug`, …).
 ///
 /// # Errors
 /// [`ServeError`].
 pub fn run_until_signal(options: ServeOptions) -> Result<(), ServeError> {
+    let filter = EnvFilter::try_from_env("BIMORPH_LOG").unwrap_or_else(|_| EnvFilter::new("warn"));
+    // A host program that logs already goes on as it does.
+    let ansi = std::io::stderr().is_terminal();
+    let log = tracing_subscriber::fmt().with_env_filter(filter).with_ansi(ansi).with_writer(std::io::stderr);
+    let _ = log.try_init();
     let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build().map_err(ServeError::Runtime)?;
     let outcome = runtime.block_on(async {
         use tokio::signal::unix::{SignalKind, signal};

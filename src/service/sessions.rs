@@ -58,7 +58,7 @@ impl Session {
             self.ask(device.as_mut(), question)
         }));
         outcome.unwrap_or_else(|_| {
-            self.close();
+            self.fault();
             Some(refused(&status::fault()))
         })
     }
@@ -100,7 +100,7 @@ impl Session {
         match outcome {
             Ok(answer) => answer.map_err(|error| status::device(&error)),
             Err(_) => {
-                self.close();
+                self.fault();
                 Err(status::fault())
             }
         }
@@ -114,6 +114,12 @@ impl Session {
 
     pub(super) fn is_closed(&self) -> bool {
         self.closed.load(Ordering::Relaxed)
+    }
+
+    /// Closes after a panic: its states may be half made.
+    fn fault(&self) {
+        tracing::error!(session = self.id, model = self.model, "internal fault: the session is closed");
+        self.close();
     }
 
     fn close(&self) {
@@ -194,6 +200,7 @@ impl Sessions {
             return Err(status::limit("sessions", limits.sessions, "one more; close one"));
         }
         open.insert(session.id.clone(), Arc::clone(&session));
+        tracing::debug!(session = session.id, model = session.model, open = open.len(), "session");
         Ok(session)
     }
 

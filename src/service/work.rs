@@ -56,5 +56,8 @@ impl Work {
 
 /// Turns a panic into INTERNAL: one bad request must not end the others.
 pub(super) fn guarded<T>(job: impl FnOnce() -> Result<T, Status>) -> Result<T, Status> {
-    catch_unwind(AssertUnwindSafe(job)).unwrap_or_else(|_| Err(status::fault()))
+    catch_unwind(AssertUnwindSafe(job)).unwrap_or_else(|_| {
+        tracing::error!("internal fault: one call has no answer");
+        Err(status::fault())
+    })
 }
