@@ -1,6 +1,6 @@
 //! One `A` device: asks its [`Device`] what ngspice's calls ask, and decides what becomes of an answer that is none.
 //!
-//! Nothing here knows ngspice's memory; [`crate::call`] copies between the two. State that must follow accepted and
+//! Nothing here knows ngspice's memory; `crate::call` copies between the two. State that must follow accepted and
 //! rejected steps lives in a [`History`], which the host rolls back; what stays here is only a cache or a count.
 
 use crate::companion::{Companion, shortest};
