@@ -1,29 +1,39 @@
-//! One Trial over the stream: the cost of the wire alone (the device echoes), per address and with the client of circuits.
+//! One Trial over the stream: the cost of the wire alone (the device echoes), and a transient Trial of a lumped plate in
+//! process and over the wire.
 //!
 //! Client and server each run on one thread, as a plug-in and `bimorph serve` do. For figures that can be compared, keep
 //! both on one core, where no thread waits for another core to wake: `taskset -c 0 cargo bench --bench stream`.
 //! Besides criterion's mean it prints the median and the 99th percentile of single calls.
 
-use bimorph::compile::CompileOptions;
+use bimorph::compile::{CompileOptions, compile};
+use bimorph::device::local::LocalDevice;
 use bimorph::device::{Device, Mode, OpenRequest, Trial, TrialReply};
 use bimorph::netlist::Bundle;
 use bimorph::service::address::Address;
 use bimorph::service::client::RemoteDevice;
-use bimorph::service::server::{ServeOptions, run_with};
+use bimorph::service::server::{MakeDevice, ServeOptions, run_with};
 use criterion::{Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 #[path = "../tests/service/echo.rs"]
 mod echo;
 
 const CALLS: usize = 20_000;
-/// Something that compiles; the echo device does not look at it.
-const NETLIST: &str =
-    "anchor * [f] [l=1u w=1u h=1u]\nspring2d * [f m] [kx=1]\nmass2d * [m] [m=1e-10]\nguide2d * [m] []\n";
+/// A plate on a spring over an electrode. The echo device does not look at it.
+const NETLIST: &str = "anchor * [f] [l=1u w=1u h=1u]
+spring2d * [f m] [kx=1]
+mass2d * [m] [m=1e-10]
+guide2d * [m] []
+plategap2d * [m e] [A=1e-8 gap=2u]
+anchor * [e] [l=1u w=1u h=1u]
+eground * [e] []
+drive port * [m e] []
+";
 
 /// Serves until the process ends.
-fn serve(listen: &str) -> Address {
+fn serve(listen: &str, make: MakeDevice) -> Address {
     let (ready, bound) = std::sync::mpsc::channel();
     let options = ServeOptions {
         listen: vec![listen.parse().expect("an address")],
@@ -32,22 +42,26 @@ fn serve(listen: &str) -> Address {
     };
     std::thread::spawn(move || {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a runtime");
-        runtime.block_on(run_with(options, echo::echo, std::future::pending())).expect("serves");
+        runtime.block_on(run_with(options, make, std::future::pending())).expect("serves");
     });
     bound.recv().expect("the server starts")
 }
 
-fn trial(device: &mut RemoteDevice, reply: &mut TrialReply, v: f64) {
-    let request = Trial { mode: Mode::Static, parent: None, t: 0.0, dt: 0.0, voltages: &[v, 1.0] };
-    device.trial(black_box(&request), reply).expect("an answer");
+fn connect(address: &Address) -> RemoteDevice {
+    let bundle = Bundle::from_text("plate.net", NETLIST);
+    RemoteDevice::connect(&address.uri(), &bundle, &CompileOptions::default(), Duration::from_secs(10))
+        .expect("the server compiles")
 }
 
-fn percentiles(name: &str, device: &mut RemoteDevice) {
-    let mut reply = TrialReply::default();
+fn ask(device: &mut dyn Device, request: &Trial<'_>, reply: &mut TrialReply) {
+    device.trial(black_box(request), reply).expect("an answer");
+}
+
+fn percentiles(name: &str, mut call: impl FnMut(usize)) {
     let mut times: Vec<Duration> = (0..CALLS)
         .map(|k| {
             let start = Instant::now();
-            trial(device, &mut reply, (k % 7) as f64);
+            call(k);
             start.elapsed()
         })
         .collect();
@@ -56,19 +70,47 @@ fn percentiles(name: &str, device: &mut RemoteDevice) {
     println!("{name}: p50 {:.1} µs, p99 {:.1} µs over {CALLS} trials", at(0.5), at(0.99));
 }
 
+/// Newton's trials of one step: the same parent, voltages that differ.
+fn steps(criterion: &mut Criterion, name: &str, device: &mut dyn Device) {
+    device.open(&OpenRequest { ports: vec![], signals: vec!["m.x".into()] }).expect("opens");
+    let mut reply = TrialReply::default();
+    let rest = Trial { mode: Mode::Static, parent: None, t: 0.0, dt: 0.0, voltages: &[1.0] };
+    ask(device, &rest, &mut reply);
+    let parent = reply.token;
+    let mut step = |k: usize| {
+        let voltages = [1.0 + 1e-3 * (k % 7) as f64];
+        let request = Trial { mode: Mode::Transient, parent, t: 1e-7, dt: 1e-7, voltages: &voltages };
+        ask(device, &request, &mut reply);
+    };
+    let mut k = 0;
+    criterion.bench_function(name, |b| {
+        b.iter(|| {
+            k += 1;
+            step(k);
+        });
+    });
+    percentiles(name, step);
+}
+
 fn stream(criterion: &mut Criterion) {
     let dir = tempfile::tempdir().expect("a directory");
-    let unix = format!("unix://{}", dir.path().join("b.sock").display());
-    for (name, listen) in [("unix socket", unix.as_str()), ("tcp loopback", "127.0.0.1:0")] {
-        let bundle = Bundle::from_text("plate.net", NETLIST);
-        let uri = serve(listen).uri();
-        let mut device = RemoteDevice::connect(&uri, &bundle, &CompileOptions::default(), Duration::from_secs(10))
-            .expect("the server compiles");
+    let unix = |name: &str| format!("unix://{}", dir.path().join(name).display());
+    for (name, listen) in [("echo over unix socket", unix("echo")), ("echo over tcp loopback", "127.0.0.1:0".into())] {
+        let mut device = connect(&serve(&listen, echo::echo));
         device.open(&OpenRequest::default()).expect("opens");
         let mut reply = TrialReply::default();
-        criterion.bench_function(&format!("trial over {name}"), |b| b.iter(|| trial(&mut device, &mut reply, 1.0)));
-        percentiles(name, &mut device);
+        let mut echo = |k: usize| {
+            let voltages = [(k % 7) as f64, 1.0];
+            let request = Trial { mode: Mode::Static, parent: None, t: 0.0, dt: 0.0, voltages: &voltages };
+            ask(&mut device, &request, &mut reply);
+        };
+        criterion.bench_function(name, |b| b.iter(|| echo(1)));
+        percentiles(name, echo);
     }
+    let compiled = compile(&Bundle::from_text("plate.net", NETLIST), &CompileOptions::default()).expect("compiles");
+    steps(criterion, "plate in process", &mut LocalDevice::new(Arc::new(compiled)));
+    let address = serve(&unix("plate"), |compiled| Box::new(LocalDevice::new(compiled)));
+    steps(criterion, "plate over unix socket", &mut connect(&address));
 }
 
 criterion_group!(benches, stream);
