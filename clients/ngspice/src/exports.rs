@@ -51,6 +51,9 @@ pub(crate) extern "C" fn CMudns() -> *const c_void {
 #[unsafe(no_mangle)]
 pub(crate) extern "C" fn CMgetCoreItfPtr() -> *mut c_void {
     let _ = catch_unwind(|| {
+        if LAYOUT.get().is_some() {
+            return; // Loaded once more, under the same or another path: the table is complete.
+        }
         let version = std::env::var("BIMORPH_NGSPICE").ok().and_then(|v| v.split('.').next()?.parse().ok());
         // SAFETY: the host calls this while it loads the plug-in, after it registered the device.
         match unsafe { DEVICE.complete(version) } {

@@ -154,3 +154,19 @@ fn circuits_do_not_share_bounds() {
     assert_ne!(lengths[0], lengths[1]);
     assert_eq!(lengths[0], lengths[2]);
 }
+
+/// Loading the plug-in twice, in an initialisation file and once more in the deck, does no harm.
+#[test]
+fn loading_twice_does_no_harm() {
+    if skipped() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::copy(analytic_deck("drive.inc"), folder.path().join("drive.inc")).unwrap();
+    let deck = folder.path().join("deck.cir");
+    let text = std::fs::read_to_string(analytic_deck("two.cir")).unwrap();
+    let again = format!(".control\npre_codemodel {}\n.endc\n.end", analytic_plugin().display());
+    std::fs::write(&deck, text.replace(".end", &again)).unwrap();
+    let run = run(CosimOptions { deck, ..options("two.cir") }).unwrap();
+    assert!((real(run.plot("Operating"), "v(x)")[0] / balance(2.0) - 1.0).abs() < 1e-9);
+}
