@@ -60,7 +60,8 @@ def serve(binary: str | None = None) -> Iterator[Server]:
         listener = threading.Thread(target=_listen, args=(process.stderr, ready, said), daemon=True)
         listener.start()
         try:
-            if not ready.wait(_START_S) or process.poll() is not None:
+            # The end of its words sets `ready` too, a moment before the process is seen to have ended.
+            if not ready.wait(_START_S) or not any(line.startswith("listening on") for line in said):
                 raise Unavailable(f"{binary} serve did not start: {''.join(said).strip() or 'no word from it'}")
             yield Server(address, process)
         finally:
