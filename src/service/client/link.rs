@@ -41,13 +41,12 @@ impl Link {
             .map_err(|error| Status::internal(format!("no asynchronous runtime: {error}")))?;
         let channel = within(&runtime, deadline, async {
             endpoint.connect().await.map_err(|error| {
-                let mut text = "no connection".to_owned();
-                let mut source = error.source();
-                while let Some(inner) = source {
-                    text = format!("{text}: {inner}");
-                    source = inner.source();
+                // the innermost cause says it all; the layers around it only repeat it
+                let mut cause: &dyn std::error::Error = &error;
+                while let Some(inner) = cause.source() {
+                    cause = inner;
                 }
-                Status::unavailable(text)
+                Status::unavailable(format!("no connection: {cause}"))
             })
         })?;
         let rpc = BimorphClient::new(channel)
