@@ -5,7 +5,6 @@ use crate::netlist::Bundle;
 use crate::service::address::Address;
 use crate::service::convert::model::{bundle_to_wire, options_to_wire};
 use crate::service::proto::{self, bimorph_client::BimorphClient};
-use std::error::Error as _;
 use std::future::Future;
 use std::time::Duration;
 use tokio::runtime::Runtime;
