@@ -13,6 +13,7 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::Duration;
 use thiserror::Error;
 
 /// What to run.
@@ -49,6 +50,9 @@ pub struct CosimReport {
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum CosimError {
+    /// The caller did not want it to go on.
+    #[error("cancelled")]
+    Cancelled,
     /// ngspice is not installed.
     #[error("ngspice was not found in PATH; install it (Debian: apt-get install ngspice) or name it in NGSPICE")]
     NoNgspice,
@@ -165,11 +169,11 @@ fn io(what: impl FnOnce() -> String) -> impl FnOnce(std::io::Error) -> CosimErro
     |source| CosimError::Io { what: what(), source }
 }
 
-/// Runs a deck to its end.
+/// Runs a deck to its end, or ends ngspice as soon as `keep_going` says no; then no raw file is left, whole or half.
 ///
 /// # Errors
 /// [`CosimError`]
-pub fn run(options: &CosimOptions) -> Result<CosimReport, CosimError> {
+pub fn run(options: &CosimOptions, keep_going: &dyn Fn() -> bool) -> Result<CosimReport, CosimError> {
     let deck = &options.deck;
     let text = std::fs::read(deck).map_err(|source| CosimError::Deck { path: deck.clone(), source })?;
     let ngspice = options.ngspice.clone().or_else(find_ngspice).ok_or(CosimError::NoNgspice)?;
@@ -201,10 +205,10 @@ pub fn run(options: &CosimOptions) -> Result<CosimReport, CosimError> {
     }
     command.arg(deck).stdout(if options.capture { Stdio::piped() } else { Stdio::inherit() }).stderr(Stdio::piped());
     let child = command.spawn().map_err(io(|| format!("cannot start {}", ngspice.display())))?;
-    let heard = listen(child, options.capture).map_err(io(|| "ngspice's output cannot be read".into()))?;
+    let heard = listen(child, options.capture, keep_going).map_err(io(|| "ngspice's output cannot be read".into()))?;
 
     let has_control = String::from_utf8_lossy(&text).lines().any(|l| l.trim().eq_ignore_ascii_case(".control"));
-    let judged = judge(&heard, &failure, deck, has_control);
+    let judged = if heard.cancelled { Err(CosimError::Cancelled) } else { judge(&heard, &failure, deck, has_control) };
     match (judged, unfinished, &options.raw) {
         (Err(error), Some(path), _) => {
             let _ = std::fs::remove_file(path);
@@ -244,43 +248,64 @@ struct Heard {
     status: std::process::ExitStatus,
     aborted: Option<String>,
     nothing_run: bool,
+    cancelled: bool,
     output: String,
 }
 
-/// Passes ngspice's messages on, or keeps them, and hears the ones that tell a failure.
-fn listen(mut child: Child, capture: bool) -> std::io::Result<Heard> {
-    let stdout = child.stdout.take();
-    let reader = stdout.map(|mut out| {
+/// How often a run looks whether it is still wanted.
+const LOOK: Duration = Duration::from_millis(10);
+
+/// Passes ngspice's messages on, or keeps them, and hears the ones that tell a failure. Ends ngspice when it shall not go on.
+fn listen(mut child: Child, capture: bool, keep_going: &dyn Fn() -> bool) -> std::io::Result<Heard> {
+    let stdout = child.stdout.take().map(|mut out| {
         std::thread::spawn(move || {
             let mut bytes = Vec::new();
             out.read_to_end(&mut bytes).map(|_| bytes)
         })
     });
-    let (mut aborted, mut nothing_run, mut messages) = (None, false, Vec::new());
-    if let Some(stderr) = child.stderr.take() {
-        let mut stderr = BufReader::new(stderr);
-        let mut line = Vec::new();
-        while stderr.read_until(b'\n', &mut line)? > 0 {
-            let text = String::from_utf8_lossy(&line);
-            if text.contains("simulation(s) aborted") {
-                aborted.get_or_insert_with(|| text.trim().to_owned());
-            }
-            nothing_run |= text.contains("no simulations run");
-            if capture {
-                messages.extend_from_slice(&line);
-            } else {
-                let _ = std::io::stderr().write_all(&line);
-            }
-            line.clear();
+    let stderr = child.stderr.take().map(|err| std::thread::spawn(move || hear(err, capture)));
+    let mut cancelled = false;
+    let status = loop {
+        if let Some(status) = child.try_wait()? {
+            break status;
         }
-    }
-    let mut output = match reader.map(std::thread::JoinHandle::join) {
+        if !cancelled && !keep_going() {
+            cancelled = true;
+            child.kill()?;
+        }
+        std::thread::sleep(LOOK);
+    };
+    let mut output = match stdout.map(std::thread::JoinHandle::join) {
         Some(Ok(bytes)) => bytes?,
         _ => Vec::new(),
     };
+    let (aborted, nothing_run, mut messages) = match stderr.map(std::thread::JoinHandle::join) {
+        Some(Ok(heard)) => heard?,
+        _ => (None, false, Vec::new()),
+    };
     output.append(&mut messages);
-    let status = child.wait()?;
-    Ok(Heard { status, aborted, nothing_run, output: String::from_utf8_lossy(&output).into_owned() })
+    Ok(Heard { status, aborted, nothing_run, cancelled, output: String::from_utf8_lossy(&output).into_owned() })
+}
+
+/// Reads ngspice's messages to their end: the line that tells an abort, whether nothing was run, and what was kept.
+fn hear(stderr: impl Read, capture: bool) -> std::io::Result<(Option<String>, bool, Vec<u8>)> {
+    let (mut aborted, mut nothing_run, mut messages) = (None, false, Vec::new());
+    let mut stderr = BufReader::new(stderr);
+    let mut line = Vec::new();
+    while stderr.read_until(b'\n', &mut line)? > 0 {
+        let text = String::from_utf8_lossy(&line);
+        if text.contains("simulation(s) aborted") {
+            aborted.get_or_insert_with(|| text.trim().to_owned());
+        }
+        nothing_run |= text.contains("no simulations run");
+        if capture {
+            messages.extend_from_slice(&line);
+        } else {
+            let _ = std::io::stderr().write_all(&line);
+        }
+        line.clear();
+    }
+    Ok((aborted, nothing_run, messages))
 }
 
 fn judge(heard: &Heard, failure: &Path, deck: &Path, has_control: bool) -> Result<(), CosimError> {

@@ -68,13 +68,14 @@ impl Cosim {
         };
         let busy = self.quiet.then(|| progress::spinner("ngspice"));
         let start = Instant::now();
-        // Ctrl-C reaches ngspice too, which ends; what it leaves behind is cleared away before this process goes.
-        interrupt::asked();
-        let report = run(&options);
+        // Ctrl-C at a terminal reaches ngspice too; a signal to this process alone ends ngspice from here. Either way what
+        // it leaves behind is cleared away before this process goes.
+        let report = run(&options, &|| !interrupt::asked());
         if let Some(busy) = busy {
             busy.finish_and_clear();
         }
         let report = match report {
+            Err(CosimError::Cancelled) => return Err(Failure::Interrupted),
             Err(CosimError::Failed { .. }) if interrupt::asked_just_now() => return Err(Failure::Interrupted),
             other => other?,
         };

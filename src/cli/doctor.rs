@@ -104,7 +104,7 @@ fn plugin() -> Result<String, String> {
         std::fs::write(folder.join("plate.net"), PLATE).map_err(|e| e.to_string())?;
         std::fs::write(&deck, DECK).map_err(|e| e.to_string())?;
         let options = CosimOptions { deck, raw: Some(raw.clone()), capture: true, ..CosimOptions::default() };
-        cosim::run(&options).map_err(|e| e.to_string())?;
+        cosim::run(&options, &|| true).map_err(|e| e.to_string())?;
         let bytes = std::fs::read(raw).map_err(|e| e.to_string())?;
         let plots = raw::read(&bytes).map_err(|e| e.to_string())?;
         let x = plots.first().and_then(|plot| plot.column("v(x)")).map(|column| column.samples.magnitudes());

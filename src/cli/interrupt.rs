@@ -1,4 +1,4 @@
-//! Ctrl-C: long work stops at its next report of progress; anything else stops at once. No half-written file stays.
+//! Ctrl-C, or a request to terminate: long work stops at its next report of progress; anything else stops at once. No half-written file stays.
 
 use bimorph::results::atomic;
 use std::process::exit;
@@ -18,7 +18,7 @@ pub(crate) fn listen() {
             return;
         };
         runtime.block_on(async {
-            while tokio::signal::ctrl_c().await.is_ok() {
+            while signalled().await {
                 // A second Ctrl-C, or work that does not ask, ends the process here.
                 if ASKED.swap(true, Ordering::SeqCst) || !POLLED.load(Ordering::SeqCst) {
                     atomic::discard_unfinished();
@@ -27,6 +27,18 @@ pub(crate) fn listen() {
             }
         });
     });
+}
+
+/// Waits for Ctrl-C or a request to terminate; false when neither can be heard.
+async fn signalled() -> bool {
+    #[cfg(unix)]
+    if let Ok(mut terminate) = tokio::signal::unix::signal(tokio::signal::unix::SignalKind::terminate()) {
+        return tokio::select! {
+            heard = tokio::signal::ctrl_c() => heard.is_ok(),
+            heard = terminate.recv() => heard.is_some(),
+        };
+    }
+    tokio::signal::ctrl_c().await.is_ok()
 }
 
 /// True once a person asked to stop. Work that calls this promises to call it again soon.

@@ -124,7 +124,7 @@ fn noise_after_a_transient_runs() {
         return;
     }
     let options = CosimOptions { capture: true, ..options("stale.cir") };
-    let report = bimorph::cosim::run(&options).unwrap();
+    let report = bimorph::cosim::run(&options, &|| true).unwrap();
     assert!(report.output.contains("length(frequency) = 6"), "{}", report.output);
 }
 
@@ -148,7 +148,7 @@ fn circuits_do_not_share_bounds() {
     );
     let deck = folder.path().join("all.cir");
     std::fs::write(&deck, control).unwrap();
-    let report = bimorph::cosim::run(&CosimOptions { deck, capture: true, ..options("plate.cir") }).unwrap();
+    let report = bimorph::cosim::run(&CosimOptions { deck, capture: true, ..options("plate.cir") }, &|| true).unwrap();
     let lengths: Vec<_> = report.output.lines().filter(|l| l.starts_with("length(time)")).collect();
     assert_eq!(lengths.len(), 3, "{}", report.output);
     assert_ne!(lengths[0], lengths[1]);

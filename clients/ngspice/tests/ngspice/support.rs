@@ -41,7 +41,7 @@ pub(crate) fn analytic_plugin() -> PathBuf {
 pub(crate) fn run(options: CosimOptions) -> Result<Run, CosimError> {
     let folder = tempfile::tempdir().unwrap();
     let raw = folder.path().join("out.raw");
-    cosim::run(&CosimOptions { raw: Some(raw.clone()), capture: true, ..options })?;
+    cosim::run(&CosimOptions { raw: Some(raw.clone()), capture: true, ..options }, &|| true)?;
     let plots = bimorph::results::raw::read(&std::fs::read(raw).unwrap()).unwrap();
     Ok(Run { plots })
 }

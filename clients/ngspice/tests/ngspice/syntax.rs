@@ -12,7 +12,7 @@ fn refused(parameters: &str, instance: &str) -> Option<String> {
     );
     std::fs::write(&deck, text).unwrap();
     let options = CosimOptions { deck, plugin: Some(analytic_plugin()), capture: true, ..CosimOptions::default() };
-    match cosim::run(&options) {
+    match cosim::run(&options, &|| true) {
         Ok(_) => None,
         Err(CosimError::Stopped { reason, .. }) => Some(reason),
         Err(CosimError::Failed { output, .. }) => Some(output),
@@ -80,7 +80,7 @@ fn no_deck() {
         capture: true,
         ..CosimOptions::default()
     };
-    assert!(matches!(cosim::run(&options), Err(CosimError::Deck { .. })));
+    assert!(matches!(cosim::run(&options, &|| true), Err(CosimError::Deck { .. })));
 }
 
 /// A deck whose analyses print nothing and whose raw file nobody asks for is not run by ngspice: an error, not silence.
@@ -93,5 +93,5 @@ fn nothing_to_run() {
     let deck = folder.path().join("deck.cir");
     std::fs::write(&deck, "* silent\nV1 a 0 1\nR1 a 0 1\n.tran 1u 10u\n.end\n").unwrap();
     let options = CosimOptions { deck, plugin: Some(analytic_plugin()), capture: true, ..CosimOptions::default() };
-    assert!(matches!(cosim::run(&options), Err(CosimError::NothingRun { .. })));
+    assert!(matches!(cosim::run(&options, &|| true), Err(CosimError::NothingRun { .. })));
 }
