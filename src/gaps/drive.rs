@@ -107,10 +107,8 @@ pub struct Ramp<'a> {
 impl Ramp<'_> {
     /// Coefficients of the steady rise of heater `k` in the time since the start.
     fn parabola(&self, k: usize) -> [f64; 3] {
-        let h = &self.electrics.heating;
-        let (a, b, c) =
-            (h.mixed(k, self.from, self.from), h.mixed(k, self.from, self.to), h.mixed(k, self.to, self.to));
-        [a, 2.0 * (b - a) / self.dt, (a - 2.0 * b + c) / (self.dt * self.dt)]
+        let [a, b, c] = self.electrics.heating.between(k, self.from, self.to);
+        [a, b / self.dt, c / (self.dt * self.dt)]
     }
 
     /// Rise of heater `k` at time `s` after the start [K].

@@ -175,11 +175,6 @@ impl System {
         })
     }
 
-    /// Strain energy [J].
-    pub fn strain_energy(&self, q: &[Pose], drive: &Drive) -> f64 {
-        forces::strain_energy(&self.model, q, &drive.rest())
-    }
-
     fn add_loads(&self, q: &[Pose], scale: f64, r: &mut [Pose]) {
         for load in &self.loads {
             if let BodyId::Free(k) = load.point.body {

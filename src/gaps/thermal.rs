@@ -137,6 +137,13 @@ impl Heating {
         sum
     }
 
+    /// Steady mean rise of heater `k` on the straight line from `from` to `to`: its coefficients in the share x of the way,
+    /// c₀ + c₁·x + c₂·x² [K].
+    pub fn between(&self, k: usize, from: &[f64], to: &[f64]) -> [f64; 3] {
+        let (a, b, c) = (self.mixed(k, from, from), self.mixed(k, from, to), self.mixed(k, to, to));
+        [a, 2.0 * (b - a), a - 2.0 * b + c]
+    }
+
     /// Steady mean rise of heater `k` at source voltages `u` [K].
     pub fn steady(&self, k: usize, u: &[f64]) -> f64 {
         self.mixed(k, u, u)

@@ -73,24 +73,6 @@ pub fn add_rest_change(model: &Model, q: &[Pose], change: &RestStrain<'_>, r: &m
     }
 }
 
-/// Strain energy [J].
-pub fn strain_energy(model: &Model, q: &[Pose], rest: &RestStrain<'_>) -> f64 {
-    model
-        .joints
-        .iter()
-        .map(|joint| {
-            let mut e = joint.kinematics(model.linear, q).strain;
-            e.x -= joint.offset(rest);
-            0.5 * e.dot(&(joint.stiffness * e))
-        })
-        .sum()
-}
-
-/// Kinetic energy [J].
-pub fn kinetic_energy(model: &Model, v: &[Pose]) -> f64 {
-    v.iter().enumerate().map(|(j, v)| 0.5 * v.dot(&model.mass(j).component_mul(v))).sum()
-}
-
 /// `r += C·v`, gas drag and dampers.
 pub fn add_damping(model: &Model, v: &[Pose], r: &mut [Pose]) {
     for (body, (v, r)) in model.bodies.iter().zip(v.iter().zip(r.iter_mut())) {

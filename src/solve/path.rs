@@ -43,9 +43,8 @@ impl LoadPath for SourcePath<'_> {
             let rise = if s >= 1.0 {
                 h.steady(k, self.to)
             } else {
-                let (a, b, c) =
-                    (h.mixed(k, self.from, self.from), h.mixed(k, self.from, self.to), h.mixed(k, self.to, self.to));
-                (1.0 - s) * (1.0 - s) * a + 2.0 * s * (1.0 - s) * b + s * s * c
+                let [a, b, c] = h.between(k, self.from, self.to);
+                a + s * (b + s * c)
             };
             drive.expansion[k] = h.heaters[k].expansion * rise;
         }
@@ -59,10 +58,8 @@ impl LoadPath for SourcePath<'_> {
         }
         for k in 0..slope.expansion.len() {
             let h = &e.heating;
-            let (a, b, c) =
-                (h.mixed(k, self.from, self.from), h.mixed(k, self.from, self.to), h.mixed(k, self.to, self.to));
-            let rise = 2.0 * ((1.0 - s) * (b - a) + s * (c - b));
-            slope.expansion[k] = h.heaters[k].expansion * rise;
+            let [_, b, c] = h.between(k, self.from, self.to);
+            slope.expansion[k] = h.heaters[k].expansion * (b + 2.0 * s * c);
         }
         slope.load = self.load[1] - self.load[0];
     }

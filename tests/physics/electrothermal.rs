@@ -39,18 +39,28 @@ fn heatuator() {
     }
 }
 
-/// A chevron of two 200 µm legs at a prescribed temperature: SUGAR 2.0's linear figure for its ETA1 demo at 10° and a rise
-/// of 310 K with α = 2.6e-6, 0.925337598 µm.
+/// A chevron of two 200 µm legs at a prescribed temperature: SUGAR 2.0's linear figures for its ETA1 demo at 1° to 20° and a
+/// rise of 310 K with α = 2.6e-6.
 #[test]
 fn chevron_at_a_prescribed_temperature() {
-    let netlist = "
-        process hotpoly : p1 = [thermalexpansion=2.6e-6 ambienttemperature=0]
-        anchor p1 [a] [l=10u w=10u oz=-pi/2]
-        beam3d hotpoly [a c] [l=200u w=2u oz=deg(10) T=310]
-        beam3d hotpoly [c b] [l=200u w=2u oz=-deg(10) T=310]
-        anchor p1 [b] [l=10u w=10u oz=-pi/2]";
-    let options = CompileOptions { linear: true, ..CompileOptions::default() };
-    close(node(&balance(&model(netlist, &options), &[]), "c").y, 9.25337598084594e-7, 1e-9);
+    let sugar = [
+        (1, 6.9541119067023e-6),
+        (2, 4.26891205507476e-6),
+        (5, 1.82571038188501e-6),
+        (10, 9.25337598084594e-7),
+        (20, 4.70961757598845e-7),
+    ];
+    for (angle, apex) in sugar {
+        let netlist = format!(
+            "process hotpoly : p1 = [thermalexpansion=2.6e-6 ambienttemperature=0]
+             anchor p1 [a] [l=10u w=10u oz=-pi/2]
+             beam3d hotpoly [a c] [l=200u w=2u oz=deg({angle}) T=310]
+             beam3d hotpoly [c b] [l=200u w=2u oz=-deg({angle}) T=310]
+             anchor p1 [b] [l=10u w=10u oz=-pi/2]"
+        );
+        let options = CompileOptions { linear: true, ..CompileOptions::default() };
+        close(node(&balance(&model(&netlist, &options), &[]), "c").y, apex, 1e-9);
+    }
 }
 
 /// A straight clamped beam heated beyond its buckling strain, π²w²/3L² = 3.3e-4 at 200 × 2 µm, bows out to one side: the

@@ -50,11 +50,6 @@ impl<'a> Paint<'a> {
         Self { fill, stroke: "none", width: 0.0, opacity: 1.0 }
     }
 
-    /// The same, partly transparent.
-    pub fn with_opacity(self, opacity: f64) -> Self {
-        Self { opacity, ..self }
-    }
-
     fn attributes(&self) -> String {
         let mut text = format!("fill=\"{}\" stroke=\"{}\"", self.fill, self.stroke);
         if self.stroke != "none" {
