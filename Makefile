@@ -1,10 +1,12 @@
 # Every target does its own set-up on a fresh Debian or Ubuntu with a Rust toolchain, and says what it does.
-.PHONY: help demo test bench clean
+.PHONY: help demo test bench pictures charts clean
 
 help:
 	@echo "make demo    build, run the bank in ngspice here and through a server, compare, draw (out/demo)"
 	@echo "make test    everything that must hold: format, lints, tests, documentation, Python, ngspice decks"
 	@echo "make bench   measure (criterion)"
+	@echo "make pictures draw the scenes and the figures of docs/paper.md (docs/pictures)"
+	@echo "make charts  draw the charts of the README from counted work (docs/pictures); scripts/charts --time measures"
 	@echo "make clean   remove everything that was built"
 
 demo:
@@ -18,6 +20,14 @@ test:
 bench:
 	@scripts/setup build
 	cargo bench --workspace
+
+pictures:
+	@scripts/setup build
+	@scripts/pictures
+
+charts:
+	@scripts/setup build
+	@scripts/charts
 
 clean:
 	rm -rf target out .venv

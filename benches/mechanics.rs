@@ -8,7 +8,8 @@ use bimorph::gaps::Ramp;
 use bimorph::multibody::planar::Pose;
 use bimorph::multibody::{BlockMatrix, forces};
 use bimorph::netlist::Bundle;
-use bimorph::solve::rodas4::{Motion, Rodas4};
+use bimorph::solve::method::{Method, Motion};
+use bimorph::solve::rodas4::Rodas4;
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
 use std::path::Path;
@@ -50,7 +51,7 @@ fn mechanics(c: &mut Criterion) {
         b.iter_batched_ref(|| motion.q.clone(), |x| factored.solve(pattern, x), BatchSize::SmallInput);
     });
 
-    let mut rodas = Rodas4::new(system, 0);
+    let mut rodas = Rodas4::new(system, &[]);
     let mut error = start.clone();
     let sources = vec![0.0; system.electrics.sources()];
     let rise = vec![0.0; system.electrics.heating.heaters.len()];
@@ -59,7 +60,7 @@ fn mechanics(c: &mut Criterion) {
         b.iter(|| {
             motion.q.copy_from_slice(&start.q);
             motion.v.copy_from_slice(&start.v);
-            rodas.step(system, &ramp, 0.0, 1e-7, black_box(&mut motion), &mut error, &[], &mut [])
+            rodas.step(system, &ramp, 0.0, 1e-7, black_box(&mut motion), &mut error)
         });
     });
 

@@ -5,7 +5,8 @@ use bimorph::device::local::LocalDevice;
 use bimorph::device::{Device, Mode, OpenRequest, Trial, TrialReply};
 use bimorph::gaps::Ramp;
 use bimorph::netlist::Bundle;
-use bimorph::solve::rodas4::{Motion, Rodas4};
+use bimorph::solve::method::{Method, Motion};
+use bimorph::solve::rodas4::Rodas4;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -43,14 +44,14 @@ fn a_bank_session_is_small_and_steps_allocate_nothing() {
     assert!(used < 200_000, "{used} bytes");
 
     let system = &compiled.parts.system;
-    let mut rodas = Rodas4::new(system, 0);
+    let mut rodas = Rodas4::new(system, &[]);
     let (mut motion, mut error) = (Motion::zeros(system.bodies()), Motion::zeros(system.bodies()));
     let sources = vec![1.0; system.electrics.sources()];
     let rise = vec![0.0; system.electrics.heating.heaters.len()];
     let ramp = Ramp { electrics: &system.electrics, from: &sources, to: &sources, rise: &rise, dt: 1e-6 };
     let blocks = dhat::HeapStats::get().total_blocks;
     for _ in 0..10 {
-        rodas.step(system, &ramp, 0.0, 1e-8, &mut motion, &mut error, &[], &mut []).unwrap();
+        rodas.step(system, &ramp, 0.0, 1e-8, &mut motion, &mut error).unwrap();
     }
     assert_eq!(dhat::HeapStats::get().total_blocks, blocks);
     println!("a compiled bank session of {} unknowns takes {used} bytes", system.model.unknowns());

@@ -1,5 +1,12 @@
 //! The verbs that every front shares: the command, the service and sweeps call these and nothing below.
 
+pub mod backbending;
+pub mod chart;
+pub mod continuation;
+pub mod formulation;
+pub mod frame;
+pub mod integrator;
+pub mod joint_transient;
 pub mod modes;
 pub mod pull_in;
 pub mod signal;
@@ -56,6 +63,12 @@ pub enum AnalysisError {
     Cancelled,
 }
 
+/// Displacement of nodes, by name, in netlist order.
+pub type NodeMotions = Vec<(String, statics::NodeMotion)>;
+
+/// Displacement of points along beams, equally spaced, ends included, beam by beam in the order of the structure.
+pub type BeamMotions = Vec<Vec<statics::NodeMotion>>;
+
 /// Voltages on ports for a whole analysis: (port name, volts). Ports not named are at 0 V.
 pub type PortVoltages = [(String, f64)];
 
@@ -65,7 +78,16 @@ impl From<crate::solve::SolveError> for AnalysisError {
         match error {
             SolveError::Singular { .. } => Self::Singular { detail: error.to_string() },
             SolveError::Lost { .. } => Self::NoEquilibrium { detail: error.to_string() },
-            SolveError::StepTooSmall { t, dt, .. } => Self::StepFailed { t, dt, detail: error.to_string() },
+            SolveError::StepTooSmall { t, dt, .. } | SolveError::StepFailed { t, dt, .. } => {
+                Self::StepFailed { t, dt, detail: error.to_string() }
+            }
+            SolveError::Massless { .. } => Self::BadRequest { what: "method".into(), detail: error.to_string() },
         }
+    }
+}
+
+impl From<crate::solve::linear::TooLarge> for AnalysisError {
+    fn from(error: crate::solve::linear::TooLarge) -> Self {
+        Self::BadRequest { what: "solver".into(), detail: error.to_string() }
     }
 }

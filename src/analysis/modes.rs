@@ -1,8 +1,9 @@
 //! Natural frequencies and shapes about the operating point.
 use super::signal::{Signal, View};
 use super::statics::{NodeMotion, operating_point};
-use super::{AnalysisError, PortVoltages};
+use super::{AnalysisError, BeamMotions, NodeMotions, PortVoltages};
 use crate::compile::Compiled;
+use crate::gaps::Point;
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
 use crate::solve::eigen::lowest_modes;
@@ -29,6 +30,18 @@ const WORST_RESIDUAL: f64 = 1e-2;
 /// # Errors
 /// See [`AnalysisError`]; `NotConverged` rather than a frequency that cannot be trusted.
 pub fn modes(compiled: &Compiled, count: usize, voltages: &PortVoltages) -> Result<ModesResult, AnalysisError> {
+    Ok(modes_with_curves(compiled, count, voltages)?.0)
+}
+
+/// The same, with the displacement of points along every beam for pictures, mode by mode.
+///
+/// # Errors
+/// See [`modes`].
+pub fn modes_with_curves(
+    compiled: &Compiled,
+    count: usize,
+    voltages: &PortVoltages,
+) -> Result<(ModesResult, Vec<BeamMotions>), AnalysisError> {
     let system = &compiled.parts.system;
     let mut drive = system.electrics.drive();
     // without loads the drawn geometry is the operating point, also for a structure that floats freely
@@ -63,30 +76,39 @@ pub fn modes(compiled: &Compiled, count: usize, voltages: &PortVoltages) -> Resu
             detail: format!("there are more than {count} modes below the highest one found; ask for more modes"),
         });
     }
-    let shapes = found.shapes.iter().map(|x| shape(compiled, &q, x)).collect();
-    Ok(ModesResult {
+    let (shapes, curves) = found.shapes.iter().map(|x| shape(compiled, &q, x)).unzip();
+    let result = ModesResult {
         frequencies_hz: found.lambda.iter().map(|&l| l.max(0.0).sqrt() / std::f64::consts::TAU).collect(),
         shapes,
         residuals: found.residuals,
         unknowns: system.model.unknowns(),
-    })
+    };
+    Ok((result, curves))
 }
 
-/// Displacements of the nodes in a mode, the largest translation scaled to 1.
-fn shape(compiled: &Compiled, q: &[Pose], x: &[Pose]) -> Vec<(String, NodeMotion)> {
+/// Displacements of the nodes and along the beams in a mode, the largest translation of a node scaled to 1.
+fn shape(compiled: &Compiled, q: &[Pose], x: &[Pose]) -> (NodeMotions, BeamMotions) {
     let zeros = vec![Pose::zeros(); q.len()];
     let (state, change) =
         (View { q, v: &zeros, rise: &[], volts: &[] }, View { q: x, v: &zeros, rise: &[], volts: &[] });
-    let mut nodes: Vec<(String, NodeMotion)> = (compiled.structure.nodes.iter().zip(&compiled.parts.nodes))
-        .filter_map(|(node, point)| {
-            let at = |d: usize| point.map(|p| Signal::Displacement(p, d).slope(compiled, &state, &change));
-            Some((node.name.clone(), NodeMotion { x: at(0)?, y: at(1)?, rz: at(2)? }))
-        })
+    let at = |point: Point| {
+        let at = |d: usize| Signal::Displacement(point, d).slope(compiled, &state, &change);
+        NodeMotion { x: at(0), y: at(1), rz: at(2) }
+    };
+    let nodes: NodeMotions = (compiled.structure.nodes.iter().zip(&compiled.parts.nodes))
+        .filter_map(|(node, point)| Some((node.name.clone(), at((*point)?))))
         .collect();
+    let curves: BeamMotions =
+        compiled.parts.beams.iter().map(|points| points.iter().map(|p| at(*p)).collect()).collect();
+    normalized(nodes, curves)
+}
+
+/// Scales a shape so that the largest translation of a node is 1.
+pub(crate) fn normalized(mut nodes: NodeMotions, mut curves: BeamMotions) -> (NodeMotions, BeamMotions) {
     let largest = nodes.iter().map(|(_, m)| m.x.hypot(m.y)).fold(0.0, f64::max);
     let scale = if largest > 0.0 { 1.0 / largest } else { 1.0 };
-    for (_, m) in &mut nodes {
+    for m in nodes.iter_mut().map(|(_, m)| m).chain(curves.iter_mut().flatten()) {
         *m = NodeMotion { x: m.x * scale, y: m.y * scale, rz: m.rz * scale };
     }
-    nodes
+    (nodes, curves)
 }

@@ -37,7 +37,7 @@ pub struct View<'a> {
 }
 
 impl Signal {
-    /// Finds a signal by name: `NODE.x|y|rz|vx|vy|vrz`, `BEAM.T`, `GAP.q`, `GAP.gap`.
+    /// Finds a signal by name: `NODE.x|y|rz|vx|vy|vrz`, the same of `BEAM[k]`, the k-th point along a beam from 0, `BEAM.T`, `GAP.q`, `GAP.gap`.
     ///
     /// # Errors
     /// [`AnalysisError::BadRequest`] with what would be understood.
@@ -50,18 +50,15 @@ impl Signal {
 
     fn lookup(compiled: &Compiled, name: &str) -> Option<Self> {
         let (part, quantity) = name.rsplit_once('.')?;
-        let node = |direction: usize, rate: bool| {
-            let point = compiled.parts.nodes[compiled.structure.node(part)?.0]?;
-            Some(if rate { Self::Rate(point, direction) } else { Self::Displacement(point, direction) })
-        };
+        if let Some((direction, rate)) = direction(quantity) {
+            let point = match compiled.structure.node(part) {
+                Some(node) => compiled.parts.nodes[node.0]?,
+                None => along_beam(compiled, part)?,
+            };
+            return Some(if rate { Self::Rate(point, direction) } else { Self::Displacement(point, direction) });
+        }
         let gap = || compiled.parts.gap_names.iter().position(|n| n == part);
         match quantity {
-            "x" => node(0, false),
-            "y" => node(1, false),
-            "rz" => node(2, false),
-            "vx" => node(0, true),
-            "vy" => node(1, true),
-            "vrz" => node(2, true),
             "q" => gap().map(Self::Charge),
             "gap" => gap().map(Self::Distance),
             "T" => {
@@ -127,11 +124,31 @@ impl Signal {
     }
 }
 
+/// Direction and kind (true: rate) of the motion that `x`, `y`, `rz`, `vx`, `vy` and `vrz` stand for.
+fn direction(quantity: &str) -> Option<(usize, bool)> {
+    let names = ["x", "y", "rz", "vx", "vy", "vrz"];
+    names.iter().position(|n| *n == quantity).map(|k| (k % 3, k >= 3))
+}
+
+/// Node, direction and kind (true: rate) of a signal of a node.
+pub(crate) fn node_signal(compiled: &Compiled, name: &str) -> Option<(usize, usize, bool)> {
+    let (part, quantity) = name.rsplit_once('.')?;
+    let (direction, rate) = direction(quantity)?;
+    Some((compiled.structure.node(part)?.0, direction, rate))
+}
+
 /// Rate of a material point when its body moves at `v` (or its first-order change when the body's pose changes by `v`).
 fn point_rate(p: Point, q: &[Pose], v: &[Pose], linear: bool) -> nalgebra::Vector2<f64> {
     let (q, v) = (Model::pose(q, p.body), Model::pose(v, p.body));
     let (turn, _) = planar::point_turn(&q, p.arm, linear);
     nalgebra::Vector2::new(v.x, v.y) + turn * v.z
+}
+
+/// The point `BEAM[k]`.
+fn along_beam(compiled: &Compiled, name: &str) -> Option<Point> {
+    let (beam, number) = name.strip_suffix(']')?.rsplit_once('[')?;
+    let beam = compiled.structure.beams.iter().position(|b| b.name == beam)?;
+    compiled.parts.beams[beam].get(number.parse::<usize>().ok()?).copied()
 }
 
 /// What a wrong name could have meant.

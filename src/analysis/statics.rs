@@ -1,6 +1,6 @@
 //! Static equilibrium.
 use super::signal::{Signal, View};
-use super::{AnalysisError, PortVoltages};
+use super::{AnalysisError, BeamMotions, PortVoltages};
 use crate::compile::Compiled;
 use crate::multibody::planar::Pose;
 use crate::solve::SolveError;
@@ -45,15 +45,53 @@ pub struct StaticResult {
 /// # Errors
 /// See [`AnalysisError`].
 pub fn static_equilibrium(compiled: &Compiled, voltages: &PortVoltages) -> Result<StaticResult, AnalysisError> {
+    Ok(static_with_curves(compiled, voltages)?.0)
+}
+
+/// The same, with the displacement of points along every beam for pictures.
+///
+/// # Errors
+/// See [`AnalysisError`].
+pub fn static_with_curves(
+    compiled: &Compiled,
+    voltages: &PortVoltages,
+) -> Result<(StaticResult, BeamMotions), AnalysisError> {
     let point = operating_point(compiled, voltages)?;
     let system = &compiled.parts.system;
-    let structure = &compiled.structure;
     let electrics = &system.electrics;
-    let view = View { q: &point.q, v: &point.q, rise: &point.rise, volts: &point.volts };
-    let temperatures_k = structure
-        .beams
-        .iter()
-        .enumerate()
+    let port = |p: usize| electrics.names[p].clone();
+    let charge = |p: usize| {
+        (0..point.volts.len())
+            .map(|g| electrics.gap_rows[(g, p)] * system.capacitance(g, &point.q) * point.volts[g])
+            .sum::<f64>()
+    };
+    let curves = beam_motions(compiled, &point.q);
+    let electrical = electrical(compiled, &point.sources, &point.rise);
+    let result = StaticResult {
+        nodes: node_motions(compiled, &point.q),
+        temperatures_k: electrical.temperatures_k,
+        currents_a: electrical.currents_a,
+        charges_c: (0..electrics.ports).map(|p| (port(p), charge(p))).collect(),
+        pulled_in: point.path.fold.is_some(),
+        free_motions: point.free_motions,
+        unknowns: system.model.unknowns(),
+        iterations: point.path.iterations,
+    };
+    Ok((result, curves))
+}
+
+/// What source voltages and temperature rises say without any mechanics.
+pub(crate) struct Electrical {
+    pub(crate) temperatures_k: Vec<(String, f64)>,
+    pub(crate) currents_a: Vec<(String, f64)>,
+}
+
+/// Temperatures of heated or prescribed beams and currents into ports.
+pub(crate) fn electrical(compiled: &Compiled, sources: &[f64], rise: &[f64]) -> Electrical {
+    let structure = &compiled.structure;
+    let electrics = &compiled.parts.system.electrics;
+    let view = View { q: &[], v: &[], rise, volts: &[] };
+    let temperatures_k = (structure.beams.iter().enumerate())
         .filter(|(_, b)| b.heater.is_some() || b.temperature.is_some())
         .map(|(index, b)| {
             let heater = compiled.parts.heaters.iter().position(|&h| h == index);
@@ -61,24 +99,9 @@ pub fn static_equilibrium(compiled: &Compiled, voltages: &PortVoltages) -> Resul
             (b.name.clone(), heater.map_or(rest, |k| Signal::Temperature(k).value(compiled, &view)))
         })
         .collect();
-    let port = |p: usize| electrics.names[p].clone();
-    let current =
-        |p: usize| (0..point.sources.len()).map(|s| electrics.conductance[(p, s)] * point.sources[s]).sum::<f64>();
-    let charge = |p: usize| {
-        (0..point.volts.len())
-            .map(|g| electrics.gap_rows[(g, p)] * system.capacitance(g, &point.q) * point.volts[g])
-            .sum::<f64>()
-    };
-    Ok(StaticResult {
-        nodes: node_motions(compiled, &point.q),
-        temperatures_k,
-        currents_a: (0..electrics.ports).map(|p| (port(p), current(p))).collect(),
-        charges_c: (0..electrics.ports).map(|p| (port(p), charge(p))).collect(),
-        pulled_in: point.path.fold.is_some(),
-        free_motions: point.free_motions,
-        unknowns: system.model.unknowns(),
-        iterations: point.path.iterations,
-    })
+    let current = |p: usize| (0..sources.len()).map(|s| electrics.conductance[(p, s)] * sources[s]).sum::<f64>();
+    let currents_a = (0..electrics.ports).map(|p| (electrics.names[p].clone(), current(p))).collect();
+    Electrical { temperatures_k, currents_a }
 }
 
 /// An equilibrium with what it was found at.
@@ -149,4 +172,14 @@ pub(crate) fn node_motions(compiled: &Compiled, q: &[Pose]) -> Vec<(String, Node
             Some((node.name.clone(), NodeMotion { x: moved.x, y: moved.y, rz: point.rotation(q) }))
         })
         .collect()
+}
+
+/// Displacement of points along every beam, ends included.
+pub(crate) fn beam_motions(compiled: &Compiled, q: &[Pose]) -> BeamMotions {
+    let linear = compiled.parts.system.model.linear;
+    let at = |point: &crate::gaps::Point| {
+        let moved = point.displacement(q, linear);
+        NodeMotion { x: moved.x, y: moved.y, rz: point.rotation(q) }
+    };
+    compiled.parts.beams.iter().map(|points| points.iter().map(at).collect()).collect()
 }

@@ -1,13 +1,17 @@
 //! Motion in time.
+use super::integrator::Integrator;
 use super::signal::{Signal, View};
 use super::statics::{operating_point, source_vector};
 use super::{AnalysisError, Watch};
 use crate::compile::Compiled;
-use crate::gaps::{Ramp, System};
+use crate::gaps::{Ramp, System, contact};
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
-use crate::solve::adaptive::{Adaptive, Advance};
-use crate::solve::rodas4::Motion;
+use crate::solve::adaptive::{Advance, Control, Observer};
+use crate::solve::dense::interpolate;
+use crate::solve::event::{Detector, Direction};
+use crate::solve::linear::{Solver, SolverKind};
+use crate::solve::method::{Motion, Work};
 use serde::Serialize;
 
 /// What a transient may be told.
@@ -25,6 +29,33 @@ pub struct TransientOptions<'a> {
     pub voltages: Vec<(String, f64)>,
     /// A variant of the same netlist whose static equilibrium is the initial state; none: at rest as drawn.
     pub release: Option<&'a Compiled>,
+    /// What integrates.
+    pub method: Integrator,
+    /// Length of equal steps [s]; none: steps follow `tol`.
+    pub step: Option<f64>,
+    /// Crossings to find: (signal name, level in the signal's unit).
+    pub events: Vec<(String, f64)>,
+    /// What solves the linear systems of the method. The result is the same to rounding; all but the recursion are
+    /// baselines, and Radau5 and rk45 have none.
+    pub solver: SolverKind,
+}
+
+impl Default for TransientOptions<'_> {
+    /// From rest to 1 s; whoever asks says more.
+    fn default() -> Self {
+        Self {
+            stop: 1.0,
+            signals: Vec::new(),
+            points: 1001,
+            tol: 1e-3,
+            voltages: Vec::new(),
+            release: None,
+            method: Integrator::default(),
+            step: None,
+            events: Vec::new(),
+            solver: SolverKind::default(),
+        }
+    }
 }
 
 /// Work done by an integration.
@@ -38,6 +69,25 @@ pub struct Counters {
     pub factorizations: u64,
     /// Solves with a factor.
     pub solves: u64,
+    /// Evaluations of the forces, with or without their tangent.
+    pub forces: u64,
+    /// Newton iterations.
+    pub iterations: u64,
+}
+
+/// A signal that crossed a level.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Event {
+    /// Name of the signal; of a gap that closes or opens, its `GAP.gap`.
+    pub signal: String,
+    /// The level, in the signal's unit.
+    pub level: f64,
+    /// When [s].
+    pub t: f64,
+    /// Which way.
+    pub direction: Direction,
+    /// True where the contact force of a gap begins (down) or ends (up) to act.
+    pub contact: bool,
 }
 
 /// Sampled signals.
@@ -51,10 +101,67 @@ pub struct TransientResult {
     pub counters: Counters,
     /// Mechanical unknowns.
     pub unknowns: usize,
+    /// Crossings asked for and contacts of gaps, in order of time.
+    pub events: Vec<Event>,
 }
 
 /// Share of the tolerance that one step may use: errors of many steps add up.
-const STEP_SHARE: f64 = 1e-2;
+pub(super) const STEP_SHARE: f64 = 1e-2;
+
+/// What carries a motion from the start of a ramp to its end.
+pub(super) trait Carrier {
+    /// Takes the start to where the formulation can go on from.
+    ///
+    /// # Errors
+    /// See [`AnalysisError`].
+    fn begin(&mut self, ramp: &Ramp<'_>, motion: &mut Motion) -> Result<(), AnalysisError> {
+        let _ = (ramp, motion);
+        Ok(())
+    }
+
+    /// Advances it; `observe` sees each step.
+    ///
+    /// # Errors
+    /// See [`AnalysisError`].
+    fn advance(
+        &mut self,
+        ramp: &Ramp<'_>,
+        motion: &mut Motion,
+        observe: Observer<'_>,
+    ) -> Result<(Advance, Work), AnalysisError>;
+}
+
+/// The bodies' own coordinates, joints as springs.
+struct Compliant<'a> {
+    system: &'a System,
+    options: &'a TransientOptions<'a>,
+}
+
+impl Carrier for Compliant<'_> {
+    fn advance(
+        &mut self,
+        ramp: &Ramp<'_>,
+        motion: &mut Motion,
+        observe: Observer<'_>,
+    ) -> Result<(Advance, Work), AnalysisError> {
+        let options = self.options;
+        if options.solver != SolverKind::Recursion && !options.method.takes_solvers() {
+            return Err(AnalysisError::BadRequest {
+                what: "solver".into(),
+                detail: format!(
+                    "{} solves its own systems; the {} solver cannot",
+                    options.method.name(),
+                    options.solver.name()
+                ),
+            });
+        }
+        let solver = Solver::new(options.solver, &self.system.model.pattern)?;
+        let h = first_step(self.system, options.stop);
+        let control = options.step.map_or(Control::Tolerance(STEP_SHARE * options.tol), Control::Fixed);
+        let (end, work) = options.method.advance(self.system, solver, ramp, motion, h, control, observe);
+        Ok((end?, work))
+    }
+}
 
 /// Integrates the motion. Each finished sample also goes to `sample` (t, values in signal order), for streaming.
 ///
@@ -63,6 +170,18 @@ const STEP_SHARE: f64 = 1e-2;
 pub fn transient(
     compiled: &Compiled,
     options: &TransientOptions<'_>,
+    sample: &mut dyn FnMut(f64, &[f64]),
+    watch: Watch<'_>,
+) -> Result<TransientResult, AnalysisError> {
+    let mut carrier = Compliant { system: &compiled.parts.system, options };
+    record(compiled, options, &mut carrier, sample, watch)
+}
+
+/// Lets `carrier` go from the start to the end of a run, and takes samples and events on the way.
+pub(super) fn record(
+    compiled: &Compiled,
+    options: &TransientOptions<'_>,
+    carrier: &mut impl Carrier,
     sample: &mut dyn FnMut(f64, &[f64]),
     watch: Watch<'_>,
 ) -> Result<TransientResult, AnalysisError> {
@@ -89,6 +208,7 @@ pub fn transient(
     let mut drive = electrics.drive();
     ramp.at(0.0, &mut drive);
     let volts = drive.volts.clone();
+    carrier.begin(&ramp, &mut motion)?;
 
     let mut result = TransientResult {
         t: Vec::with_capacity(options.points),
@@ -97,11 +217,20 @@ pub fn transient(
             .collect(),
         counters: Counters::default(),
         unknowns: system.model.unknowns(),
+        events: Vec::new(),
     };
+    let mut watched = watched(compiled, options)?;
+    let mut events = Vec::new();
     let spacing = options.stop / (options.points - 1) as f64;
     let mut row = vec![0.0; signals.len()];
     let mut rise_now = rise.clone();
     let mut now = Motion::zeros(system.bodies());
+    let mut within = now.clone();
+    let mut rise_within = rise.clone();
+    for w in &mut watched {
+        let view = View { q: &motion.q, v: &motion.v, rise: &rise, volts: &volts };
+        w.detector = Detector::new(w.signal.value(compiled, &view) - w.level);
+    }
     let mut emit = |t: f64, motion: &Motion, result: &mut TransientResult| {
         for (k, r) in rise_now.iter_mut().enumerate() {
             *r = ramp.rise_at(k, t);
@@ -126,22 +255,68 @@ pub fn transient(
             emit(t, &now, &mut result);
             next += 1;
         }
+        let first = events.len();
+        for w in &mut watched {
+            let value = |x: f64| {
+                interpolate(before, after, h, x, &mut within);
+                for (k, r) in rise_within.iter_mut().enumerate() {
+                    *r = ramp.rise_at(k, s + x * h);
+                }
+                let view = View { q: &within.q, v: &within.v, rise: &rise_within, volts: &volts };
+                w.signal.value(compiled, &view) - w.level
+            };
+            w.detector.step(value, |x, direction| {
+                events.push(Event {
+                    signal: w.name.clone(),
+                    level: w.level,
+                    t: s + x * h,
+                    direction,
+                    contact: w.contact,
+                });
+            });
+        }
+        events[first..].sort_by(|a, b| a.t.total_cmp(&b.t));
         watch(((s + h) / options.stop).min(1.0))
     };
-    let mut stepper = Adaptive::new(system, 0);
-    let mut h = first_step(system, options.stop);
-    let tol = STEP_SHARE * options.tol;
-    let end = stepper.advance(system, &ramp, &mut motion, &[], &mut [], &mut h, tol, usize::MAX, &mut observe)?;
+    let (end, work) = carrier.advance(&ramp, &mut motion, &mut observe)?;
     if end == Advance::Stopped {
         return Err(AnalysisError::Cancelled);
     }
     result.counters = Counters {
-        steps: stepper.work.steps,
-        rejected: stepper.work.rejected,
-        factorizations: stepper.method.factorizations,
-        solves: stepper.method.solves,
+        steps: work.steps,
+        rejected: work.rejected,
+        factorizations: work.factorizations,
+        solves: work.solves,
+        forces: work.forces,
+        iterations: work.iterations,
     };
+    result.events = events;
     Ok(result)
+}
+
+/// A signal whose crossings of a level are found.
+struct Watched {
+    name: String,
+    signal: Signal,
+    level: f64,
+    contact: bool,
+    detector: Detector,
+}
+
+/// The crossings asked for, and the contact of every gap that has one.
+fn watched(compiled: &Compiled, options: &TransientOptions<'_>) -> Result<Vec<Watched>, AnalysisError> {
+    let watch =
+        |name: String, signal, level, contact| Watched { name, signal, level, contact, detector: Detector::default() };
+    let asked = options
+        .events
+        .iter()
+        .map(|(name, level)| Signal::find(compiled, name).map(|signal| watch(name.clone(), signal, *level, false)));
+    let system = &compiled.parts.system;
+    let touching = (0..system.gaps.len()).filter(|&g| system.touches(g)).map(|g| {
+        let name = format!("{}.gap", compiled.parts.gap_names[g]);
+        Ok(watch(name, Signal::Distance(g), contact::RANGE, true))
+    });
+    asked.chain(touching).collect()
 }
 
 /// A cautious first step: the error control corrects it within a few steps either way.
@@ -159,7 +334,7 @@ pub(crate) fn first_step(system: &System, interval: f64) -> f64 {
     if fastest > 0.0 { interval.min(1.0 / fastest) } else { interval }
 }
 
-fn check(options: &TransientOptions<'_>) -> Result<(), AnalysisError> {
+pub(crate) fn check(options: &TransientOptions<'_>) -> Result<(), AnalysisError> {
     let bad = |what: &str, detail: String| Err(AnalysisError::BadRequest { what: what.into(), detail });
     if !(options.stop.is_finite() && options.stop > 0.0) {
         return bad("stop", format!("{} is not a positive time in seconds", options.stop));
@@ -170,17 +345,18 @@ fn check(options: &TransientOptions<'_>) -> Result<(), AnalysisError> {
     if !(options.tol.is_finite() && options.tol > 0.0 && options.tol < 1.0) {
         return bad("tol", format!("{} is not a relative error between 0 and 1", options.tol));
     }
-    Ok(())
-}
-
-/// Cubic Hermite interpolation between two ends of a step of length `h`, at the share `x`.
-fn interpolate(before: &Motion, after: &Motion, h: f64, x: f64, out: &mut Motion) {
-    let (a, b) = ((1.0 + 2.0 * x) * (1.0 - x) * (1.0 - x), x * x * (3.0 - 2.0 * x));
-    let (c, d) = (h * x * (1.0 - x) * (1.0 - x), -h * x * x * (1.0 - x));
-    let (da, dc, dd) = (-6.0 * x * (1.0 - x) / h, (1.0 - x) * (1.0 - 3.0 * x), x * (3.0 * x - 2.0));
-    for k in 0..out.q.len() {
-        let (q0, q1, v0, v1) = (before.q[k], after.q[k], before.v[k], after.v[k]);
-        out.q[k] = q0 * a + q1 * b + v0 * c + v1 * d;
-        out.v[k] = (q0 - q1) * da + v0 * dc + v1 * dd;
+    if let Some(step) = options.step
+        && !(step.is_finite() && step > 0.0 && options.stop / step < 1e9)
+    {
+        return bad("step", format!("{step} is not a positive time in seconds, of which at most 1e9 make the run"));
     }
+    if let Integrator::GeneralizedAlpha { rho } = options.method
+        && !(0.0..=1.0).contains(&rho)
+    {
+        return bad("rho", format!("{rho} is not between 0 and 1"));
+    }
+    if let Some((name, level)) = options.events.iter().find(|(_, level)| !level.is_finite()) {
+        return bad("event", format!("{name}={level}: the level is not finite"));
+    }
+    Ok(())
 }

@@ -1,6 +1,7 @@
 //! Why a command did not finish, and with which exit status.
 
 use bimorph::analysis::AnalysisError;
+use bimorph::analysis::chart::ChartError;
 use bimorph::compile::CompileError;
 use bimorph::cosim::CosimError;
 use bimorph::jobs::sweep::SweepError;
@@ -34,6 +35,8 @@ pub(crate) enum Failure {
     Interrupted,
     #[error("no point of the sweep has a result; the first says: {0}")]
     AllPoints(String),
+    #[error("no run of the chart has a result; the first says: {0}")]
+    AllRuns(String),
     #[error("the core does not work on this machine; see the lines marked missing")]
     Doctor,
     #[error(transparent)]
@@ -42,6 +45,8 @@ pub(crate) enum Failure {
     Compile(#[from] CompileError),
     #[error(transparent)]
     Analysis(#[from] AnalysisError),
+    #[error(transparent)]
+    Chart(ChartError),
     #[error(transparent)]
     Table(#[from] LengthMismatch),
     #[error(transparent)]
@@ -56,6 +61,17 @@ pub(crate) enum Failure {
     Serve(#[from] ServeError),
     #[error(transparent)]
     Address(#[from] AddressError),
+}
+
+/// A chart's netlist and analysis fail as those of every command.
+impl From<ChartError> for Failure {
+    fn from(error: ChartError) -> Self {
+        match error {
+            ChartError::Compile(error) => error.into(),
+            ChartError::Analysis(error) => error.into(),
+            other => Self::Chart(other),
+        }
+    }
 }
 
 impl Failure {

@@ -3,19 +3,23 @@
 //! Every subcommand is an [`clap::Args`] struct with a `run` method. It reads, computes, writes its `--out` file, and
 //! only then prints to standard output, so that a failure leaves standard output empty and no file behind.
 
+mod chart;
 mod check;
 mod cosim;
 mod doctor;
+mod draw_motion;
 mod failure;
 mod interrupt;
 mod model;
 mod modes;
 mod output;
+mod path;
 mod plot;
 mod progress;
 mod pull_in;
 mod report;
 mod serve;
+mod solver;
 mod statics;
 mod sweep;
 mod tran;
@@ -40,12 +44,14 @@ struct Cli {
 enum Command {
     Check(check::Check),
     Static(statics::Static),
+    Path(path::PathCommand),
     Modes(modes::Modes),
     Pullin(pull_in::Pullin),
     Tran(tran::Tran),
     Cosim(cosim::Cosim),
     Serve(serve::Serve),
     Sweep(sweep::Sweep),
+    Chart(chart::Chart),
     Plot(plot::Plot),
     Doctor(doctor::Doctor),
 }
@@ -56,12 +62,14 @@ pub(crate) fn main() -> ExitCode {
     let done = match &cli.command {
         Command::Check(command) => command.run(),
         Command::Static(command) => command.run(),
+        Command::Path(command) => command.run(),
         Command::Modes(command) => command.run(),
         Command::Pullin(command) => command.run(),
         Command::Tran(command) => command.run(),
         Command::Cosim(command) => command.run(),
         Command::Serve(command) => command.run(),
         Command::Sweep(command) => command.run(),
+        Command::Chart(command) => command.run(),
         Command::Plot(command) => command.run(),
         Command::Doctor(command) => command.run(),
     };

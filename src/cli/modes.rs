@@ -3,19 +3,24 @@
 use super::failure::Failure;
 use super::model::{Context, ModelArgs, Named};
 use super::output::OutputArgs;
+use super::solver::ModelChoice;
 use super::{progress, report, statics, value};
-use bimorph::analysis::modes::{ModesResult, modes};
+use bimorph::analysis::BeamMotions;
+use bimorph::analysis::frame::{frame, frame_modes};
+use bimorph::analysis::modes::{ModesResult, modes_with_curves};
 use bimorph::analysis::statics::NodeMotion;
 use bimorph::compile::Compiled;
+use bimorph::results::format::Format;
+use bimorph::results::plot::animation::{self, Frame, Play};
 use bimorph::results::plot::axis::quantity;
 use bimorph::results::plot::mechanism::{self, Drawing, Scale};
-use bimorph::results::plot::{stack, svg::Picture};
+use bimorph::results::plot::svg::Picture;
 use bimorph::results::table::Table;
 use clap::Args;
 use serde::Serialize;
 
 /// Shapes drawn in one picture.
-const MOST_SHAPES: usize = 6;
+const MOST_SHAPES: usize = 12;
 
 /// Natural frequencies and mode shapes about the operating point, without damping.
 ///
@@ -37,6 +42,10 @@ pub(crate) struct Modes {
     #[arg(long = "port", short = 'p', value_name = "NAME=VOLTS", value_parser = value::volts)]
     ports: Vec<(String, f64)>,
 
+    /// What computes it: the product's own model, or the baseline to compare with
+    #[arg(long, value_enum, default_value_t)]
+    solver: ModelChoice,
+
     #[command(flatten)]
     output: OutputArgs,
 }
@@ -47,6 +56,7 @@ struct Document<'a> {
     shapes: Vec<Named<'a, NodeMotion>>,
     residuals: &'a [f64],
     unknowns: usize,
+    solver: ModelChoice,
     port_voltages_v: Named<'a, f64>,
     #[serde(flatten)]
     context: Context<'a>,
@@ -60,14 +70,20 @@ impl Modes {
         }
         let compiled = self.model.compile()?;
         let busy = progress::spinner("modes");
-        let result = modes(&compiled, self.count, &self.ports);
+        let result = match self.solver {
+            ModelChoice::Recursion => modes_with_curves(&compiled, self.count, &self.ports),
+            ModelChoice::Frame => {
+                frame(&compiled).and_then(|frame| frame_modes(&compiled, &frame, self.count, &self.ports))
+            }
+        };
         busy.finish_and_clear();
-        let result = result?;
+        let (result, curves) = result?;
         let document = Document {
             frequencies_hz: &result.frequencies_hz,
             shapes: result.shapes.iter().map(|shape| Named(shape)).collect(),
             residuals: &result.residuals,
             unknowns: result.unknowns,
+            solver: self.solver,
             port_voltages_v: Named(&self.ports),
             context: self.model.context(&compiled),
         };
@@ -82,7 +98,15 @@ impl Modes {
         let text = report::columns(&["mode", "frequency", "residual"], &rows)
             + "\n"
             + &report::footing(&compiled, result.unknowns);
-        self.output.finish(|| table(&title, &result), || Ok(picture(&compiled, &title, &result)), &document, &text)
+        if self.output.format() == Some(Format::Html) {
+            return self.output.finish_page(|| page(&compiled, &title, &result, &curves), &document, &text);
+        }
+        self.output.finish(
+            || table(&title, &result),
+            || Ok(picture(&compiled, &title, &result, &curves)),
+            &document,
+            &text,
+        )
     }
 }
 
@@ -94,18 +118,39 @@ fn table(title: &str, result: &ModesResult) -> Result<Table, Failure> {
     Ok(table)
 }
 
-fn picture(compiled: &Compiled, title: &str, result: &ModesResult) -> Picture {
-    let shapes = result.shapes.iter().zip(&result.frequencies_hz).enumerate().take(MOST_SHAPES);
-    let drawings: Vec<Picture> = shapes
-        .map(|(i, (shape, frequency))| {
-            mechanism::draw(&Drawing {
-                structure: &compiled.structure,
-                title: &format!("{title}: mode {}, {}", i + 1, quantity(*frequency, "Hz")),
-                motion: &statics::motion(compiled, shape),
-                temperatures: &[],
-                scale: Scale::Shape,
-            })
+/// Title of a mode.
+fn name(index: usize, frequency: f64) -> String {
+    format!("{}: {}", index + 1, quantity(frequency, "Hz"))
+}
+
+fn picture(compiled: &Compiled, title: &str, result: &ModesResult, curves: &[BeamMotions]) -> Picture {
+    let names: Vec<String> = result.frequencies_hz.iter().enumerate().map(|(i, f)| name(i, *f)).collect();
+    let motions: Vec<_> = result.shapes.iter().map(|shape| statics::motion(compiled, shape)).collect();
+    let curves: Vec<_> = curves.iter().map(statics::beams).collect();
+    let drawings: Vec<Drawing<'_>> = (names.iter().zip(&motions).zip(&curves).take(MOST_SHAPES))
+        .map(|((title, motion), curves)| Drawing {
+            structure: &compiled.structure,
+            title,
+            motion,
+            curves,
+            temperatures: &[],
+            scale: Scale::Shape,
         })
         .collect();
-    stack(&drawings)
+    mechanism::grid(title, &drawings)
+}
+
+/// The modes swinging. Their displacements stand for no length: the largest of each becomes a micrometre.
+fn page(compiled: &Compiled, title: &str, result: &ModesResult, curves: &[BeamMotions]) -> String {
+    let frames = result.shapes.iter().zip(&result.frequencies_hz).zip(curves).enumerate();
+    let frames: Vec<Frame> = frames
+        .map(|(k, ((shape, frequency), curves))| {
+            let (mut nodes, mut curves) = (statics::motion(compiled, shape), statics::beams(curves));
+            let all = || nodes.iter().chain(curves.iter().flatten());
+            let largest = all().map(|[x, y, _]| x.hypot(*y)).fold(f64::MIN_POSITIVE, f64::max);
+            nodes.iter_mut().chain(curves.iter_mut().flatten()).for_each(|m| *m = m.map(|x| 1e-6 * x / largest));
+            Frame { label: name(k, *frequency), nodes, curves }
+        })
+        .collect();
+    animation::page(&compiled.structure, title, Play::Modes, &frames)
 }

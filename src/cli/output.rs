@@ -36,6 +36,19 @@ impl OutputArgs {
         self.out.as_deref().and_then(|path| Format::from_path(path).ok())
     }
 
+    /// Writes a finished page to `--out`, then prints.
+    pub(crate) fn finish_page(
+        &self,
+        page: impl FnOnce() -> String,
+        json: &impl Serialize,
+        report: &str,
+    ) -> Result<(), Failure> {
+        if let Some(path) = &self.out {
+            write_page(path, &page())?;
+        }
+        self.print(json, report)
+    }
+
     /// Writes the `--out` file, then prints.
     pub(crate) fn finish(
         &self,
@@ -47,6 +60,10 @@ impl OutputArgs {
         if let (Some(path), Some(format)) = (&self.out, self.format()) {
             write(path, format, table, picture)?;
         }
+        self.print(json, report)
+    }
+
+    fn print(&self, json: &impl Serialize, report: &str) -> Result<(), Failure> {
         if self.json {
             let mut text = serde_json::to_string(json).map_err(|e| Failure::Stdout(e.into()))?;
             text.push('\n');
@@ -85,20 +102,29 @@ pub(crate) fn write(
             let table = table()?;
             atomic::write(path, |out| csv::write(&table, out)).map_err(failed)
         }
-        Format::Svg => {
-            let svg = picture()?.to_svg();
-            atomic::write(path, |out| out.write_all(svg.as_bytes())).map_err(failed)
-        }
-        Format::Png => {
-            let png = render::png(&picture()?)?;
-            atomic::write(path, |out| out.write_all(&png)).map_err(failed)
-        }
+        Format::Svg | Format::Png | Format::Html => write_picture(path, format, &picture()?),
+    }
+}
+
+/// Writes a picture as SVG, as a web page, or (any other format) as PNG.
+pub(crate) fn write_picture(path: &Path, format: Format, picture: &Picture) -> Result<(), Failure> {
+    let bytes = match format {
+        Format::Svg => picture.to_svg().into_bytes(),
         Format::Html => {
             let name = path.file_stem().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-            let page = render::html(&name, &picture()?);
-            atomic::write(path, |out| out.write_all(page.as_bytes())).map_err(failed)
+            render::html(&name, picture).into_bytes()
         }
-    }
+        _ => render::png(picture)?,
+    };
+    let failed = |source| Failure::Write { path: path.to_owned(), source };
+    atomic::write(path, |out| out.write_all(&bytes)).map_err(failed)
+}
+
+/// Writes a page as it is.
+pub(crate) fn write_page(path: &Path, page: &str) -> Result<(), Failure> {
+    interrupt::no_longer_polled();
+    let failed = |source| Failure::Write { path: path.to_owned(), source };
+    atomic::write(path, |out| out.write_all(page.as_bytes())).map_err(failed)
 }
 
 /// Prints to standard output.

@@ -3,11 +3,12 @@
 use super::failure::Failure;
 use super::output::{check_folder, write};
 use super::{interrupt, statics, value};
-use bimorph::analysis::statics::static_equilibrium;
+use bimorph::analysis::statics::static_with_curves;
 use bimorph::compile::{CompileOptions, compile};
 use bimorph::netlist::{Bundle, Setting};
 use bimorph::results::format::Format;
 use bimorph::results::plot::chart::{self, Chart, Panel, Series};
+use bimorph::results::plot::plane::{self, Curve, Mark, Plane, Sign};
 use bimorph::results::plot::{stack, svg::Picture};
 use bimorph::results::raw;
 use bimorph::results::table::{Column, Table};
@@ -20,7 +21,8 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  bimorph plot bank.raw --out bank.png\n  \
     bimorph plot bank.raw --panel 'drive=v(heat)' --panel 'yoke [µm]=v(y)' --out bank.svg\n  \
-    bimorph plot bank.raw --mechanism bank.net --port heat=2.2 --out bank.png")]
+    bimorph plot bank.raw --mechanism bank.net --port heat=2.2 --out bank.png\n  \
+    bimorph plot stage.raw --track c.x,c.y --out track.png          one signal against another, to one scale")]
 pub(crate) struct Plot {
     /// ngspice raw file, binary or ASCII
     file: PathBuf,
@@ -29,6 +31,14 @@ pub(crate) struct Plot {
     /// [default: one panel for each unit]
     #[arg(long = "panel", value_name = "TITLE=SIGNALS")]
     panels: Vec<String>,
+
+    /// One signal against another, to one scale: X,Y or NAME=X,Y. Repeatable; all share one picture
+    #[arg(long = "track", value_name = "NAME=X,Y")]
+    tracks: Vec<String>,
+
+    /// Another raw file over the same axis; its signals are called STEM:SIGNAL. Repeatable
+    #[arg(long = "with", value_name = "FILE")]
+    others: Vec<PathBuf>,
 
     /// Which plot of the file, from 1 [default: the longest]
     #[arg(long, value_name = "N")]
@@ -60,20 +70,37 @@ impl Plot {
         interrupt::listen();
         let format = Format::from_path(&self.out)?;
         check_folder(&self.out)?;
-        let table = longest(&self.file, self.plot)?;
-        let chart = chart_of(&table, self.title.as_deref(), &self.panels)?;
+        let mut table = longest(&self.file, self.plot)?;
+        for other in &self.others {
+            join(&mut table, other)?;
+        }
+        let mut pictures = Vec::new();
+        if self.tracks.is_empty() || !self.panels.is_empty() {
+            pictures.push(chart_of(&table, self.title.as_deref(), &self.panels)?);
+        }
+        if !self.tracks.is_empty() {
+            pictures.push(tracks(&table, self.title.as_deref(), &self.tracks)?);
+        }
         let mechanism = self.mechanism.as_deref().map(|netlist| self.mechanism(netlist)).transpose()?;
-        write(&self.out, format, || Ok(table), || Ok(stack(&[vec![chart], mechanism.into_iter().collect()].concat())))
+        write(
+            &self.out,
+            format,
+            || Ok(table),
+            || {
+                pictures.extend(mechanism);
+                Ok(stack(&pictures))
+            },
+        )
     }
 
     fn mechanism(&self, netlist: &Path) -> Result<Picture, Failure> {
         let bundle = Bundle::read(netlist, &[]).map_err(|source| Failure::Read { path: netlist.to_owned(), source })?;
         let compiled = compile(&bundle, &CompileOptions { set: self.set.clone(), ..CompileOptions::default() })?;
-        let result = static_equilibrium(&compiled, &self.ports)?;
+        let (result, curves) = static_with_curves(&compiled, &self.ports)?;
         let volts: Vec<String> = self.ports.iter().map(|(name, v)| format!("{name} = {v} V")).collect();
         let name = netlist.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
         let title = if volts.is_empty() { name } else { format!("{name} at {}", volts.join(", ")) };
-        Ok(statics::picture(&compiled, &title, &result))
+        Ok(statics::picture(&compiled, &title, &result, &curves))
     }
 }
 
@@ -111,20 +138,92 @@ pub(crate) fn chart_of(table: &Table, title: Option<&str>, panels: &[String]) ->
     }))
 }
 
+/// Adds the signals of another raw file, which must run over the same axis.
+fn join(table: &mut Table, path: &Path) -> Result<(), Failure> {
+    let other = longest(path, None)?;
+    let axis = |t: &Table| t.columns().first().map(|c| c.samples.magnitudes()).unwrap_or_default();
+    let (own, its) = (axis(table), axis(&other));
+    let end = own.last().map_or(0.0, |x| x.abs());
+    let same = own.len() == its.len() && own.iter().zip(&its).all(|(a, b)| (a - b).abs() <= 1e-9 * end);
+    if !same {
+        let got = format!("{}: {} samples instead of {}, or other ones", path.display(), its.len(), own.len());
+        return Err(Failure::bad("--with", "a raw file over the same axis", got));
+    }
+    let stem = path.file_stem().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    for column in other.columns().iter().skip(1) {
+        table.push_real(&format!("{stem}:{}", column.name), &column.unit, column.samples.magnitudes())?;
+    }
+    Ok(())
+}
+
+/// Signals against each other.
+fn tracks(table: &Table, title: Option<&str>, tracks: &[String]) -> Result<Picture, Failure> {
+    let mut curves = Vec::new();
+    let mut names: Option<[[String; 2]; 2]> = None;
+    for track in tracks {
+        let (name, list) = track.split_once('=').unwrap_or(("", track));
+        let signals = value::names(&[list.to_owned()]);
+        let [x, y] = signals.as_slice() else {
+            return Err(Failure::bad("--track", "NAME=X,Y: two signals", format!("\"{track}\"")));
+        };
+        let find = |signal: &String| {
+            table.column(signal).ok_or_else(|| {
+                let known: Vec<&str> = table.columns().iter().map(|c| c.name.as_str()).collect();
+                Failure::bad("--track", format!("signals among {known:?}"), format!("\"{signal}\""))
+            })
+        };
+        let (x, y) = (find(x)?, find(y)?);
+        let points = x.samples.magnitudes().into_iter().zip(y.samples.magnitudes()).map(|(x, y)| [x, y]).collect();
+        names.get_or_insert_with(|| [x, y].map(|c| [c.name.clone(), unit(c)]));
+        let name = if name.is_empty() { format!("{}, {}", x.name, y.name) } else { name.trim().to_owned() };
+        curves.push(Curve { name, points, dashed: Vec::new() });
+    }
+    let [x, y] = names.unwrap_or_default();
+    let start = curves.first().and_then(|c| c.points.first().copied()).unwrap_or_default();
+    Ok(plane::draw(&Plane {
+        title: title.unwrap_or(&table.title).to_owned(),
+        x,
+        y,
+        curves,
+        marks: vec![Mark { at: start, sign: Sign::Dot, word: "start".to_owned(), below: false }],
+        equal: true,
+        note: String::new(),
+    }))
+}
+
 /// One panel for each unit, in order of appearance.
 fn by_unit(columns: &[Column]) -> Vec<Panel> {
     let mut panels: Vec<Panel> = Vec::new();
     for column in columns {
         let series = Series { name: column.name.clone(), values: column.samples.magnitudes() };
-        match panels.iter_mut().find(|p| p.unit == column.unit) {
+        let unit = unit(column);
+        match panels.iter_mut().find(|p| p.unit == unit) {
             Some(panel) => panel.series.push(series),
             None => {
-                let title = chart::word(&column.unit).to_owned();
-                panels.push(Panel { title, unit: column.unit.clone(), series: vec![series] });
+                let title = chart::word(&unit).to_owned();
+                panels.push(Panel { title, unit, series: vec![series] });
             }
         }
     }
     panels
+}
+
+/// The unit of a signal; where a raw file has none for it, that of the signal's name.
+fn unit(column: &Column) -> String {
+    if !column.unit.is_empty() {
+        return column.unit.clone();
+    }
+    let quantity = column.name.rsplit_once('.').map_or("", |(_, quantity)| quantity);
+    match quantity {
+        "x" | "y" | "gap" => "m",
+        "rz" => "rad",
+        "vx" | "vy" => "m/s",
+        "vrz" => "rad/s",
+        "T" => "K",
+        "q" => "C",
+        _ => "",
+    }
+    .to_owned()
 }
 
 /// `TITLE=SIGNALS` or `TITLE [UNIT]=SIGNALS`.
@@ -138,7 +237,7 @@ fn panel(text: &str, table: &Table) -> Result<Panel, Failure> {
             let known: Vec<&str> = table.columns().iter().map(|c| c.name.as_str()).collect();
             Failure::bad("--panel", format!("signals among {known:?}"), format!("\"{name}\""))
         })?;
-        unit.clone_from(&column.unit);
+        unit = self::unit(column);
         series.push(Series { name, values: column.samples.magnitudes() });
     }
     match title.trim().strip_suffix(']').and_then(|t| t.split_once('[')) {

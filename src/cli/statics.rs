@@ -3,8 +3,12 @@
 use super::failure::Failure;
 use super::model::{Context, ModelArgs, Named};
 use super::output::OutputArgs;
+use super::solver::ModelChoice;
 use super::{progress, report, value};
-use bimorph::analysis::statics::{NodeMotion, StaticResult, static_equilibrium};
+use bimorph::analysis::BeamMotions;
+use bimorph::analysis::backbending::backbend;
+use bimorph::analysis::frame::{frame, frame_statics};
+use bimorph::analysis::statics::{NodeMotion, StaticResult, static_with_curves};
 use bimorph::compile::Compiled;
 use bimorph::results::plot::axis::quantity;
 use bimorph::results::plot::mechanism::{self, Drawing, Scale};
@@ -18,11 +22,12 @@ use std::fmt::Write;
 /// Static equilibrium: displacement of every node, temperatures, port currents and charges.
 ///
 /// The equilibrium is the one reached from rest by raising all loads and voltages together. JSON: "nodes" holds x [m],
-/// y [m] and rz [rad] from the drawn place; "temperatures_k", "currents_a" and "charges_c" by name.
+/// y [m] and rz [rad] from the drawn place; "temperatures_k", "currents_a", "charges_c" and "permanent_strains" by name.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  bimorph static bank.net --port heat=2.2\n  \
                         bimorph static stage.net --set F=100u --json\n  \
-                        bimorph static bank.net --port heat=2.2 --out bank.svg     the mechanism, at rest and deflected")]
+                        bimorph static bank.net --port heat=2.2 --out bank.svg     the mechanism, at rest and deflected\n  \
+                        bimorph static bank.net --backbend heat=2.6          at rest after it was heated too far once")]
 pub(crate) struct Static {
     #[command(flatten)]
     model: ModelArgs,
@@ -30,6 +35,14 @@ pub(crate) struct Static {
     /// Hold a port at a voltage [V]; others are at 0 V. Repeatable
     #[arg(long = "port", short = 'p', value_name = "NAME=VOLTS", value_parser = value::volts)]
     ports: Vec<(String, f64)>,
+
+    /// First raise a port to a voltage [V] once, so far that hot arms yield and stay shorter. Repeatable
+    #[arg(long, value_name = "NAME=VOLTS", value_parser = value::volts)]
+    backbend: Vec<(String, f64)>,
+
+    /// What computes it: the product's own model, or the baseline to compare with
+    #[arg(long, value_enum, default_value_t)]
+    solver: ModelChoice,
 
     #[command(flatten)]
     output: OutputArgs,
@@ -41,9 +54,11 @@ struct Document<'a> {
     temperatures_k: Named<'a, f64>,
     currents_a: Named<'a, f64>,
     charges_c: Named<'a, f64>,
+    permanent_strains: Named<'a, f64>,
     pulled_in: bool,
     free_motions: &'a [String],
     unknowns: usize,
+    solver: ModelChoice,
     iterations: usize,
     port_voltages_v: Named<'a, f64>,
     #[serde(flatten)]
@@ -53,19 +68,32 @@ struct Document<'a> {
 impl Static {
     pub(crate) fn run(&self) -> Result<(), Failure> {
         self.output.check()?;
-        let compiled = self.model.compile()?;
+        let mut compiled = self.model.compile()?;
+        let mut permanent_strains = Vec::new();
+        if !self.backbend.is_empty() {
+            if self.solver == ModelChoice::Frame {
+                return Err(Failure::bad("--backbend", "--solver recursion", "--solver frame, which does not yield"));
+            }
+            let bent = backbend(&compiled, &self.backbend)?;
+            (compiled, permanent_strains) = (bent.compiled, bent.strains);
+        }
         let busy = progress::spinner("static equilibrium");
-        let result = static_equilibrium(&compiled, &self.ports);
+        let result = match self.solver {
+            ModelChoice::Recursion => static_with_curves(&compiled, &self.ports),
+            ModelChoice::Frame => frame(&compiled).and_then(|frame| frame_statics(&compiled, &frame, &self.ports)),
+        };
         busy.finish_and_clear();
-        let result = result?;
+        let (result, curves) = result?;
         let document = Document {
             nodes: Named(&result.nodes),
             temperatures_k: Named(&result.temperatures_k),
             currents_a: Named(&result.currents_a),
             charges_c: Named(&result.charges_c),
+            permanent_strains: Named(&permanent_strains),
             pulled_in: result.pulled_in,
             free_motions: &result.free_motions,
             unknowns: result.unknowns,
+            solver: self.solver,
             iterations: result.iterations,
             port_voltages_v: Named(&self.ports),
             context: self.model.context(&compiled),
@@ -73,9 +101,9 @@ impl Static {
         let title = self.model.title();
         self.output.finish(
             || table(&title, &result),
-            || Ok(picture(&compiled, &title, &result)),
+            || Ok(picture(&compiled, &title, &result, &curves)),
             &document,
-            &text(&compiled, &result),
+            &text(&compiled, &result, &permanent_strains),
         )
     }
 }
@@ -98,11 +126,12 @@ fn table(title: &str, result: &StaticResult) -> Result<Table, Failure> {
 }
 
 /// The mechanism at rest and in this equilibrium.
-pub(crate) fn picture(compiled: &Compiled, title: &str, result: &StaticResult) -> Picture {
+pub(crate) fn picture(compiled: &Compiled, title: &str, result: &StaticResult, curves: &BeamMotions) -> Picture {
     mechanism::draw(&Drawing {
         structure: &compiled.structure,
         title,
         motion: &motion(compiled, &result.nodes),
+        curves: &beams(curves),
         temperatures: &result.temperatures_k,
         scale: Scale::Visible,
     })
@@ -119,7 +148,12 @@ pub(crate) fn motion(compiled: &Compiled, nodes: &[(String, NodeMotion)]) -> Vec
     motion
 }
 
-fn text(compiled: &Compiled, result: &StaticResult) -> String {
+/// Displacements along beams as pictures take them.
+pub(crate) fn beams(curves: &BeamMotions) -> Vec<Vec<Motion>> {
+    curves.iter().map(|curve| curve.iter().map(|m| [m.x, m.y, m.rz]).collect()).collect()
+}
+
+fn text(compiled: &Compiled, result: &StaticResult, strains: &[(String, f64)]) -> String {
     let rows: Vec<Vec<String>> = result
         .nodes
         .iter()
@@ -135,6 +169,10 @@ fn text(compiled: &Compiled, result: &StaticResult) -> String {
             let rows: Vec<Vec<String>> = list.iter().map(|(n, v)| vec![n.clone(), quantity(*v, unit)]).collect();
             let _ = write!(text, "\n{}", report::columns(&head, &rows));
         }
+    }
+    if !strains.is_empty() {
+        let rows: Vec<Vec<String>> = strains.iter().map(|(n, e)| vec![n.clone(), format!("{e:.3e}")]).collect();
+        let _ = write!(text, "\n{}", report::columns(&["beam", "permanent strain"], &rows));
     }
     if result.pulled_in {
         text.push_str("\npulled in on the way to these voltages\n");

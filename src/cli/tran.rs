@@ -3,26 +3,49 @@
 use super::failure::Failure;
 use super::model::{Context, ModelArgs, Named};
 use super::output::OutputArgs;
-use super::{progress, report, value};
-use bimorph::analysis::transient::{Counters, TransientOptions, TransientResult, transient};
-use bimorph::compile::{Compiled, compile};
-use bimorph::netlist::Setting;
+use super::solver::SolverChoice;
+use super::{draw_motion, progress, report, value};
+use bimorph::analysis::chart::released;
+use bimorph::analysis::formulation::Formulation;
+use bimorph::analysis::frame::{frame, frame_transient};
+use bimorph::analysis::integrator::Integrator;
+use bimorph::analysis::joint_transient::{JointReport, joint_transient};
+use bimorph::analysis::transient::{Counters, Event, TransientOptions, TransientResult, transient};
+use bimorph::compile::Compiled;
 use bimorph::results::plot::axis::quantity;
 use bimorph::results::plot::chart::{self, Chart, Panel, Series};
 use bimorph::results::plot::svg::Picture;
 use bimorph::results::table::Table;
+use bimorph::solve::event::Direction;
 use clap::Args;
 use serde::Serialize;
+use std::path::PathBuf;
 
 /// Motion in time, from rest or from a released equilibrium.
 ///
 /// Signals: NODE.x, NODE.y [m], NODE.rz [rad], NODE.vx, NODE.vy [m/s], NODE.vrz [rad/s], BEAM.T [K], GAP.q [C].
-/// JSON: "t" [s]; "signals": samples by name in SI; "units" by name; "counters": the work done.
+/// JSON: "t" [s]; "signals": samples by name in SI; "units" by name; "method"; "counters": the work done; "events":
+/// crossings of --event levels and contacts of gaps, each with its time "t" [s] and "direction" up or down; "formulation",
+/// and for rcr "joint_coordinates": n, m, evaluations near singular configurations, largest gap of a loop [m].
 #[derive(Debug, Args)]
-#[command(after_help = "Examples:\n  \
+#[command(after_help = "Methods, with their orders; steps follow --tol, or are equal with --step:\n  \
+    rodas4 (4)             the default: one factorization a step; fast motions die out\n  \
+    radau5 (5)             the most accurate; one real and one complex factorization a step; fast motions die out\n  \
+    tr-bdf2 (2)            cheap and robust; fast motions die out\n  \
+    generalized-alpha (2)  fast motions damped as chosen: --rho 0 (at once) to 1 (not at all)\n  \
+    avf (2)                keeps the energy of an undamped motion, whatever the step\n  \
+    midpoint (2)           keeps the energy on average\n  \
+    newmark (2)            average acceleration; may gain energy when steps are long\n  \
+    rk45 (5)               explicit: tiny steps, and needs inertia in every direction\n\n\
+Examples:\n  \
     bimorph tran bank.net --stop 300u --port heat=2.2 --signals yoke.y,b1.hot.T --out heat.svg\n  \
     bimorph tran stage.net --set F=100u --release F --stop 30u --undamped --signals c.x --json\n      \
-    starts from the equilibrium under F = 100 µN and lets go at t = 0")]
+    starts from the equilibrium under F = 100 µN and lets go at t = 0\n  \
+    bimorph tran stage.net --set F=100u --release F --stop 1m --undamped --method avf --step 0.5u --event c.x=0\n      \
+    keeps the energy over many swings and tells each passage through the middle\n  \
+    bimorph tran stage.net --set F=100u --release F --stop 30u --draw motion.html\n  \
+    bimorph tran stage.net --set F=100u --release F --stop 30u --undamped --formulation rcr --signals c.x --json\n      \
+    the model of the paper: joints that only turn, in joint coordinates; \"joint_coordinates\" tells n, m and the gaps")]
 pub(crate) struct Tran {
     #[command(flatten)]
     model: ModelArgs,
@@ -47,6 +70,35 @@ pub(crate) struct Tran {
     #[arg(long = "port", short = 'p', value_name = "NAME=VOLTS", value_parser = value::volts)]
     ports: Vec<(String, f64)>,
 
+    /// How bodies become equations: compliant (springs, implicit steps), rcr (the recursion in joint coordinates, beams' joints
+    /// only turn) or rcr-elastic (the same, every elastic direction a coordinate)
+    #[arg(long, default_value = "compliant", value_name = "NAME", value_parser = clap::builder::PossibleValuesParser::new(Formulation::NAMES))]
+    formulation: String,
+
+    /// What integrates [default: rodas4; in joint coordinates rk45]
+    #[arg(long, value_name = "NAME", value_parser = clap::builder::PossibleValuesParser::new(Integrator::NAMES))]
+    method: Option<String>,
+
+    /// Equal steps of this length [s], such as 0.5u [default: steps follow --tol]
+    #[arg(long, value_name = "SECONDS", value_parser = value::number, allow_negative_numbers = true)]
+    step: Option<f64>,
+
+    /// Of generalized-alpha: factor by which an infinitely fast motion shrinks in a step, 0 to 1 [default: 0.8]
+    #[arg(long, value_parser = value::number, allow_negative_numbers = true)]
+    rho: Option<f64>,
+
+    /// Tell when a signal crosses a level, in the signal's SI unit. Repeatable
+    #[arg(long = "event", value_name = "NAME=LEVEL", value_parser = value::volts)]
+    events: Vec<(String, f64)>,
+
+    /// Draw the moving mechanism: a page with a slider (.html), or its last state (.svg, .png)
+    #[arg(long, value_name = "FILE")]
+    draw: Option<PathBuf>,
+
+    /// What solves the equations; all but the recursion are baselines to compare with
+    #[arg(long, value_enum, default_value_t)]
+    solver: SolverChoice,
+
     #[command(flatten)]
     output: OutputArgs,
 }
@@ -56,8 +108,13 @@ struct Document<'a> {
     t: &'a [f64],
     signals: Named<'a, Vec<f64>>,
     units: Named<'a, String>,
+    method: &'a str,
     counters: Counters,
+    events: &'a [Event],
+    formulation: &'a str,
+    joint_coordinates: Option<JointReport>,
     unknowns: usize,
+    solver: SolverChoice,
     release: Option<&'a str>,
     port_voltages_v: Named<'a, f64>,
     #[serde(flatten)]
@@ -67,27 +124,58 @@ struct Document<'a> {
 impl Tran {
     pub(crate) fn run(&self) -> Result<(), Failure> {
         self.output.check()?;
+        if let Some(path) = &self.draw {
+            draw_motion::check(path)?;
+            if self.solver == SolverChoice::Frame {
+                return Err(Failure::bad("--draw", "--solver recursion or another of its equations", "--solver frame"));
+            }
+        }
         if self.stop <= 0.0 {
             return Err(Failure::bad("--stop", "a time above 0 s", self.stop.to_string()));
         }
         if !(2..=10_000_000).contains(&self.points) {
             return Err(Failure::bad("--points", "2 to 10000000 output times", self.points.to_string()));
         }
+        let formulation = self.formulation()?;
+        let method = self.integrator(formulation)?;
         let initial = self.model.compile()?;
-        let released = self.release.as_deref().map(|name| self.without(&initial, name)).transpose()?;
+        let released = match &self.release {
+            Some(name) => Some(released(&self.model.bundle()?, &initial, name)?),
+            None => None,
+        };
         let compiled = released.as_ref().unwrap_or(&initial);
+        let mut signals = if self.signals.is_empty() { free_nodes(compiled) } else { value::names(&self.signals) };
+        let wanted = signals.len();
+        if self.draw.is_some() {
+            signals.extend(draw_motion::signals(compiled));
+        }
         let options = TransientOptions {
             stop: self.stop,
-            signals: if self.signals.is_empty() { free_nodes(compiled) } else { value::names(&self.signals) },
+            signals,
             points: self.points,
             tol: compiled.options.tol,
             voltages: self.ports.clone(),
             release: released.as_ref().map(|_| &initial),
+            method,
+            step: self.step,
+            events: self.events.clone(),
+            solver: self.solver.linear(),
         };
         let bar = progress::bar("transient");
-        let result = transient(compiled, &options, &mut |_, _| (), &mut progress::watch(&bar));
+        let watch = &mut progress::watch(&bar);
+        let result = match (self.solver, formulation) {
+            (SolverChoice::Frame, _) => {
+                frame(compiled).and_then(|frame| frame_transient(compiled, &frame, &options, watch)).map(|r| (r, None))
+            }
+            (_, Formulation::Compliant) => transient(compiled, &options, &mut |_, _| (), watch).map(|r| (r, None)),
+            _ => joint_transient(compiled, formulation, &options, &mut |_, _| (), watch).map(|(r, j)| (r, Some(j))),
+        };
         bar.finish_and_clear();
-        let result = result?;
+        let (mut result, joints) = result?;
+        let drawn = result.signals.split_off(wanted);
+        if let Some(path) = &self.draw {
+            draw_motion::write(path, compiled, &self.model.title(), &result.t, &drawn)?;
+        }
 
         let (mut signals, mut units) = (Vec::new(), Vec::new());
         for (name, unit, values) in &result.signals {
@@ -98,8 +186,13 @@ impl Tran {
             t: &result.t,
             signals: Named(&signals),
             units: Named(&units),
+            method: method.name(),
             counters: result.counters,
+            events: &result.events,
+            formulation: formulation.name(),
+            joint_coordinates: joints.clone(),
             unknowns: result.unknowns,
+            solver: self.solver,
             release: self.release.as_deref(),
             port_voltages_v: Named(&self.ports),
             context: self.model.context(&initial),
@@ -109,25 +202,39 @@ impl Tran {
             || table(&title, &result),
             || Ok(picture(&title, &result)),
             &document,
-            &text(compiled, &result),
+            &text(compiled, &result, joints.as_ref()),
         )
     }
 
-    /// The same netlist with one parameter at 0.
-    fn without(&self, initial: &Compiled, name: &str) -> Result<Compiled, Failure> {
-        match initial.parameters.iter().find(|(parameter, _)| parameter == name) {
-            Some((_, Setting::Number(_))) => {}
-            Some(_) => return Err(Failure::bad("--release", "a numeric parameter", format!("\"{name}\", a text"))),
-            None => {
-                let known: Vec<&str> = initial.parameters.iter().map(|(p, _)| p.as_str()).collect();
-                let got = format!("\"{name}\"; the netlist has {known:?}");
-                return Err(Failure::bad("--release", "a parameter of the netlist", got));
-            }
+    fn formulation(&self) -> Result<Formulation, Failure> {
+        Formulation::named(&self.formulation)
+            .ok_or_else(|| Failure::bad("--formulation", "the name of a formulation", self.formulation.clone()))
+    }
+
+    fn integrator(&self, formulation: Formulation) -> Result<Integrator, Failure> {
+        let implicit = formulation == Formulation::Compliant;
+        let name = self.method.as_deref().unwrap_or(if implicit { "rodas4" } else { "rk45" });
+        let unknown = || Failure::bad("--method", "the name of an integrator", name.to_owned());
+        let method = Integrator::named(name).ok_or_else(unknown)?;
+        if !implicit && (method != Integrator::Rk45 || self.step.is_some()) {
+            let got = if self.step.is_some() { "--step".to_owned() } else { format!("--method {name}") };
+            return Err(Failure::bad("--formulation", "rk45 with steps by --tol in joint coordinates", got));
         }
-        let mut options = initial.options.clone();
-        options.set.retain(|(parameter, _)| parameter != name);
-        options.set.push((name.to_owned(), Setting::Number(0.0)));
-        Ok(compile(&self.model.bundle()?, &options)?)
+        if !implicit && self.solver != SolverChoice::Recursion {
+            return Err(Failure::bad(
+                "--solver",
+                "recursion in joint coordinates",
+                format!("{:?}", self.solver).to_lowercase(),
+            ));
+        }
+        match (method, self.rho) {
+            (Integrator::GeneralizedAlpha { .. }, Some(rho)) if (0.0..=1.0).contains(&rho) => {
+                Ok(Integrator::GeneralizedAlpha { rho })
+            }
+            (Integrator::GeneralizedAlpha { .. }, Some(rho)) => Err(Failure::bad("--rho", "0 to 1", rho.to_string())),
+            (_, Some(_)) => Err(Failure::bad("--rho", "--method generalized-alpha beside it", name.to_owned())),
+            (method, None) => Ok(method),
+        }
     }
 }
 
@@ -169,7 +276,7 @@ fn picture(title: &str, result: &TransientResult) -> Picture {
     })
 }
 
-fn text(compiled: &Compiled, result: &TransientResult) -> String {
+fn text(compiled: &Compiled, result: &TransientResult, joints: Option<&JointReport>) -> String {
     let rows: Vec<Vec<String>> = result
         .signals
         .iter()
@@ -184,14 +291,28 @@ fn text(compiled: &Compiled, result: &TransientResult) -> String {
         })
         .collect();
     let c = result.counters;
+    let events: String = result
+        .events
+        .iter()
+        .map(|e| {
+            let what = if e.contact { " (contact)" } else { "" };
+            let way = if e.direction == Direction::Up { "up" } else { "down" };
+            format!("{} crosses {:e} {way} at {}{what}\n", e.signal, e.level, quantity(e.t, "s"))
+        })
+        .collect();
+    let work = match joints {
+        None => format!("{} factorizations, {} solves", c.factorizations, c.solves),
+        Some(j) => format!(
+            "{} accelerations ({} near singular), n = {}, m = {}, largest gap of a loop {:.1e} m",
+            j.accelerations, j.singular_evaluations, j.coordinates, j.constraints, j.largest_gap_m
+        ),
+    };
     format!(
-        "{}\n{} samples, {} steps ({} rejected), {} factorizations, {} solves; {}",
+        "{}\n{events}{} samples, {} steps ({} rejected), {work}; {}",
         report::columns(&["signal", "lowest", "highest", "at the end"], &rows),
         result.t.len(),
         c.steps,
         c.rejected,
-        c.factorizations,
-        c.solves,
         report::footing(compiled, result.unknowns)
     )
 }

@@ -18,7 +18,7 @@ use crate::multibody::planar::Pose;
 use crate::solve::adaptive::Adaptive;
 use crate::solve::equilibrium::{Equilibrium, EquilibriumOptions};
 use crate::solve::harmonic::{ComplexPose, Harmonic};
-use crate::solve::rodas4::Motion;
+use crate::solve::rodas4::{Motion, Rodas4};
 use std::sync::Arc;
 
 /// A [`Device`] over a compiled model.
@@ -37,10 +37,9 @@ pub(super) struct Session {
     pub(super) states: States,
     pub(super) first_step: f64,
     pub(super) equilibrium: Equilibrium,
+    /// Carries ∂motion/∂(final voltage), one for each opened port.
     pub(super) stepper: Adaptive,
     pub(super) motion: Motion,
-    /// ∂motion/∂(final voltage), one for each opened port.
-    pub(super) sensitivity: Vec<Motion>,
     pub(super) rise: Vec<f64>,
     pub(super) rise_slope: Vec<f64>,
     pub(super) sources: Vec<f64>,
@@ -146,8 +145,7 @@ impl Session {
         let n = system.bodies();
         let heaters = electrics.heating.heaters.len();
         let session = Self {
-            sensitivity: vec![Motion::zeros(n); ports.len()],
-            stepper: Adaptive::new(system, ports.len()),
+            stepper: Adaptive::new(system, Rodas4::new(system, &ports)),
             ports,
             signals,
             states: States::default(),

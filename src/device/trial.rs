@@ -8,7 +8,7 @@ use crate::analysis::signal::View;
 use crate::compile::Compiled;
 use crate::gaps::Ramp;
 use crate::multibody::planar::Pose;
-use crate::solve::adaptive::Advance;
+use crate::solve::adaptive::{Advance, Control};
 use crate::solve::path::SourcePath;
 
 /// Share of the compilation's tolerance that one internal step may use.
@@ -49,7 +49,7 @@ impl Session {
             self.unit.fill(0.0);
             self.unit[port] = 1.0;
             electrics.steady_slope(&self.sources, &self.unit, &mut self.change);
-            let s = &mut self.sensitivity[p];
+            let s = &mut self.stepper.method.sensitivity[p];
             system.drive_force(&self.motion.q, &self.drive, &self.change, &mut s.q);
             for x in &mut s.q {
                 *x = -*x;
@@ -84,7 +84,7 @@ impl Session {
                 vec![0.0; self.sources.len()]
             }
         };
-        for s in &mut self.sensitivity {
+        for s in &mut self.stepper.method.sensitivity {
             s.q.fill(Pose::zeros());
             s.v.fill(Pose::zeros());
         }
@@ -95,10 +95,8 @@ impl Session {
             system,
             &ramp,
             &mut self.motion,
-            &self.ports,
-            &mut self.sensitivity,
             &mut h,
-            STEP_SHARE * compiled.options.tol,
+            Control::Tolerance(STEP_SHARE * compiled.options.tol),
             MAX_INTERNAL_STEPS,
             &mut |_, _, _, _| true,
         );
@@ -155,7 +153,7 @@ impl Session {
         reply.doutputs_dv.clear();
         reply.doutputs_dv.resize(self.signals.len() * ports, 0.0);
         for (p, &port) in self.ports.iter().enumerate() {
-            let s = &self.sensitivity[p];
+            let s = &self.stepper.method.sensitivity[p];
             let gap_row: Vec<f64> = (0..gaps).map(|g| electrics.gap_rows[(g, port)]).collect();
             for k in 0..self.rise_slope.len() {
                 self.rise_slope[k] = match from {

@@ -9,9 +9,10 @@
 
 use super::rigid::{Assembly, Lump};
 use crate::gaps::Point;
-use crate::multibody::{BodyId, Joint};
+use crate::multibody::{BodyId, BodyName, Joint};
 use crate::structure::Beam;
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
+use std::sync::Arc;
 
 /// Lays a beam: adds its inner bodies, masses and joints. Returns the points along it, ends included.
 pub fn lay(
@@ -25,9 +26,10 @@ pub fn lay(
     let (start, end) = (rigid.position(beam.a.0), rigid.position(beam.b.0));
     let n = segments as f64;
     let mut points = vec![rigid.point(beam.a.0)];
+    let name = Arc::from(beam.name.as_str());
     for k in 1..segments {
         let position = start + (end - start) * (k as f64 / n);
-        points.push(rigid.add_segment(format!("{}[{k}]", beam.name), position));
+        points.push(rigid.add_segment(BodyName::segment(&name, k), position));
     }
     points.push(rigid.point(beam.b.0));
     add_masses(beam, segments, undamped, &points, rigid);
@@ -54,6 +56,7 @@ pub fn lay(
             second,
             expansion: heater.map(|group| (group, h)),
             rest: h * strain,
+            locked: [false; 3],
         });
     }
     points

@@ -11,10 +11,12 @@
 //! | [`order`] | model order: how many segments a beam gets |
 //! | [`rigid`] | nodes → rigid groups, supports → ground and held directions |
 //! | [`beam`] | the E4 segment: joints, second-order axial strain, masses |
+//! | [`frame`] | the same drawing as a linear frame of cubic beam elements: a baseline |
 //! | [`gap`] | combs, plates and facing beams → gap functions |
 //! | [`ports`] | resistors, heaters, sources and ports → network and quadratic forms of temperature |
 
 pub mod beam;
+pub mod frame;
 pub mod gap;
 pub mod order;
 pub mod ports;
@@ -177,6 +179,7 @@ fn lay_spring(
             second: Matrix2::zeros(),
             expansion: None,
             rest: 0.0,
+            locked: [false; 3],
         });
     }
     if !undamped && spring.damping.iter().any(|&c| c != 0.0) {

@@ -5,7 +5,7 @@
 
 use crate::gaps::Point;
 use crate::multibody::planar::JointFrame;
-use crate::multibody::{Body, BodyId, Joint};
+use crate::multibody::{Body, BodyId, BodyName, Drag, Joint};
 use crate::structure::{Mass, Structure};
 use nalgebra::{Matrix2, Matrix3, Vector2};
 
@@ -36,7 +36,7 @@ impl Lump {
 /// A body in the making.
 #[derive(Debug, Clone)]
 pub struct Rough {
-    name: String,
+    name: BodyName,
     reference: Vector2<f64>,
     mass: Lump,
     drag: Lump,
@@ -80,7 +80,7 @@ impl Assembly {
                 continue;
             }
             group[node] = if first == node || group[first] == BodyId::Ground {
-                bodies.push(Rough::new(structure.nodes[node].name.clone(), position[node]));
+                bodies.push(Rough::new((&structure.nodes[node].name).into(), position[node]));
                 BodyId::Free(bodies.len() - 1)
             } else {
                 group[first]
@@ -115,7 +115,7 @@ impl Assembly {
     }
 
     /// A new body for an inner node of a beam.
-    pub fn add_segment(&mut self, name: String, position: Vector2<f64>) -> Point {
+    pub fn add_segment(&mut self, name: BodyName, position: Vector2<f64>) -> Point {
         self.bodies.push(Rough::new(name, position));
         Point { body: BodyId::Free(self.bodies.len() - 1), arm: Vector2::zeros() }
     }
@@ -189,6 +189,7 @@ impl Assembly {
                 second: Matrix2::zeros(),
                 expansion: None,
                 rest: 0.0,
+                locked: [support.held[0], support.held[1], false],
             });
         }
     }
@@ -217,7 +218,7 @@ impl Assembly {
 }
 
 impl Rough {
-    fn new(name: String, reference: Vector2<f64>) -> Self {
+    fn new(name: BodyName, reference: Vector2<f64>) -> Self {
         let (mass, drag) = (Lump::default(), Lump::default());
         Self { name, reference, mass, drag, held: Vec::new(), fixed_angle: false }
     }
@@ -237,14 +238,13 @@ impl Rough {
         let center = self.mass.center();
         let mut drag = Lump::default();
         drag.add(&self.drag, -center, 1.0);
-        let (c, s) = (drag.amount, drag.first);
         Body {
             name: self.name.clone(),
             center: self.reference + center,
             mass: self.mass.amount,
             inertia: (self.mass.second - self.mass.amount * center.norm_squared()).max(0.0),
-            drag: Matrix3::new(c, 0.0, -s.y, 0.0, c, s.x, -s.y, s.x, drag.second),
-            free: self.projector(),
+            drag: Drag { amount: drag.amount, first: drag.first, second: drag.second },
+            free: self.projector().map(Box::new),
         }
     }
 

@@ -29,6 +29,19 @@ pub fn repulsion(d: f64, height: f64) -> (f64, f64) {
     (force * scale, slope * scale)
 }
 
+/// Energy stored in the repulsion at distance `d` [J]: the integral of [`repulsion`] from there to its beginning.
+pub fn energy(d: f64, height: f64) -> f64 {
+    if d >= RANGE {
+        return 0.0;
+    }
+    let at = d.max(FROZEN);
+    let pole = |d: f64| 0.5 * STRENGTH / ((d - POLE) * (d - POLE));
+    let curved = (pole(at) - pole(RANGE) - OFFSET * (RANGE - at)) * height / HEIGHT;
+    let below = (FROZEN - d).max(0.0);
+    let (force, slope) = repulsion(FROZEN, height);
+    curved + force * below - 0.5 * slope * below * below
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -42,5 +55,15 @@ mod tests {
         let (f0, s0) = repulsion(FROZEN, 2e-6);
         let (f1, s1) = repulsion(FROZEN - 1e-9, 2e-6);
         assert!((f1 - (f0 - s0 * 1e-9)).abs() < 1e-9 * f0 && s0 == s1);
+    }
+    /// The energy's slope is the force, on both branches: central differences of 1e-12 m.
+    #[test]
+    fn energy_is_the_integral_of_the_force() {
+        for d in [0.09e-6, 0.06e-6, 0.052e-6] {
+            let slope = (energy(d - 1e-12, 3e-6) - energy(d + 1e-12, 3e-6)) / 2e-12;
+            let force = repulsion(d, 3e-6).0;
+            assert!((slope / force - 1.0).abs() < 1e-5, "{d}: {slope} {force}");
+        }
+        assert_eq!(energy(RANGE, 2e-6), 0.0);
     }
 }

@@ -74,11 +74,17 @@ impl System {
     pub fn residual(&self, q: &[Pose], drive: &Drive, r: &mut [Pose]) {
         r.fill(Pose::zeros());
         forces::add_elastic(&self.model, q, &drive.rest(), r);
+        self.add_body_forces(q, drive, r);
+        self.model.project(r);
+    }
+
+    /// `r +=` the share of gaps, contacts and dead loads in the residual: minus the wrench on each body. A formulation that
+    /// has its own way with joints needs only this of a system.
+    pub fn add_body_forces(&self, q: &[Pose], drive: &Drive, r: &mut [Pose]) {
         for (gap, &volts) in self.gaps.iter().zip(&drive.volts) {
             self.add_gap_force(gap, q, -0.5 * volts * volts, true, r);
         }
         self.add_loads(q, -drive.load, r);
-        self.model.project(r);
     }
 
     /// The tangent ∂r/∂q and the residual r. The tangent's held directions are left to the caller, who may add inertia.
@@ -169,10 +175,12 @@ impl System {
 
     /// True when some gap is so far closed that its contact force acts.
     pub fn in_contact(&self, q: &[Pose]) -> bool {
-        (0..self.gaps.len()).any(|g| {
-            let touches = !matches!(&self.gaps[g], Gap::Single { contact: None, .. });
-            touches && self.distance(g, q) < contact::RANGE
-        })
+        (0..self.gaps.len()).any(|g| self.touches(g) && self.distance(g, q) < contact::RANGE)
+    }
+
+    /// True when a gap has a contact force.
+    pub fn touches(&self, gap: usize) -> bool {
+        !matches!(&self.gaps[gap], Gap::Single { contact: None, .. })
     }
 
     fn add_loads(&self, q: &[Pose], scale: f64, r: &mut [Pose]) {

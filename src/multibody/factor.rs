@@ -99,25 +99,27 @@ impl<T: Scalar, const N: usize> BlockMatrix<T, N> {
             *scale = SVector::from_fn(|i, _| block[(i, i)].modulus());
         }
         for j in 0..pattern.bodies() {
-            let inverse = invert(&self.diagonal[j], &self.scale[j], &mut inertia, &mut |direction| {
+            let own = Decomposed::new(&self.diagonal[j], &self.scale[j], &mut inertia, &mut |direction| {
                 vanished(ZeroPivot { body: j, direction })
             })?;
-            self.diagonal[j] = inverse;
+            self.diagonal[j] = own.inverse();
             let column = pattern.column(j);
             let mut target = pattern.targets(j).iter();
-            for k in column.clone() {
-                let row = pattern.row(k);
+            for (k, &row) in column.clone().zip(pattern.rows(j)) {
                 let coupling = self.below[k];
-                let scaled = coupling * inverse;
                 // rows before k already hold L; their couplings are L·D, so update with L·(A)ᵀ from this side
-                for i in column.start..k {
-                    if let Some(&at) = target.next() {
-                        let update = coupling * self.below[i].transpose();
-                        self.below[at] -= update;
+                for (i, &at) in (column.start..k).zip(target.by_ref()) {
+                    let scaled = self.below[i];
+                    let block = &mut self.below[at as usize];
+                    for c in 0..N {
+                        for s in 0..N {
+                            for r in 0..N {
+                                block[(r, s)] -= coupling[(r, c)] * scaled[(s, c)];
+                            }
+                        }
                     }
                 }
-                self.diagonal[row] -= scaled * coupling.transpose();
-                self.below[k] = scaled;
+                self.below[k] = own.eliminate(coupling, &mut self.diagonal[row as usize]);
             }
         }
         Ok(inertia)
@@ -125,19 +127,32 @@ impl<T: Scalar, const N: usize> BlockMatrix<T, N> {
 
     /// Solves in place with the factors: `b` becomes A⁻¹·b. Body vectors in elimination order.
     pub fn solve(&self, pattern: &Pattern, b: &mut [SVector<T, N>]) {
-        for j in 0..pattern.bodies() {
-            let pivot = b[j];
-            for k in pattern.column(j) {
-                b[pattern.row(k)] -= self.below[k] * pivot;
+        // along a beam the row is the next body: its value is handed on without a trip through memory
+        let count = pattern.bodies();
+        let mut next = b.first().copied().unwrap_or_else(SVector::zeros);
+        for j in 0..count {
+            let pivot = next;
+            next = b.get(j + 1).copied().unwrap_or_else(SVector::zeros);
+            for (block, &row) in self.below[pattern.column(j)].iter().zip(pattern.rows(j)) {
+                let row = row as usize;
+                if row == j + 1 {
+                    subtract(block, &pivot, &mut next);
+                } else {
+                    subtract(block, &pivot, &mut b[row]);
+                }
             }
             b[j] = self.diagonal[j] * pivot;
         }
-        for j in (0..pattern.bodies()).rev() {
+        let mut last = next;
+        for j in (0..count).rev() {
             let mut sum = b[j];
-            for k in pattern.column(j) {
-                sum -= self.below[k].tr_mul(&b[pattern.row(k)]);
+            for (block, &row) in self.below[pattern.column(j)].iter().zip(pattern.rows(j)) {
+                let row = row as usize;
+                let x = if row == j + 1 { last } else { b[row] };
+                subtract(&block.transpose(), &x, &mut sum);
             }
             b[j] = sum;
+            last = sum;
         }
     }
 
@@ -155,61 +170,124 @@ impl<T: Scalar, const N: usize> BlockMatrix<T, N> {
     }
 }
 
-/// Inverse of a symmetric block by L·D·Lᵀ; adds the pivots' signs to `inertia`.
-///
-/// Only the lower triangle is read. `vanished` decides about a direction whose pivot vanished: an error, or to hold it.
-fn invert<T: Scalar, const N: usize>(
-    a: &SMatrix<T, N, N>,
-    scale: &SVector<f64, N>,
-    inertia: &mut Inertia,
-    vanished: &mut dyn FnMut(usize) -> Result<(), ZeroPivot>,
-) -> Result<SMatrix<T, N, N>, ZeroPivot> {
-    let mut l = SMatrix::<T, N, N>::identity();
-    let mut pivot = SVector::<T, N>::zeros();
-    for j in 0..N {
-        let mut d = a[(j, j)];
-        for k in 0..j {
-            d -= l[(j, k)] * l[(j, k)] * pivot[k];
-        }
-        if d.modulus() <= LOST * scale[j] || !d.is_finite() {
-            vanished(j)?;
-            d = T::from_real(scale[j]);
-        }
-        if d.real() < 0.0 {
-            inertia.negative += 1;
-        }
-        pivot[j] = d;
-        for i in j + 1..N {
-            let mut s = a[(i, j)];
-            for k in 0..j {
-                s -= l[(i, k)] * l[(j, k)] * pivot[k];
-            }
-            l[(i, j)] = s / d;
-        }
-    }
-    // L⁻¹ by forward substitution, then (L⁻¹)ᵀ D⁻¹ L⁻¹
-    let mut li = SMatrix::<T, N, N>::identity();
-    for j in 0..N {
-        for i in j + 1..N {
-            let mut s = T::zero();
-            for k in j..i {
-                s -= l[(i, k)] * li[(k, j)];
-            }
-            li[(i, j)] = s;
-        }
-    }
-    let mut inverse = SMatrix::<T, N, N>::zeros();
+/// `b −= block·x`. The products of the later columns are summed aside: along a beam each body waits for the one before
+/// it, and the path from x to b is what a solve takes.
+#[inline]
+fn subtract<T: Scalar, const N: usize>(block: &SMatrix<T, N, N>, x: &SVector<T, N>, b: &mut SVector<T, N>) {
     for i in 0..N {
-        for j in 0..=i {
-            let mut s = T::zero();
-            for k in i..N {
-                s += li[(k, i)] * li[(k, j)] / pivot[k];
-            }
-            inverse[(i, j)] = s;
-            inverse[(j, i)] = s;
+        let mut later = T::zero();
+        for c in 1..N {
+            later += block[(i, c)] * x[c];
         }
+        b[i] = (b[i] - block[(i, 0)] * x[0]) - later;
     }
-    Ok(inverse)
+}
+
+/// A symmetric block as L·D·Lᵀ.
+struct Decomposed<T: Scalar, const N: usize> {
+    /// L, unit lower triangle.
+    l: SMatrix<T, N, N>,
+    /// D⁻¹.
+    reciprocal: [T; N],
+}
+
+impl<T: Scalar, const N: usize> Decomposed<T, N> {
+    /// Decomposes the lower triangle of `a`; adds the pivots' signs to `inertia`. `vanished` decides about a direction
+    /// whose pivot vanished: an error, or to hold it.
+    #[inline]
+    fn new(
+        a: &SMatrix<T, N, N>,
+        scale: &SVector<f64, N>,
+        inertia: &mut Inertia,
+        vanished: &mut dyn FnMut(usize) -> Result<(), ZeroPivot>,
+    ) -> Result<Self, ZeroPivot> {
+        let mut l = *a;
+        let mut reciprocal = [T::zero(); N];
+        for j in 0..N {
+            let mut d = l[(j, j)];
+            if d.modulus() <= LOST * scale[j] || !d.is_finite() {
+                vanished(j)?;
+                d = T::from_real(scale[j]);
+            }
+            if d.real() < 0.0 {
+                inertia.negative += 1;
+            }
+            reciprocal[j] = T::one() / d;
+            for i in j + 1..N {
+                let below = l[(i, j)];
+                l[(i, j)] = below * reciprocal[j];
+                // columns j + 1 … i of row i, against rows that hold their share of L already
+                for k in j + 1..=i {
+                    let other = l[(k, j)];
+                    l[(i, k)] -= below * other;
+                }
+            }
+        }
+        Ok(Self { l, reciprocal })
+    }
+
+    /// L⁻ᵀ·D⁻¹·L⁻¹.
+    #[inline]
+    fn inverse(&self) -> SMatrix<T, N, N> {
+        let mut li = SMatrix::<T, N, N>::identity();
+        for j in 0..N {
+            for i in j + 1..N {
+                let mut s = -self.l[(i, j)];
+                for k in j + 1..i {
+                    s -= self.l[(i, k)] * li[(k, j)];
+                }
+                li[(i, j)] = s;
+            }
+        }
+        let mut inverse = SMatrix::<T, N, N>::zeros();
+        for i in 0..N {
+            for j in 0..=i {
+                let mut s = T::zero();
+                for k in i..N {
+                    s += li[(k, i)] * self.reciprocal[k] * li[(k, j)];
+                }
+                inverse[(i, j)] = s;
+                inverse[(j, i)] = s;
+            }
+        }
+        inverse
+    }
+
+    /// For the coupling C of a later body's row: takes C·A⁻¹·Cᵀ from the lower triangle of that body's block, and returns
+    /// C·A⁻¹. The last pivot, which everything waits for, enters the block through one product and one sum.
+    #[inline]
+    fn eliminate(&self, coupling: SMatrix<T, N, N>, later: &mut SMatrix<T, N, N>) -> SMatrix<T, N, N> {
+        let l = &self.l;
+        let mut y = coupling;
+        for c in 1..N {
+            for k in 0..c {
+                for r in 0..N {
+                    let known = y[(r, k)];
+                    y[(r, c)] -= known * l[(c, k)];
+                }
+            }
+        }
+        let mut x = y;
+        for c in 0..N {
+            for r in 0..N {
+                x[(r, c)] *= self.reciprocal[c];
+            }
+            for j in 0..N {
+                for i in j..N {
+                    later[(i, j)] -= y[(i, c)] * x[(j, c)];
+                }
+            }
+        }
+        for c in (0..N).rev() {
+            for k in c + 1..N {
+                for r in 0..N {
+                    let known = x[(r, k)];
+                    x[(r, c)] -= known * l[(k, c)];
+                }
+            }
+        }
+        x
+    }
 }
 
 #[cfg(test)]

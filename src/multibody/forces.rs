@@ -1,26 +1,66 @@
 //! Elastic forces, strain energy, tangent and damping of a model. One pass over the joints each, no allocation.
 
-use super::model::{Joint, Model};
-use super::planar::{JointKinematics, Pose};
+use super::model::Model;
+use super::planar::{HalfTurn, JointKinematics, PairTangent, Pose};
+use super::section::{LaidJoint, NONE, Place, Section};
 use super::{BlockMatrix, BodyId};
-use nalgebra::Vector3;
+use nalgebra::{Matrix6, Vector3};
 
-impl Joint {
-    #[inline]
-    fn kinematics(&self, linear: bool, q: &[Pose]) -> JointKinematics {
-        let (qa, qb) = (Model::pose(q, self.a), Model::pose(q, self.b));
-        if linear { self.frame.linear(&qa, &qb) } else { self.frame.kinematics(&qa, &qb, &self.second) }
+/// Half turns of the two bodies that were met last. Along a beam each body is met twice in a row, and a sine and cosine
+/// is dearer than everything else that a body costs.
+struct Turns {
+    a: (u32, HalfTurn),
+    b: (u32, HalfTurn),
+}
+
+impl Turns {
+    fn new() -> Self {
+        Self { a: (NONE, HalfTurn::REST), b: (NONE, HalfTurn::REST) }
     }
 
+    #[inline(always)]
+    fn of(&self, body: u32, pose: &Pose) -> HalfTurn {
+        if body == self.b.0 {
+            self.b.1
+        } else if body == self.a.0 {
+            self.a.1
+        } else if body == NONE {
+            HalfTurn::REST
+        } else {
+            HalfTurn::new(pose.z)
+        }
+    }
+
+    /// Kinematics of the next joint.
+    #[inline(always)]
+    fn kinematics(&mut self, linear: bool, joint: &LaidJoint, section: &Section, q: &[Pose]) -> JointKinematics {
+        let Place { a, b, .. } = joint.place;
+        let (qa, qb) = (pose(q, a), pose(q, b));
+        let frame = joint.frame(section);
+        if linear {
+            return frame.linear(&qa, &qb);
+        }
+        let (turn_a, turn_b) = (self.of(a, &qa), self.of(b, &qb));
+        (self.a, self.b) = ((a, turn_a), (b, turn_b));
+        frame.turned((&qa, &turn_a), (&qb, &turn_b), &section.second)
+    }
+}
+
+#[inline]
+fn pose(q: &[Pose], body: u32) -> Pose {
+    if body == NONE { Pose::zeros() } else { q[body as usize] }
+}
+
+impl LaidJoint {
     /// Axial rest offset [m].
     #[inline]
-    fn offset(&self, rest: &RestStrain<'_>) -> f64 {
-        self.rest * rest.built_in + self.expansion.map_or(0.0, |(group, length)| length * rest.expansion[group])
+    fn offset(&self, section: &Section, rest: &RestStrain<'_>) -> f64 {
+        self.rest * rest.built_in + section.expansion.map_or(0.0, |(group, length)| length * rest.expansion[group])
     }
 
-    #[inline]
-    fn stress(&self, k: &JointKinematics, rest: &RestStrain<'_>) -> Vector3<f64> {
-        self.stiffness * (k.strain - Vector3::new(self.offset(rest), 0.0, 0.0))
+    #[inline(always)]
+    fn stress(&self, section: &Section, k: &JointKinematics, rest: &RestStrain<'_>) -> Vector3<f64> {
+        section.stiffness * Vector3::new(k.strain.x - self.offset(section, rest), k.strain.y, k.strain.z)
     }
 }
 
@@ -33,11 +73,34 @@ pub struct RestStrain<'a> {
     pub built_in: f64,
 }
 
+/// Force along the axis of a joint [N], tension positive.
+pub fn axial_force(model: &Model, joint: &LaidJoint, q: &[Pose], rest: &RestStrain<'_>) -> f64 {
+    let section = model.section(joint);
+    joint.stress(section, &Turns::new().kinematics(model.linear, joint, section, q), rest).x
+}
+
+/// Change of [`axial_force`] with a change `dq` of the configuration [N].
+pub fn axial_change(model: &Model, joint: &LaidJoint, q: &[Pose], dq: &[Pose]) -> f64 {
+    let section = model.section(joint);
+    let k = Turns::new().kinematics(model.linear, joint, section, q);
+    let (da, db) = (pose(dq, joint.place.a), pose(dq, joint.place.b));
+    (section.stiffness * (k.rows() * nalgebra::Vector6::new(da.x, da.y, da.z, db.x, db.y, db.z))).x
+}
+
+/// `r +=` the forces that a change `offset` [m] of one joint's rest offset brings.
+pub fn add_offset_change(model: &Model, joint: &LaidJoint, q: &[Pose], offset: f64, r: &mut [Pose]) {
+    let section = model.section(joint);
+    let k = Turns::new().kinematics(model.linear, joint, section, q);
+    scatter(joint.place, k.forces(&(section.stiffness * Vector3::new(-offset, 0.0, 0.0))), r);
+}
+
 /// `r += ∂U/∂q`, the elastic forces at displacement `q`.
 pub fn add_elastic(model: &Model, q: &[Pose], rest: &RestStrain<'_>, r: &mut [Pose]) {
+    let mut turns = Turns::new();
     for joint in &model.joints {
-        let k = joint.kinematics(model.linear, q);
-        scatter(joint.a, joint.b, &(k.rows.transpose() * joint.stress(&k, rest)), r);
+        let section = model.section(joint);
+        let k = turns.kinematics(model.linear, joint, section, q);
+        scatter(joint.place, k.forces(&joint.stress(section, &k, rest)), r);
     }
 }
 
@@ -49,26 +112,47 @@ pub fn add_tangent(
     tangent: &mut BlockMatrix<f64, 3>,
     r: &mut [Pose],
 ) {
-    for (joint, place) in model.joints.iter().zip(&model.joint_place) {
-        let k = joint.kinematics(model.linear, q);
-        let stress = joint.stress(&k, rest);
-        scatter(joint.a, joint.b, &(k.rows.transpose() * stress), r);
-        let mut h = k.rows.transpose() * joint.stiffness * k.rows;
-        if !model.linear {
-            h += k.geometric(&stress, &joint.second);
-        }
-        place.add(tangent, &h);
+    let mut turns = Turns::new();
+    for joint in &model.joints {
+        let section = model.section(joint);
+        let k = turns.kinematics(model.linear, joint, section, q);
+        let stress = joint.stress(section, &k, rest);
+        scatter(joint.place, k.forces(&stress), r);
+        let h = if model.linear {
+            k.elastic(&section.stiffness)
+        } else {
+            k.tangent(&section.stiffness, &stress, &section.second)
+        };
+        joint.place.add_pair(tangent, &h);
     }
+}
+
+/// Strain energy U(q) [J].
+pub fn strain_energy(model: &Model, q: &[Pose], rest: &RestStrain<'_>) -> f64 {
+    let mut turns = Turns::new();
+    let energy = |joint: &LaidJoint| {
+        let section = model.section(joint);
+        let k = turns.kinematics(model.linear, joint, section, q);
+        let strain = k.strain - Vector3::new(joint.offset(section, rest), 0.0, 0.0);
+        0.5 * strain.dot(&(section.stiffness * strain))
+    };
+    model.joints.iter().map(energy).sum()
+}
+
+/// Kinetic energy ½·vᵀMv [J].
+pub fn kinetic_energy(model: &Model, v: &[Pose]) -> f64 {
+    v.iter().enumerate().map(|(k, v)| 0.5 * v.dot(&model.mass(k).component_mul(v))).sum()
 }
 
 /// `r += (∂²U/∂q∂rest)·change`: the forces that a change of the rest offsets brings.
 pub fn add_rest_change(model: &Model, q: &[Pose], change: &RestStrain<'_>, r: &mut [Pose]) {
+    let mut turns = Turns::new();
     for joint in &model.joints {
-        let offset = joint.offset(change);
+        let section = model.section(joint);
+        let offset = joint.offset(section, change);
         if offset != 0.0 {
-            let k = joint.kinematics(model.linear, q);
-            let stress = joint.stiffness.column(0) * -offset;
-            scatter(joint.a, joint.b, &(k.rows.transpose() * stress), r);
+            let k = turns.kinematics(model.linear, joint, section, q);
+            scatter(joint.place, k.forces(&(section.stiffness * Vector3::new(-offset, 0.0, 0.0))), r);
         }
     }
 }
@@ -76,21 +160,31 @@ pub fn add_rest_change(model: &Model, q: &[Pose], change: &RestStrain<'_>, r: &m
 /// `r += C·v`, gas drag and dampers.
 pub fn add_damping(model: &Model, v: &[Pose], r: &mut [Pose]) {
     for (body, (v, r)) in model.bodies.iter().zip(v.iter().zip(r.iter_mut())) {
-        *r += body.drag * v;
+        *r += body.drag.force(v);
     }
     for (damper, matrix) in model.dampers.iter().zip(&model.damper_matrix) {
         let (va, vb) = (Model::pose(v, damper.a), Model::pose(v, damper.b));
         let pair = nalgebra::Vector6::new(va.x, va.y, va.z, vb.x, vb.y, vb.z);
-        scatter(damper.a, damper.b, &(matrix * pair), r);
+        let f = matrix * pair;
+        for (id, part) in [(damper.a, f.fixed_rows::<3>(0)), (damper.b, f.fixed_rows::<3>(3))] {
+            if let BodyId::Free(k) = id {
+                r[k] += part;
+            }
+        }
     }
 }
 
 /// `matrix += m·M + c·C`: the inertia and damping share of an implicit step.
 pub fn add_inertia(model: &Model, m: f64, c: f64, matrix: &mut BlockMatrix<f64, 3>) {
-    for (j, body) in model.bodies.iter().enumerate() {
-        matrix.diagonal[j] += body.drag * c;
-        for i in 0..3 {
-            matrix.diagonal[j][(i, i)] += m * model.mass(j)[i];
+    for (block, body) in matrix.diagonal.iter_mut().zip(&model.bodies) {
+        let (drag, first) = (body.drag, body.drag.first * c);
+        let translation = m * body.mass + c * drag.amount;
+        block[(0, 0)] += translation;
+        block[(1, 1)] += translation;
+        block[(2, 2)] += m * body.inertia + c * drag.second;
+        for (i, lever) in [(0, -first.y), (1, first.x)] {
+            block[(i, 2)] += lever;
+            block[(2, i)] += lever;
         }
     }
     for (damping, place) in model.damper_matrix.iter().zip(&model.damper_place) {
@@ -98,12 +192,45 @@ pub fn add_inertia(model: &Model, m: f64, c: f64, matrix: &mut BlockMatrix<f64, 
     }
 }
 
-#[inline]
-fn scatter(a: BodyId, b: BodyId, f: &nalgebra::Vector6<f64>, r: &mut [Pose]) {
-    if let BodyId::Free(a) = a {
-        r[a] += f.fixed_rows::<3>(0);
+#[inline(always)]
+fn scatter(place: Place, (a, b): (Pose, Pose), r: &mut [Pose]) {
+    if place.a != NONE {
+        r[place.a as usize] += a;
     }
-    if let BodyId::Free(b) = b {
-        r[b] += f.fixed_rows::<3>(3);
+    if place.b != NONE {
+        r[place.b as usize] += b;
+    }
+}
+
+impl Place {
+    /// Adds the tangent of a pair to `matrix`, in the parts that belong to free bodies.
+    #[inline(always)]
+    pub(crate) fn add_pair(self, matrix: &mut BlockMatrix<f64, 3>, h: &PairTangent) {
+        if self.a != NONE {
+            matrix.diagonal[self.a as usize] += h.aa();
+        }
+        if self.b != NONE {
+            matrix.diagonal[self.b as usize] += h.bb();
+        }
+        if self.block != NONE {
+            // the block's row is the body eliminated later
+            let ab = h.ab();
+            matrix.below[self.block as usize] += if self.a > self.b { ab } else { ab.transpose() };
+        }
+    }
+
+    /// Adds a 6×6 pair block (a then b) to `matrix`, in the parts that belong to free bodies.
+    #[inline]
+    pub(crate) fn add(self, matrix: &mut BlockMatrix<f64, 3>, h: &Matrix6<f64>) {
+        if self.a != NONE {
+            matrix.diagonal[self.a as usize] += h.fixed_view::<3, 3>(0, 0);
+        }
+        if self.b != NONE {
+            matrix.diagonal[self.b as usize] += h.fixed_view::<3, 3>(3, 3);
+        }
+        if self.block != NONE {
+            let corner = if self.a > self.b { h.fixed_view::<3, 3>(0, 3) } else { h.fixed_view::<3, 3>(3, 0) };
+            matrix.below[self.block as usize] += corner;
+        }
     }
 }

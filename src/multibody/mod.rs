@@ -10,16 +10,27 @@
 //! | [`pattern`] | where each block of the factor lies, fill of the loops included, and the update schedule |
 //! | [`factor`] | symmetric block factorization and solve, generic over scalar and block size |
 //! | [`planar`] | everything that knows a plane from space: poses, points on bodies, joint strains and their derivatives |
+//! | [`sine`] | sine and cosine of small angles, inlined |
+//! | [`body`] | a rigid body: name, mass, drag, held directions |
+//! | [`section`] | joints as they are stored: what those of one beam share, and where their couplings lie |
 //! | [`model`] | bodies, joints, dampers: the immutable model and the mutable state |
+//! | [`rcr`] | the same graph in relative joint coordinates, loops reduced inside the recursion |
+//! | [`linear_system`] | K, M and C of a linear frame on one pattern |
 //! | [`forces`] | elastic forces, energy and tangent of a model at a configuration |
 
+pub mod body;
 pub mod factor;
 pub mod forces;
+pub mod linear_system;
 pub mod model;
 pub mod order;
 pub mod pattern;
 pub mod planar;
+pub mod rcr;
+pub mod section;
+pub mod sine;
 
+pub use body::{Body, BodyName, Drag};
 pub use factor::{BlockMatrix, Scalar};
-pub use model::{Body, BodyId, Damper, Joint, Model, State};
+pub use model::{BodyId, Damper, Joint, Model, State};
 pub use pattern::Pattern;

@@ -1,9 +1,11 @@
 //! The immutable model: bodies in elimination order, joints, dampers; and the state that a snapshot holds.
 
+use super::body::Body;
 use super::order::elimination_order;
 use super::pattern::Pattern;
-use super::planar::{Block, JointFrame, Pose};
-use nalgebra::{Matrix2, Matrix3, Matrix6, Vector2, Vector3};
+use super::planar::{JointFrame, Pose};
+use super::section::{LaidJoint, NONE, Place, Section, Sections};
+use nalgebra::{Matrix2, Matrix3, Matrix6, Vector3};
 use serde::{Deserialize, Serialize};
 
 /// A body of the model, or ground.
@@ -13,23 +15,6 @@ pub enum BodyId {
     Ground,
     /// The body eliminated as the k-th.
     Free(usize),
-}
-
-/// A rigid body. Coordinates are those of its centre of mass, so that the mass matrix is constant and diagonal.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Body {
-    /// Name for messages: the node or the beam segment it stands for.
-    pub name: String,
-    /// Centre of mass as drawn [m].
-    pub center: Vector2<f64>,
-    /// Mass [kg]; 0 for a body that only joints hold.
-    pub mass: f64,
-    /// Moment of inertia about the centre of mass [kg·m²].
-    pub inertia: f64,
-    /// Gas damping about the drawn place: force = −drag · rate, symmetric [N·s/m, N·s, N·m·s].
-    pub drag: Block,
-    /// Projector onto the directions that supports leave free; none: all.
-    pub free: Option<Block>,
 }
 
 /// A flexible joint between two bodies, with three directions: axial, shear, rotation.
@@ -49,6 +34,9 @@ pub struct Joint {
     pub expansion: Option<(usize, f64)>,
     /// Axial rest offset that does not change [m] (residual stress, prescribed temperature).
     pub rest: f64,
+    /// Directions (u, g, p) that are meant to be rigid. `stiffness` is then only high enough for a formulation that needs
+    /// one; a formulation in joint coordinates leaves the direction out.
+    pub locked: [bool; 3],
 }
 
 /// A linear damper between two bodies.
@@ -68,39 +56,8 @@ impl Damper {
     /// Force on the pair's six coordinates per rate: symmetric and constant.
     fn matrix(&self) -> Matrix6<f64> {
         let rest = Pose::zeros();
-        let rows = self.frame.kinematics(&rest, &rest, &Matrix2::zeros()).rows;
+        let rows = self.frame.kinematics(&rest, &rest, &[0.0; 3]).rows();
         rows.transpose() * Matrix3::from_diagonal(&self.coefficients) * rows
-    }
-}
-
-/// Where the couplings of a pair of bodies lie in the tangent.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Place {
-    a: usize,
-    b: usize,
-    block: usize,
-}
-
-const NONE: usize = usize::MAX;
-
-impl Place {
-    /// Adds a 6×6 pair block (a then b) to `matrix`, in the parts that belong to free bodies.
-    #[inline]
-    pub(crate) fn add(self, matrix: &mut super::BlockMatrix<f64, 3>, h: &Matrix6<f64>) {
-        if self.a != NONE {
-            matrix.diagonal[self.a] += h.fixed_view::<3, 3>(0, 0);
-        }
-        if self.b != NONE {
-            matrix.diagonal[self.b] += h.fixed_view::<3, 3>(3, 3);
-        }
-        if self.block != NONE {
-            // the block's row is the body eliminated later
-            if self.a > self.b {
-                matrix.below[self.block] += h.fixed_view::<3, 3>(0, 3);
-            } else {
-                matrix.below[self.block] += h.fixed_view::<3, 3>(3, 0);
-            }
-        }
     }
 }
 
@@ -110,14 +67,17 @@ pub struct Model {
     /// Bodies in elimination order.
     pub bodies: Vec<Body>,
     /// Joints, along the elimination order of their earlier body.
-    pub joints: Vec<Joint>,
+    pub joints: Vec<LaidJoint>,
+    /// What joints share.
+    pub sections: Vec<Section>,
     /// Dampers.
     pub dampers: Vec<Damper>,
     /// Pattern of the tangent.
     pub pattern: Pattern,
     /// Small displacements about the drawn geometry.
     pub linear: bool,
-    pub(crate) joint_place: Vec<Place>,
+    /// Bodies with a projector.
+    held: Vec<u32>,
     pub(crate) damper_place: Vec<Place>,
     pub(crate) damper_matrix: Vec<Matrix6<f64>>,
 }
@@ -143,7 +103,7 @@ impl Model {
     /// (further pairs that forces will couple) means `bodies[k]`. Also returns where each given body went.
     pub fn new(
         bodies: Vec<Body>,
-        mut joints: Vec<Joint>,
+        joints: Vec<Joint>,
         mut dampers: Vec<Damper>,
         couplings: &[(BodyId, BodyId)],
         linear: bool,
@@ -156,7 +116,13 @@ impl Model {
                 _ => None,
             })
             .collect();
-        let order = elimination_order(bodies.len(), &edges);
+        let grounded: Vec<usize> = (joints.iter().map(|j| (j.a, j.b)))
+            .filter_map(|pair| match pair {
+                (BodyId::Free(k), BodyId::Ground) | (BodyId::Ground, BodyId::Free(k)) => Some(k),
+                _ => None,
+            })
+            .collect();
+        let order = elimination_order(bodies.len(), &edges, &grounded);
         let mut place = vec![0; bodies.len()];
         for (k, &body) in order.iter().enumerate() {
             place[body] = k;
@@ -165,50 +131,56 @@ impl Model {
             BodyId::Ground => BodyId::Ground,
             BodyId::Free(k) => BodyId::Free(place[k]),
         };
-        for j in &mut joints {
-            (j.a, j.b) = (moved(j.a), moved(j.b));
-        }
         for d in &mut dampers {
             (d.a, d.b) = (moved(d.a), moved(d.b));
         }
-        joints.sort_by_key(|j| (j.a.min_free(j.b), j.a.max_free(j.b)));
-        let edges: Vec<(usize, usize)> = edges.iter().map(|&(a, b)| (place[a], place[b])).collect();
+        let edges: Vec<(usize, usize)> = edges.into_iter().map(|(a, b)| (place[a], place[b])).collect();
         let pattern = Pattern::new(bodies.len(), &edges);
+        drop(edges);
+        let mut sections = Sections::new();
+        let mut laid: Vec<LaidJoint> =
+            joints.iter().map(|j| sections.lay(j, locate(&pattern, moved(j.a), moved(j.b)))).collect();
+        drop(joints);
+        laid.sort_by_key(|j| j.place.order());
         let mut slots: Vec<Option<Body>> = bodies.into_iter().map(Some).collect();
-        let bodies = order.iter().filter_map(|&k| slots[k].take()).collect();
-        let joint_place = joints.iter().map(|j| locate(&pattern, j.a, j.b)).collect();
+        let mut bodies = Vec::with_capacity(order.len());
+        bodies.extend(order.iter().filter_map(|&k| slots[k].take()));
         let damper_place = dampers.iter().map(|d| locate(&pattern, d.a, d.b)).collect();
         let damper_matrix = dampers.iter().map(Damper::matrix).collect();
-        let model = Self { bodies, joints, dampers, pattern, linear, joint_place, damper_place, damper_matrix };
+        let sections = sections.all;
+        let held = (0..).zip(&bodies).filter(|(_, b)| b.free.is_some()).map(|(k, _)| k).collect();
+        let model =
+            Self { bodies, joints: laid, sections, dampers, pattern, linear, held, damper_place, damper_matrix };
         (model, place)
     }
 
     /// Mechanical unknowns: three per body, less the directions that supports hold.
     pub fn unknowns(&self) -> usize {
-        self.bodies.iter().map(|b| b.free.map_or(3.0, |p| p.trace()).round() as usize).sum()
+        self.bodies.iter().map(|b| b.free.as_ref().map_or(3.0, |p| p.trace()).round() as usize).sum()
     }
 
     /// True when joints connect a body to ground.
     pub fn grounded(&self, body: usize) -> bool {
-        let mut reached = vec![false; self.bodies.len()];
-        let mut stack = vec![body];
-        reached[body] = true;
-        let touching = |k: usize| self.joints.iter().filter(move |j| j.a == BodyId::Free(k) || j.b == BodyId::Free(k));
-        while let Some(k) = stack.pop() {
-            for joint in touching(k) {
-                for end in [joint.a, joint.b] {
-                    match end {
-                        BodyId::Ground => return true,
-                        BodyId::Free(next) if !reached[next] => {
-                            reached[next] = true;
-                            stack.push(next);
-                        }
-                        BodyId::Free(_) => {}
-                    }
-                }
-            }
+        // joints in any order join sets of bodies; ground is one more
+        let ground = self.bodies.len();
+        let mut leader: Vec<usize> = (0..=ground).collect();
+        let index = |id: u32| if id == NONE { ground } else { id as usize };
+        for joint in &self.joints {
+            let (a, b) = (root(&mut leader, index(joint.place.a)), root(&mut leader, index(joint.place.b)));
+            leader[a] = b;
         }
-        false
+        root(&mut leader, body) == root(&mut leader, ground)
+    }
+
+    /// What a joint shares with others.
+    #[inline]
+    pub fn section(&self, joint: &LaidJoint) -> &Section {
+        &self.sections[joint.section()]
+    }
+
+    /// Joint `k` as it was given, its bodies numbered in elimination order.
+    pub fn joint(&self, k: usize) -> Joint {
+        self.joints[k].whole(self.section(&self.joints[k]))
     }
 
     /// Where a pair's blocks lie.
@@ -225,15 +197,19 @@ impl Model {
 
     /// Removes the held directions from a vector.
     pub fn project(&self, x: &mut [Pose]) {
-        for (body, x) in self.bodies.iter().zip(x) {
-            if let Some(p) = &body.free {
-                *x = p * *x;
+        for &k in &self.held {
+            let k = k as usize;
+            if let Some(p) = &self.bodies[k].free {
+                x[k] = **p * x[k];
             }
         }
     }
 
     /// Removes the held directions from a matrix and gives them the pivot 1, so that solutions have no share in them.
     pub fn project_matrix<T: super::Scalar>(&self, matrix: &mut super::BlockMatrix<T, 3>) {
+        if self.held.is_empty() {
+            return;
+        }
         for (j, body) in self.bodies.iter().enumerate() {
             if let Some(p) = &body.free {
                 let p: Matrix3<T> = p.map(T::from_real);
@@ -260,29 +236,23 @@ impl Model {
     }
 }
 
-impl BodyId {
-    fn min_free(self, other: Self) -> usize {
-        match (self, other) {
-            (Self::Free(a), Self::Free(b)) => a.min(b),
-            (Self::Free(a), Self::Ground) | (Self::Ground, Self::Free(a)) => a,
-            (Self::Ground, Self::Ground) => NONE,
-        }
-    }
-
-    fn max_free(self, other: Self) -> usize {
-        match (self, other) {
-            (Self::Free(a), Self::Free(b)) => a.max(b),
-            _ => NONE,
-        }
-    }
-}
-
 fn locate(pattern: &Pattern, a: BodyId, b: BodyId) -> Place {
     let index = |id| match id {
         BodyId::Ground => NONE,
-        BodyId::Free(k) => k,
+        BodyId::Free(k) => k as u32,
     };
-    let (a, b) = (index(a), index(b));
-    let block = if a == NONE || b == NONE || a == b { NONE } else { pattern.block(a.max(b), a.min(b)).unwrap_or(NONE) };
-    Place { a, b, block }
+    let block = match (a, b) {
+        (BodyId::Free(a), BodyId::Free(b)) if a != b => pattern.block(a.max(b), a.min(b)).map_or(NONE, |k| k as u32),
+        _ => NONE,
+    };
+    Place { a: index(a), b: index(b), block }
+}
+
+/// The set that `k` belongs to.
+fn root(leader: &mut [usize], mut k: usize) -> usize {
+    while leader[k] != k {
+        leader[k] = leader[leader[k]];
+        k = leader[k];
+    }
+    k
 }

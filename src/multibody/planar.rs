@@ -17,8 +17,12 @@
 //! ```
 //! With Q = diag(0.6/h, −h/12) for a segment of length h the chord of the bent, uniformly sheared segment keeps the right
 //! length to second order, which makes large rotation, stretch stiffening and buckling right at no unknown.
+//!
+//! Strains depend on translations through the opening alone, so their derivatives with respect to the position of body a
+//! are those of body b with the other sign, and ten numbers make up the 6×6 tangent of a pair.
 
-use nalgebra::{Matrix2, Matrix3, Matrix6, SMatrix, Vector2, Vector3, Vector6};
+use super::sine::sin_cos;
+use nalgebra::{Matrix3, Matrix6, SMatrix, Vector2, Vector3, Vector6};
 
 /// Degrees of freedom of a planar body: x [m], y [m], θ [rad].
 pub const DOF: usize = 3;
@@ -48,25 +52,31 @@ pub fn swing(theta: f64, v: Vector2<f64>) -> Vector2<f64> {
     HalfTurn::new(theta).swing(v)
 }
 
-/// Sine and cosine of half of a body's rotation.
+/// Sine and cosine of half of a body's rotation θ, with R(θ) − 1.
 #[derive(Debug, Clone, Copy)]
-struct HalfTurn {
+pub(crate) struct HalfTurn {
     sin: f64,
     cos: f64,
+    /// cos θ − 1.
+    less: f64,
+    /// sin θ.
+    whole: f64,
 }
 
 impl HalfTurn {
+    /// Of a body at rest.
+    pub(crate) const REST: Self = Self { sin: 0.0, cos: 1.0, less: 0.0, whole: 0.0 };
+
     #[inline]
-    fn new(theta: f64) -> Self {
-        let (sin, cos) = (0.5 * theta).sin_cos();
-        Self { sin, cos }
+    pub(crate) fn new(theta: f64) -> Self {
+        let (sin, cos) = sin_cos(0.5 * theta);
+        Self { sin, cos, less: -2.0 * sin * sin, whole: 2.0 * sin * cos }
     }
 
     /// (R(θ) − 1)·v without cancellation at small angles.
     #[inline]
     fn swing(&self, v: Vector2<f64>) -> Vector2<f64> {
-        let (less, s) = (-2.0 * self.sin * self.sin, 2.0 * self.sin * self.cos);
-        Vector2::new(less * v.x - s * v.y, s * v.x + less * v.y)
+        Vector2::new(self.less * v.x - self.whole * v.y, self.whole * v.x + self.less * v.y)
     }
 
     /// R((θₐ + θ_b)/2)·v.
@@ -114,13 +124,73 @@ pub struct JointFrame {
     pub axis: Vector2<f64>,
 }
 
+/// A symmetric 3×3 matrix over the strains (u, g, p): uu, ug, up, gg, gp, pp.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Symmetric(pub [f64; 6]);
+
+impl std::ops::Mul<Vector3<f64>> for Symmetric {
+    type Output = Vector3<f64>;
+
+    #[inline]
+    fn mul(self, x: Vector3<f64>) -> Vector3<f64> {
+        let [uu, ug, up, gg, gp, pp] = self.0;
+        Vector3::new(uu * x.x + ug * x.y + up * x.z, ug * x.x + gg * x.y + gp * x.z, up * x.x + gp * x.y + pp * x.z)
+    }
+}
+
+/// Second derivatives of an energy of a pair of bodies that depends on their translations through x_b − x_a alone.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PairTangent {
+    /// Translation of b twice: xx, xy, yy.
+    shift: [f64; 3],
+    /// Translation of b and rotation of a, of b.
+    shift_a: Vector2<f64>,
+    shift_b: Vector2<f64>,
+    /// Rotations: of a twice, of a and b, of b twice.
+    turn: [f64; 3],
+}
+
+impl PairTangent {
+    /// Block of body a twice.
+    #[inline]
+    pub fn aa(&self) -> Block {
+        let ([xx, xy, yy], c) = (self.shift, self.shift_a);
+        Matrix3::new(xx, xy, -c.x, xy, yy, -c.y, -c.x, -c.y, self.turn[0])
+    }
+
+    /// Block of body b twice.
+    #[inline]
+    pub fn bb(&self) -> Block {
+        let ([xx, xy, yy], c) = (self.shift, self.shift_b);
+        Matrix3::new(xx, xy, c.x, xy, yy, c.y, c.x, c.y, self.turn[2])
+    }
+
+    /// Block with rows of body a and columns of body b.
+    #[inline]
+    pub fn ab(&self) -> Block {
+        let ([xx, xy, yy], a, b) = (self.shift, self.shift_a, self.shift_b);
+        Matrix3::new(-xx, -xy, -b.x, -xy, -yy, -b.y, a.x, a.y, self.turn[1])
+    }
+
+    /// The whole, a then b.
+    pub fn matrix(&self) -> Matrix6<f64> {
+        let mut h = Matrix6::zeros();
+        h.fixed_view_mut::<3, 3>(0, 0).copy_from(&self.aa());
+        h.fixed_view_mut::<3, 3>(0, 3).copy_from(&self.ab());
+        h.fixed_view_mut::<3, 3>(3, 0).copy_from(&self.ab().transpose());
+        h.fixed_view_mut::<3, 3>(3, 3).copy_from(&self.bb());
+        h
+    }
+}
+
 /// Strains of a joint with what their derivatives need.
 #[derive(Debug, Clone, Copy)]
 pub struct JointKinematics {
     /// e_u [m], g [m], p [rad].
     pub strain: Vector3<f64>,
-    /// ∂strain/∂(q_a, q_b).
-    pub rows: PairRow,
+    /// u and g where the derivatives are taken [m].
+    axial: f64,
+    shear: f64,
     /// Q·(g, p), half of ∂e_u/∂(g, p).
     bent: Vector2<f64>,
     opening: Vector2<f64>,
@@ -129,67 +199,125 @@ pub struct JointKinematics {
     e1: Vector2<f64>,
 }
 
+/// Derivatives of the strains.
+struct Slopes {
+    /// ∂(e_u, g)/∂(x, y) of body b; for body a with the other sign; ∂p/∂(x, y) = 0.
+    u: Vector2<f64>,
+    g: Vector2<f64>,
+    /// ∂strain/∂θ of the bodies.
+    turn_a: Vector3<f64>,
+    turn_b: Vector3<f64>,
+}
+
 impl JointFrame {
-    /// Exact strains at two poses. `second` is Q.
+    /// Exact strains at two poses. `second` is Q over (g, p) as (gg, gp, pp).
     #[inline]
-    pub fn kinematics(&self, qa: &Pose, qb: &Pose, second: &Matrix2<f64>) -> JointKinematics {
+    pub fn kinematics(&self, qa: &Pose, qb: &Pose, second: &[f64; 3]) -> JointKinematics {
+        self.turned((qa, &HalfTurn::new(qa.z)), (qb, &HalfTurn::new(qb.z)), second)
+    }
+
+    /// [`JointFrame::kinematics`] for bodies whose half turns are known.
+    #[inline(always)]
+    pub(crate) fn turned(
+        &self,
+        (qa, a): (&Pose, &HalfTurn),
+        (qb, b): (&Pose, &HalfTurn),
+        second: &[f64; 3],
+    ) -> JointKinematics {
         // one sine and cosine of half an angle for each body serve everything: R − 1 of the body, and R of the mean
-        let (a, b) = (HalfTurn::new(qa.z), HalfTurn::new(qb.z));
         let (swing_a, swing_b) = (a.swing(self.arm_a), b.swing(self.arm_b));
         let (ra, rb) = (self.arm_a + swing_a, self.arm_b + swing_b);
         let opening = Vector2::new(qb.x - qa.x, qb.y - qa.y) + swing_b - swing_a;
-        let e1 = a.mean(&b, self.axis);
-        let e2 = turn(e1);
-        let (g, p) = (opening.dot(&e2), qb.z - qa.z);
-        let bent = second * Vector2::new(g, p);
-        let strain = Vector3::new(opening.dot(&e1) + bent.x * g + bent.y * p, g, p);
-        // ∂u/∂θ: the frame turns by half (+g/2), the point turns with its body
-        let (ta, tb) = (turn(ra), turn(rb));
-        let u = Vector6::new(-e1.x, -e1.y, 0.5 * g - e1.dot(&ta), e1.x, e1.y, 0.5 * g + e1.dot(&tb));
-        let axial = opening.dot(&e1);
-        let v = Vector6::new(-e2.x, -e2.y, -0.5 * axial - e2.dot(&ta), e2.x, e2.y, -0.5 * axial + e2.dot(&tb));
-        let w = Vector6::new(0.0, 0.0, -1.0, 0.0, 0.0, 1.0);
-        let row_u = u + (v * bent.x + w * bent.y) * 2.0;
-        let rows = PairRow::from_rows(&[row_u.transpose(), v.transpose(), w.transpose()]);
-        JointKinematics { strain, rows, bent, opening, radius_a: ra, radius_b: rb, e1 }
+        let e1 = a.mean(b, self.axis);
+        let (u, g, p) = (opening.dot(&e1), opening.dot(&turn(e1)), qb.z - qa.z);
+        let bent = Vector2::new(second[0] * g + second[1] * p, second[1] * g + second[2] * p);
+        let strain = Vector3::new(u + bent.x * g + bent.y * p, g, p);
+        JointKinematics { strain, axial: u, shear: g, bent, opening, radius_a: ra, radius_b: rb, e1 }
     }
 
     /// Strains linearized about the drawn geometry: small displacements, as SUGAR.
     #[inline]
     pub fn linear(&self, qa: &Pose, qb: &Pose) -> JointKinematics {
-        let rest = Pose::zeros();
-        let mut k = self.kinematics(&rest, &rest, &Matrix2::zeros());
-        let q = Vector6::new(qa.x, qa.y, qa.z, qb.x, qb.y, qb.z);
-        k.strain = k.rows * q;
+        let rest = (&Pose::zeros(), &HalfTurn::REST);
+        let mut k = self.turned(rest, rest, &[0.0; 3]);
+        k.strain = k.rows() * Vector6::new(qa.x, qa.y, qa.z, qb.x, qb.y, qb.z);
         k
     }
 }
 
 impl JointKinematics {
-    /// ∂²(strain · stress)/∂q² : the geometric stiffness of a joint under `stress` (N, V, M), pair coordinates.
-    #[inline]
-    pub fn geometric(&self, stress: &Vector3<f64>, second: &Matrix2<f64>) -> Matrix6<f64> {
-        let bending = self.rows.fixed_rows::<2>(1);
-        let mut h = bending.transpose() * (second * (2.0 * stress.x)) * bending;
-        // total force conjugate to (u, g): the second-order strain adds to the shear
-        let shear = stress.y + 2.0 * stress.x * self.bent.x;
-        let e2 = turn(self.e1);
-        let n = self.e1 * stress.x + e2 * shear;
-        let sn = turn(n);
-        let nd = n.dot(&self.opening);
-        for t in [2, 5] {
-            for i in 0..2 {
-                h[(i, t)] -= 0.5 * sn[i];
-                h[(t, i)] -= 0.5 * sn[i];
-                h[(i + 3, t)] += 0.5 * sn[i];
-                h[(t, i + 3)] += 0.5 * sn[i];
-            }
-            h[(t, t)] -= 0.25 * nd;
+    #[inline(always)]
+    fn slopes(&self) -> Slopes {
+        let (g, half_g, half_u) = (turn(self.e1), 0.5 * self.shear, 0.5 * self.axial);
+        let (ta, tb) = (turn(self.radius_a), turn(self.radius_b));
+        // the frame turns by half (u: +g/2, g: −u/2), the point turns with its body
+        let (u_a, u_b) = (half_g - self.e1.dot(&ta), half_g + self.e1.dot(&tb));
+        let (g_a, g_b) = (-half_u - g.dot(&ta), -half_u + g.dot(&tb));
+        let twice = self.bent * 2.0;
+        Slopes {
+            u: self.e1 + g * twice.x,
+            g,
+            turn_a: Vector3::new(u_a + g_a * twice.x - twice.y, g_a, -1.0),
+            turn_b: Vector3::new(u_b + g_b * twice.x + twice.y, g_b, 1.0),
         }
-        let (na, nb) = (n.dot(&self.radius_a), n.dot(&self.radius_b));
-        let cross = -0.25 * nd + 0.5 * nb - 0.5 * na;
-        h[(2, 5)] += cross;
-        h[(5, 2)] += cross;
+    }
+
+    /// ∂strain/∂(q_a, q_b).
+    #[inline]
+    pub fn rows(&self) -> PairRow {
+        let Slopes { u, g, turn_a: a, turn_b: b } = self.slopes();
+        PairRow::from_row_slice(&[
+            -u.x, -u.y, a.x, u.x, u.y, b.x, //
+            -g.x, -g.y, a.y, g.x, g.y, b.y, //
+            0.0, 0.0, a.z, 0.0, 0.0, b.z,
+        ])
+    }
+
+    /// The generalized forces rowsᵀ·stress on bodies a and b: the force n at the joint's two material points, and a moment.
+    #[inline(always)]
+    pub fn forces(&self, stress: &Vector3<f64>) -> (Pose, Pose) {
+        // the second-order strain passes the axial force on to shear and moment
+        let double = 2.0 * stress.x;
+        let (shear, moment) = (stress.y + double * self.bent.x, stress.z + double * self.bent.y);
+        let n = self.e1 * stress.x + turn(self.e1) * shear;
+        // the frame turns by half with each body
+        let frame = 0.5 * (self.shear * stress.x - self.axial * shear);
+        let (at_a, at_b) = (turn(self.radius_a).dot(&n), turn(self.radius_b).dot(&n));
+        (Pose::new(-n.x, -n.y, frame - at_a - moment), Pose::new(n.x, n.y, frame + at_b + moment))
+    }
+
+    /// rowsᵀ·`stiffness`·rows: the tangent without the joint's stress.
+    #[inline(always)]
+    pub fn elastic(&self, stiffness: &Symmetric) -> PairTangent {
+        let s = self.slopes();
+        let [uu, ug, _, gg, ..] = stiffness.0;
+        let (to_u, to_g) = (s.u * uu + s.g * ug, s.u * ug + s.g * gg);
+        let (a, b) = (*stiffness * s.turn_a, *stiffness * s.turn_b);
+        PairTangent {
+            shift: [s.u.x * to_u.x + s.g.x * to_g.x, s.u.x * to_u.y + s.g.x * to_g.y, s.u.y * to_u.y + s.g.y * to_g.y],
+            shift_a: s.u * a.x + s.g * a.y,
+            shift_b: s.u * b.x + s.g * b.y,
+            turn: [s.turn_a.dot(&a), s.turn_a.dot(&b), s.turn_b.dot(&b)],
+        }
+    }
+
+    /// The whole tangent under `stress` (N, V, M): rowsᵀ·stiffness·rows + ∂²(strain · stress)/∂q². `second` is Q.
+    #[inline(always)]
+    pub fn tangent(&self, stiffness: &Symmetric, stress: &Vector3<f64>, second: &[f64; 3]) -> PairTangent {
+        // the axial force bends: 2·N·Q acts between g and p as a stiffness does
+        let double = 2.0 * stress.x;
+        let [uu, ug, up, gg, gp, pp] = stiffness.0;
+        let [bend_gg, bend_gp, bend_pp] = second.map(|q| double * q);
+        let mut h = self.elastic(&Symmetric([uu, ug, up, gg + bend_gg, gp + bend_gp, pp + bend_pp]));
+        // the force on b, as in `forces`
+        let n = self.e1 * stress.x + turn(self.e1) * (stress.y + double * self.bent.x);
+        let half = turn(n) * 0.5;
+        h.shift_a += half;
+        h.shift_b += half;
+        let quarter = 0.25 * n.dot(&self.opening);
+        h.turn[0] -= quarter;
+        h.turn[2] -= quarter;
+        h.turn[1] += 0.5 * (n.dot(&self.radius_b) - n.dot(&self.radius_a)) - quarter;
         h
     }
 }
@@ -198,38 +326,57 @@ impl JointKinematics {
 mod tests {
     use super::*;
 
-    fn sample() -> (JointFrame, Matrix2<f64>, Pose, Pose) {
+    fn sample() -> (JointFrame, [f64; 3], Pose, Pose) {
         let frame = JointFrame {
             arm_a: Vector2::new(0.7, -0.3),
             arm_b: Vector2::new(-0.4, 0.9),
             axis: Vector2::new(0.4f64.cos(), 0.4f64.sin()),
         };
-        let second = Matrix2::new(0.6, 0.1, 0.1, -0.08);
+        let second = [0.6, 0.1, -0.08];
         (frame, second, Pose::new(0.1, -0.2, 0.3), Pose::new(0.15, 0.1, -0.5))
     }
 
-    /// Rows are the derivative of the strains, and `geometric` the derivative of rowsᵀ·stress: central differences of
-    /// step 1e-6 agree to 1e-8, which is their own error.
+    /// Rows are the derivative of the strains, and `tangent` that of the forces of an elastic joint whose stress follows
+    /// its strain: central differences of step 1e-6 agree to 1e-8, which is their own error.
     #[test]
     fn derivatives_match_central_differences() {
         let (frame, second, qa, qb) = sample();
-        let stress = Vector3::new(1.3, -0.7, 0.4);
+        let stiffness = Symmetric([1.9, 0.3, -0.2, 1.4, 0.5, 1.1]);
+        let rest = Vector3::new(-0.4, 0.9, 0.2);
         let at = |q: &Vector6<f64>| {
             frame.kinematics(&q.fixed_rows::<3>(0).into_owned(), &q.fixed_rows::<3>(3).into_owned(), &second)
         };
+        let force = |k: &JointKinematics| {
+            let (a, b) = k.forces(&(stiffness * (k.strain - rest)));
+            Vector6::new(a.x, a.y, a.z, b.x, b.y, b.z)
+        };
         let q = Vector6::new(qa.x, qa.y, qa.z, qb.x, qb.y, qb.z);
         let here = at(&q);
-        let geometric = here.geometric(&stress, &second);
+        let stress = stiffness * (here.strain - rest);
+        assert!((here.rows().transpose() * stress - force(&here)).norm() < 1e-15 * stress.norm());
+        let tangent = here.tangent(&stiffness, &stress, &second).matrix();
         for i in 0..6 {
             let (mut lo, mut hi) = (q, q);
             lo[i] -= 1e-6;
             hi[i] += 1e-6;
             let (lo, hi) = (at(&lo), at(&hi));
             let d = (hi.strain - lo.strain) / 2e-6;
-            assert!((d - here.rows.column(i)).norm() < 1e-8);
-            let h = (hi.rows.transpose() * stress - lo.rows.transpose() * stress) / 2e-6;
-            assert!((h - geometric.column(i)).norm() < 1e-8, "{i}: {h} {}", geometric.column(i));
+            assert!((d - here.rows().column(i)).norm() < 1e-8);
+            let h = (force(&hi) - force(&lo)) / 2e-6;
+            assert!((h - tangent.column(i)).norm() < 1e-8, "{i}: {h} {}", tangent.column(i));
         }
+    }
+
+    /// Linearized forces have the derivatives of the drawn place at any displacement: rowsᵀ·stress, in which the opening has
+    /// no share.
+    #[test]
+    fn linear_forces_keep_the_drawn_frame() {
+        let (frame, _, qa, qb) = sample();
+        let stress = Vector3::new(1.3, -0.7, 0.4);
+        let (at_rest, displaced) = (frame.linear(&Pose::zeros(), &Pose::zeros()), frame.linear(&qa, &qb));
+        assert_eq!(displaced.rows(), at_rest.rows());
+        assert_eq!(displaced.forces(&stress), at_rest.forces(&stress));
+        assert_ne!(displaced.strain, at_rest.strain);
     }
 
     /// A rigid motion of both bodies strains nothing: to rounding, for a finite rotation.

@@ -11,6 +11,7 @@ use super::stream::TrialStream;
 use super::sweeps::Sweeps;
 use super::work::{Work, guarded};
 use super::{proto, status};
+use crate::analysis::integrator::Integrator;
 use crate::analysis::transient::TransientOptions;
 use crate::analysis::{modes, pull_in, statics};
 use crate::compile::{CompileError, CompileOptions, compile};
@@ -201,6 +202,27 @@ impl proto::bimorph_server::Bimorph for Calls {
         if values > self.0.limits.transient_values {
             return Err(status::limit("transient_values", self.0.limits.transient_values, values));
         }
+        let method = match request.method.as_str() {
+            "" => Integrator::default(),
+            name => Integrator::named(name).ok_or_else(|| {
+                let expected = format!("expected one of {:?}, got \"{name}\"", Integrator::NAMES);
+                status::violation(Violation::new("method", expected))
+            })?,
+        };
+        let method = match (method, request.rho) {
+            (Integrator::GeneralizedAlpha { .. }, Some(rho)) => {
+                Integrator::GeneralizedAlpha { rho: convert::number("rho", rho, false).map_err(status::violation)? }
+            }
+            (_, Some(_)) => {
+                return Err(status::violation(Violation::new("rho", "expected only with method generalized-alpha")));
+            }
+            (method, None) => method,
+        };
+        let step = match request.step_s {
+            0.0 => None,
+            step => Some(convert::number("step_s", step, true).map_err(status::violation)?),
+        };
+        let events = convert::pairs(request.events);
         let (signals, voltages) = (request.signals, voltages(request.voltages)?);
         let place = self.0.work.place().await?;
         let (outlet, receiver) = Outlet::new(Arc::clone(&self.0));
@@ -209,7 +231,18 @@ impl proto::bimorph_server::Bimorph for Calls {
             let _place = place;
             let job = || {
                 let release = release.as_ref().map(|model| &*model.compiled);
-                let options = TransientOptions { stop, signals, points, tol, voltages, release };
+                let options = TransientOptions {
+                    stop,
+                    signals,
+                    points,
+                    tol,
+                    voltages,
+                    release,
+                    method,
+                    step,
+                    events,
+                    ..TransientOptions::default()
+                };
                 send_transient(&model.compiled, &options, outlet);
                 Ok(())
             };

@@ -1,12 +1,14 @@
-//! Error control of the integrator: from one time to another in as few steps as the tolerance allows.
+//! Drives any [`Method`] from one time to another: with error control, in as few steps as the tolerance allows, or in equal
+//! steps.
 //!
 //! The error of a step is measured in the mass norm, ‖e‖² = eᵀMe, which has one unit for translations and rotations:
 //! √(‖e_q‖² + h²‖e_v‖²) must stay below tol·(‖q‖ + floor), with ‖q‖ the larger of both ends and a floor of 1e-4 of the
-//! model's length scale. The next step is 0.9·err^(−1/4) times the last, between 0.2 and 5 times (Hairer & Wanner 1996,
-//! §IV.8).
+//! model's length scale. The next step is 0.9·err^(−1/p) times the last, between 0.2 and 5 times, where the estimated
+//! error falls with the p-th power of the step (Hairer & Wanner 1996, §IV.8).
 
-use super::rodas4::{Motion, Rodas4};
-use super::{DIRECTIONS, SolveError};
+use super::method::{Method, Motion, StepFailure, Work};
+use super::rodas4::Rodas4;
+use super::{SolveError, WhyFailed};
 use crate::gaps::{Ramp, System};
 use crate::multibody::planar::Pose;
 
@@ -15,13 +17,13 @@ const FLOOR: f64 = 1e-4;
 /// Rejections in a row before giving up.
 const MAX_REJECTED: usize = 40;
 
-/// Work done.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Work {
-    /// Accepted steps.
-    pub steps: u64,
-    /// Rejected steps.
-    pub rejected: u64,
+/// What sets the length of steps.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Control {
+    /// Relative error that a step may make [1].
+    Tolerance(f64),
+    /// Equal steps, as many as are needed for none to be longer than this [s].
+    Fixed(f64),
 }
 
 /// How an advance ended.
@@ -38,51 +40,74 @@ pub enum Advance {
 /// Sees each accepted step: start time, length, motion before and after; answers whether to go on.
 pub type Observer<'a> = &'a mut dyn FnMut(f64, f64, &Motion, &Motion) -> bool;
 
-/// Integrator with error control and its storage.
+/// A method with control of its steps, and the storage for it.
 #[derive(Debug, Clone)]
-pub struct Adaptive {
+pub struct Adaptive<M = Rodas4> {
     /// The method.
-    pub method: Rodas4,
-    /// Work so far.
-    pub work: Work,
+    pub method: M,
+    steps: u64,
+    rejected: u64,
     before: Motion,
     error: Motion,
-    sensitivity_before: Vec<Motion>,
+    carried_before: Vec<Motion>,
     mass: f64,
 }
 
-impl Adaptive {
-    /// Storage for a system, with sensitivities for `ports` ports.
-    pub fn new(system: &System, ports: usize) -> Self {
+impl<M: Method> Adaptive<M> {
+    /// Storage for a method on a system.
+    pub fn new(system: &System, mut method: M) -> Self {
         let n = system.bodies();
         Self {
-            method: Rodas4::new(system, ports),
-            work: Work::default(),
+            carried_before: method.carried().to_vec(),
+            method,
+            steps: 0,
+            rejected: 0,
             before: Motion::zeros(n),
             error: Motion::zeros(n),
-            sensitivity_before: vec![Motion::zeros(n); ports],
             mass: system.model.bodies.iter().map(|b| b.mass).sum(),
         }
     }
 
-    /// Advances `motion` from the start of the ramp to its end, and with it the sensitivities to the sources `ports`. `h` holds the first step to try [s] and receives the step
-    /// that would come next.
+    /// Work so far.
+    pub fn work(&self) -> Work {
+        Work { steps: self.steps, rejected: self.rejected, ..self.method.work() }
+    }
+
+    /// Advances `motion` from the start of the ramp to its end, and with it what the method carries. `h` holds the first
+    /// step to try [s] and receives the step that would come next.
     ///
     /// # Errors
-    /// [`SolveError::StepTooSmall`].
+    /// [`SolveError::StepTooSmall`], [`SolveError::StepFailed`].
     #[allow(clippy::too_many_arguments)]
     pub fn advance(
         &mut self,
         system: &System,
         ramp: &Ramp<'_>,
         motion: &mut Motion,
-        ports: &[usize],
-        sensitivity: &mut [Motion],
+        h: &mut f64,
+        control: Control,
+        max_steps: usize,
+        observe: Observer<'_>,
+    ) -> Result<Advance, SolveError> {
+        self.method.start(system, ramp, motion).map_err(|e| failed(system, 0.0, *h, e))?;
+        match control {
+            Control::Tolerance(tol) => self.controlled(system, ramp, motion, h, tol, max_steps, observe),
+            Control::Fixed(step) => self.equal(system, ramp, motion, step, max_steps, observe),
+        }
+    }
+
+    #[allow(clippy::too_many_arguments)]
+    fn controlled(
+        &mut self,
+        system: &System,
+        ramp: &Ramp<'_>,
+        motion: &mut Motion,
         h: &mut f64,
         tol: f64,
         max_steps: usize,
         observe: Observer<'_>,
     ) -> Result<Advance, SolveError> {
+        let exponent = -1.0 / self.method.error_order();
         let (mut s, mut rejected, mut steps) = (0.0, 0, 0);
         while s < ramp.dt {
             if steps == max_steps {
@@ -91,40 +116,78 @@ impl Adaptive {
             let left = ramp.dt - s;
             // the last two steps share what is left, so that no sliver remains
             let step = if *h >= 0.999 * left { left } else { h.min(0.5 * left.max(*h)) };
-            self.before.q.copy_from_slice(&motion.q);
-            self.before.v.copy_from_slice(&motion.v);
-            for (keep, now) in self.sensitivity_before.iter_mut().zip(sensitivity.iter()) {
-                keep.clone_from(now);
-            }
-            let stepped = self.method.step(system, ramp, s, step, motion, &mut self.error, ports, sensitivity);
+            self.keep(motion);
+            let stepped = self.method.step(system, ramp, s, step, motion, &mut self.error);
             let error = if stepped.is_ok() { self.relative_error(system, motion, step, tol) } else { f64::INFINITY };
             if error <= 1.0 {
                 let last = s + step >= ramp.dt * (1.0 - 1e-14);
                 s = if last { ramp.dt } else { s + step };
                 (rejected, steps) = (0, steps + 1);
-                self.work.steps += 1;
-                let growth = (0.9 * error.max(1e-10).powf(-0.25)).clamp(0.2, 5.0);
+                self.steps += 1;
+                let growth = (0.9 * error.max(1e-10).powf(exponent)).clamp(0.2, 5.0);
                 // a step cut short by the end of the interval says nothing against the longer one
                 *h = if step < *h { h.max(growth * step) } else { growth * step };
                 if !observe(s - step, step, &self.before, motion) {
                     return Ok(Advance::Stopped);
                 }
             } else {
-                motion.q.copy_from_slice(&self.before.q);
-                motion.v.copy_from_slice(&self.before.v);
-                for (keep, now) in self.sensitivity_before.iter().zip(sensitivity.iter_mut()) {
-                    now.clone_from(keep);
-                }
-                self.work.rejected += 1;
+                self.put_back(motion);
+                self.rejected += 1;
                 rejected += 1;
-                let shrink = if error.is_finite() { (0.9 * error.powf(-0.25)).clamp(0.1, 0.8) } else { 0.1 };
+                let shrink = if error.is_finite() { (0.9 * error.powf(exponent)).clamp(0.1, 0.8) } else { 0.1 };
                 *h = shrink * step;
                 if rejected > MAX_REJECTED || *h < 1e-12 * ramp.dt.min(*h * 1e12) || *h < f64::MIN_POSITIVE {
+                    stepped.map_err(|e| failed(system, s, step, e))?;
                     return Err(self.too_small(system, s, step, rejected));
                 }
             }
         }
         Ok(Advance::Done)
+    }
+
+    fn equal(
+        &mut self,
+        system: &System,
+        ramp: &Ramp<'_>,
+        motion: &mut Motion,
+        step: f64,
+        max_steps: usize,
+        observe: Observer<'_>,
+    ) -> Result<Advance, SolveError> {
+        let count = (ramp.dt / step * (1.0 - 1e-9)).ceil().max(1.0) as usize;
+        let at = |k: usize| if k == count { ramp.dt } else { ramp.dt * (k as f64 / count as f64) };
+        for k in 0..count {
+            if k == max_steps {
+                return Ok(Advance::OutOfSteps(at(k)));
+            }
+            let (s, h) = (at(k), at(k + 1) - at(k));
+            self.keep(motion);
+            self.method.step(system, ramp, s, h, motion, &mut self.error).map_err(|e| failed(system, s, h, e))?;
+            if let Some((body, direction)) = not_finite(motion) {
+                return Err(SolveError::step_failed(system, s, h, WhyFailed::NotFinite, body, direction));
+            }
+            self.steps += 1;
+            if !observe(s, h, &self.before, motion) {
+                return Ok(Advance::Stopped);
+            }
+        }
+        Ok(Advance::Done)
+    }
+
+    /// Keeps the start of a step.
+    fn keep(&mut self, motion: &Motion) {
+        self.before.copy(motion);
+        for (keep, now) in self.carried_before.iter_mut().zip(self.method.carried().iter()) {
+            keep.copy(now);
+        }
+    }
+
+    /// Goes back to it.
+    fn put_back(&mut self, motion: &mut Motion) {
+        motion.copy(&self.before);
+        for (keep, now) in self.carried_before.iter().zip(self.method.carried().iter_mut()) {
+            now.copy(keep);
+        }
     }
 
     fn relative_error(&self, system: &System, after: &Motion, h: f64, tol: f64) -> f64 {
@@ -149,14 +212,25 @@ impl Adaptive {
                 }
             }
         }
-        SolveError::StepTooSmall {
-            t,
-            dt,
-            rejected,
-            body: system.model.bodies[body].name.clone(),
-            direction: DIRECTIONS[direction],
+        let body = system.model.bodies[body].name.to_string();
+        SolveError::StepTooSmall { t, dt, rejected, body, direction: super::DIRECTIONS[direction] }
+    }
+}
+
+fn failed(system: &System, t: f64, dt: f64, failure: StepFailure) -> SolveError {
+    match failure {
+        StepFailure::Singular(p) => SolveError::step_failed(system, t, dt, WhyFailed::Singular, p.body, p.direction),
+        StepFailure::Diverged { iterations, body, direction } => {
+            SolveError::step_failed(system, t, dt, WhyFailed::Diverged { iterations }, body, direction)
         }
     }
+}
+
+/// The first body and direction whose motion is not finite.
+fn not_finite(motion: &Motion) -> Option<(usize, usize)> {
+    let wrong = |p: &Pose| p.iter().position(|x| !x.is_finite());
+    let mut pairs = motion.q.iter().zip(&motion.v).enumerate();
+    pairs.find_map(|(j, (q, v))| wrong(q).or_else(|| wrong(v)).map(|i| (j, i)))
 }
 
 /// √(xᵀMx).

@@ -159,7 +159,7 @@ pub fn lowest_modes(system: &System, stiffness: &BlockMatrix<f64, 3>, count: usi
 fn massive_directions(model: &Model) -> usize {
     (model.bodies.iter())
         .map(|b| {
-            let free = |i: usize| b.free.map_or(1.0, |p| p[(i, i)]);
+            let free = |i: usize| b.free.as_ref().map_or(1.0, |p| p[(i, i)]);
             let translations = if b.mass > 0.0 { (free(0) + free(1)).round() as usize } else { 0 };
             translations + usize::from(b.inertia > 0.0 && free(2) > 0.5)
         })

@@ -308,7 +308,7 @@ impl Equilibrium {
             share,
             iterations,
             residual: self.residual[worst].amax(),
-            body: system.model.bodies[worst].name.clone(),
+            body: system.model.bodies[worst].name.to_string(),
         }
     }
 }

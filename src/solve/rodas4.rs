@@ -15,10 +15,12 @@
 //!
 //! Reference: E. Hairer, G. Wanner, "Solving Ordinary Differential Equations II" (1996), §IV.7 and table 7.1 (RODAS).
 
+use super::linear::{LinearSolver, Recursion};
+pub use super::method::Motion;
+use super::method::{Method, StepFailure, Work};
 use crate::gaps::{Drive, Ramp, System};
-use crate::multibody::factor::ZeroPivot;
 use crate::multibody::planar::Pose;
-use crate::multibody::{BlockMatrix, forces};
+use crate::multibody::{BlockMatrix, Pattern, forces};
 
 const GAMMA: f64 = 0.25;
 /// Stage positions α_i and γ_i.
@@ -43,41 +45,10 @@ const C: [[f64; 5]; 6] = [
     [8.083246795921522, -7.981132988064893, -31.52159432874371, 16.31930543123136, -6.058818238834054],
 ];
 
-/// Displacements and rates, or changes of them.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Motion {
-    /// Displacements.
-    pub q: Vec<Pose>,
-    /// Rates.
-    pub v: Vec<Pose>,
-}
-
-impl Motion {
-    /// All zero.
-    pub fn zeros(bodies: usize) -> Self {
-        Self { q: vec![Pose::zeros(); bodies], v: vec![Pose::zeros(); bodies] }
-    }
-
-    fn copy(&mut self, from: &Self) {
-        self.q.copy_from_slice(&from.q);
-        self.v.copy_from_slice(&from.v);
-    }
-
-    fn add(&mut self, factor: f64, other: &Self) {
-        if factor != 0.0 {
-            for (a, b) in self.q.iter_mut().zip(&other.q) {
-                *a += b * factor;
-            }
-            for (a, b) in self.v.iter_mut().zip(&other.v) {
-                *a += b * factor;
-            }
-        }
-    }
-}
-
 /// The method with its storage.
 #[derive(Debug, Clone)]
-pub struct Rodas4 {
+pub struct Rodas4<S = Recursion> {
+    solver: S,
     w: BlockMatrix<f64, 3>,
     stage_tangent: BlockMatrix<f64, 3>,
     stages: Vec<Motion>,
@@ -89,11 +60,11 @@ pub struct Rodas4 {
     drive: Drive,
     rate: Drive,
     change: Drive,
+    sources: Vec<usize>,
     ports: Vec<PortStages>,
-    /// Factorizations so far.
-    pub factorizations: u64,
-    /// Solves so far.
-    pub solves: u64,
+    /// ∂motion/∂(final voltage of a source), one for each source given to [`Rodas4::new`]; advanced with the motion.
+    pub sensitivity: Vec<Motion>,
+    work: Work,
 }
 
 /// Stage storage of one port's sensitivity.
@@ -105,37 +76,43 @@ struct PortStages {
 }
 
 impl Rodas4 {
-    /// Storage for a system; `ports` sensitivities can be carried along.
-    pub fn new(system: &System, ports: usize) -> Self {
+    /// Storage for a system, with sensitivities to the final voltages of `sources`.
+    pub fn new(system: &System, sources: &[usize]) -> Self {
+        Self::with_solver(Recursion, system, sources)
+    }
+}
+
+impl<S: LinearSolver> Rodas4<S> {
+    /// [`Rodas4::new`] with another solver of its linear systems.
+    pub fn with_solver(solver: S, system: &System, sources: &[usize]) -> Self {
         let n = system.bodies();
         let zeros = vec![Pose::zeros(); n];
-        let stages = vec![Motion::zeros(n); 6];
-        let port = PortStages { stages: stages.clone(), at: Motion::zeros(n), forcing: zeros.clone() };
+        let nothing = Pattern::new(0, &[]);
+        let port = |_| PortStages { stages: vec![Motion::zeros(n); 6], at: Motion::zeros(n), forcing: zeros.clone() };
         Self {
+            solver,
             w: BlockMatrix::new(&system.model.pattern),
-            stage_tangent: BlockMatrix::new(&system.model.pattern),
-            stages,
+            // only sensitivities need the tangent of every stage
+            stage_tangent: BlockMatrix::new(if sources.is_empty() { &nothing } else { &system.model.pattern }),
+            stages: vec![Motion::zeros(n); 6],
             at: Motion::zeros(n),
             force: zeros.clone(),
             forcing: zeros.clone(),
             scratch: zeros.clone(),
-            change_work: zeros,
+            change_work: if sources.is_empty() { Vec::new() } else { zeros.clone() },
             drive: system.electrics.drive(),
             rate: system.electrics.drive(),
             change: system.electrics.drive(),
-            ports: vec![port; ports],
-            factorizations: 0,
-            solves: 0,
+            sources: sources.to_vec(),
+            ports: sources.iter().map(port).collect(),
+            sensitivity: vec![Motion::zeros(n); sources.len()],
+            work: Work::default(),
         }
     }
 
+    /// The step of [`Method::step`], with the sensitivities of `sensitivity` beside the motion.
     #[allow(clippy::too_many_arguments)]
-    /// One step of length `h` from `motion` at time `s` of the ramp. The new motion replaces `motion`, and `error` receives
-    /// the embedded estimate. `sensitivity[p]` holds ∂motion/∂(final voltage of source `ports[p]`) and is advanced too.
-    ///
-    /// # Errors
-    /// [`ZeroPivot`] when W cannot be factored; `motion` is then unchanged.
-    pub fn step(
+    fn step_with(
         &mut self,
         system: &System,
         ramp: &Ramp<'_>,
@@ -143,9 +120,8 @@ impl Rodas4 {
         h: f64,
         motion: &mut Motion,
         error: &mut Motion,
-        ports: &[usize],
         sensitivity: &mut [Motion],
-    ) -> Result<(), ZeroPivot> {
+    ) -> Result<(), StepFailure> {
         let model = &system.model;
         let gh = GAMMA * h;
         ramp.at(s, &mut self.drive);
@@ -157,16 +133,14 @@ impl Rodas4 {
         }
         forces::add_inertia(model, 1.0 / (gh * gh), 1.0 / gh, &mut self.w);
         model.project_matrix(&mut self.w);
-        self.w.factor(&model.pattern)?;
-        self.factorizations += 1;
+        self.solver.factor(&model.pattern, &mut self.w)?;
+        self.work.factorizations += 1;
+        self.work.forces += 6;
         ramp.rate(s, &mut self.rate);
         system.drive_force(&motion.q, &self.drive, &self.rate, &mut self.forcing);
-        self.forcing_sensitivities(system, ramp, s, motion, ports);
+        self.forcing_sensitivities(system, ramp, s, motion);
         for i in 0..6 {
-            self.at.copy(motion);
-            for (stage, a) in self.stages[..i].iter().zip(A[i]) {
-                self.at.add(a, stage);
-            }
+            combine(&mut self.at, motion, &self.stages[..i], &A[i]);
             if i > 0 {
                 ramp.at(s + ALPHA[i] * h, &mut self.drive);
                 if sensitivity.is_empty() {
@@ -177,14 +151,14 @@ impl Rodas4 {
             }
             // sensitivities first: they need this stage's tangent, and `force` is consumed below
             for (p, start) in sensitivity.iter().enumerate() {
-                self.sensitivity_stage(system, ramp, s, h, i, (p, ports[p]), start);
+                self.sensitivity_stage(system, ramp, s, h, i, p, start);
             }
             forces::add_damping(model, &self.at.v, &mut self.force);
             let (before, rest) = self.stages.split_at_mut(i);
             let stage = &mut rest[0];
             finish_stage(
                 system,
-                &self.w,
+                (&self.solver, &self.w),
                 before,
                 i,
                 h,
@@ -194,7 +168,7 @@ impl Rodas4 {
                 stage,
                 &mut self.scratch,
             );
-            self.solves += 1;
+            self.work.solves += 1;
         }
         // stiffly accurate: the last stage's argument plus its increment is the new value, the increment the error
         motion.copy(&self.at);
@@ -208,8 +182,8 @@ impl Rodas4 {
     }
 
     /// ∂(∂r/∂drive·rate)/∂(final voltage) of each port at the start of the step.
-    fn forcing_sensitivities(&mut self, system: &System, ramp: &Ramp<'_>, s: f64, motion: &Motion, sources: &[usize]) {
-        for (port, &source) in self.ports.iter_mut().zip(sources) {
+    fn forcing_sensitivities(&mut self, system: &System, ramp: &Ramp<'_>, s: f64, motion: &Motion) {
+        for (port, &source) in self.ports.iter_mut().zip(&self.sources) {
             ramp.rate_sensitivity(s, source, &mut self.change);
             system.drive_force(&motion.q, &self.drive, &self.change, &mut port.forcing);
             // forces are quadratic in gap voltages: the voltage that rate acts on changes too
@@ -230,15 +204,12 @@ impl Rodas4 {
         s: f64,
         h: f64,
         i: usize,
-        (p, source): (usize, usize),
+        p: usize,
         start: &Motion,
     ) {
         let port = &mut self.ports[p];
-        port.at.copy(start);
-        for (stage, a) in port.stages[..i].iter().zip(A[i]) {
-            port.at.add(a, stage);
-        }
-        ramp.sensitivity(s + ALPHA[i] * h, source, &mut self.change);
+        combine(&mut port.at, start, &port.stages[..i], &A[i]);
+        ramp.sensitivity(s + ALPHA[i] * h, self.sources[p], &mut self.change);
         let force = &mut self.scratch;
         system.drive_force(&self.at.q, &self.drive, &self.change, force);
         self.stage_tangent.multiply_add(&system.model.pattern, &port.at.q, force);
@@ -247,18 +218,60 @@ impl Rodas4 {
         let force = std::mem::take(&mut self.scratch);
         let (before, rest) = port.stages.split_at_mut(i);
         let mut work = std::mem::take(&mut self.change_work);
-        finish_stage(system, &self.w, before, i, h, &port.at.v, &force, &port.forcing, &mut rest[0], &mut work);
+        let matrix = (&self.solver, &self.w);
+        finish_stage(system, matrix, before, i, h, &port.at.v, &force, &port.forcing, &mut rest[0], &mut work);
         self.scratch = force;
         self.change_work = work;
-        self.solves += 1;
+        self.work.solves += 1;
+    }
+}
+
+impl<S: LinearSolver> Method for Rodas4<S> {
+    fn error_order(&self) -> f64 {
+        4.0
+    }
+
+    fn step(
+        &mut self,
+        system: &System,
+        ramp: &Ramp<'_>,
+        s: f64,
+        h: f64,
+        motion: &mut Motion,
+        error: &mut Motion,
+    ) -> Result<(), StepFailure> {
+        let mut sensitivity = std::mem::take(&mut self.sensitivity);
+        let done = self.step_with(system, ramp, s, h, motion, error, &mut sensitivity);
+        self.sensitivity = sensitivity;
+        done
+    }
+
+    fn carried(&mut self) -> &mut [Motion] {
+        &mut self.sensitivity
+    }
+
+    fn work(&self) -> Work {
+        self.work
+    }
+}
+
+/// `at = from + Σ factors[j]·before[j]`, in one pass.
+fn combine(at: &mut Motion, from: &Motion, before: &[Motion], factors: &[f64; 5]) {
+    for (k, (q, v)) in at.q.iter_mut().zip(&mut at.v).enumerate() {
+        let (mut sum_q, mut sum_v) = (from.q[k], from.v[k]);
+        for (stage, &factor) in before.iter().zip(factors) {
+            sum_q += stage.q[k] * factor;
+            sum_v += stage.v[k] * factor;
+        }
+        (*q, *v) = (sum_q, sum_v);
     }
 }
 
 /// Solves one stage: `force` is r + C·v at the stage, `forcing` ∂r/∂t at the start of the step.
 #[allow(clippy::too_many_arguments)]
-fn finish_stage(
+fn finish_stage<S: LinearSolver>(
     system: &System,
-    w: &BlockMatrix<f64, 3>,
+    (solver, w): (&S, &BlockMatrix<f64, 3>),
     before: &[Motion],
     i: usize,
     h: f64,
@@ -270,24 +283,26 @@ fn finish_stage(
 ) {
     let model = &system.model;
     let gh = GAMMA * h;
+    let c = C[i].map(|c| c / h);
     // r₁ into stage.v, and its damping force into `damped`
     for (k, r1) in stage.v.iter_mut().enumerate() {
-        *r1 = v[k];
-        for (j, u) in before.iter().enumerate() {
-            *r1 += u.q[k] * (C[i][j] / h);
+        let mut sum = v[k];
+        for (u, c) in before.iter().zip(c) {
+            sum += u.q[k] * c;
         }
+        *r1 = sum;
     }
     damped.fill(Pose::zeros());
     forces::add_damping(model, &stage.v, damped);
     for (k, b) in stage.q.iter_mut().enumerate() {
         let mut momentum = stage.v[k] / gh;
-        for (j, u) in before.iter().enumerate() {
-            momentum += u.v[k] * (C[i][j] / h);
+        for (u, c) in before.iter().zip(c) {
+            momentum += u.v[k] * c;
         }
         *b = damped[k] - force[k] - forcing[k] * (GAMMA_I[i] * h) + model.mass(k).component_mul(&momentum);
     }
     model.project(&mut stage.q);
-    w.solve(&model.pattern, &mut stage.q);
+    solver.solve(&model.pattern, w, &mut stage.q);
     for (r1, u) in stage.v.iter_mut().zip(&stage.q) {
         *r1 = u / gh - *r1;
     }
@@ -315,18 +330,17 @@ mod tests {
     fn run(steps: usize, end: f64) -> (f64, f64) {
         let compiled = compile(&Bundle::from_text("plate", PLATE), &CompileOptions::default()).unwrap();
         let system = &compiled.parts.system;
-        let mut rodas = Rodas4::new(system, 1);
+        let mut rodas = Rodas4::new(system, &[0]);
         let (mut motion, mut error) = (Motion::zeros(1), Motion::zeros(1));
-        let mut sensitivity = vec![Motion::zeros(1)];
         let (from, to) = ([2.0], [end]);
         let ramp = Ramp { electrics: &system.electrics, from: &from, to: &to, rise: &[], dt: 4e-5 };
         let h = ramp.dt / steps as f64;
         for k in 0..steps {
             let s = k as f64 * h;
-            rodas.step(system, &ramp, s, h, &mut motion, &mut error, &[0], &mut sensitivity).unwrap();
+            rodas.step(system, &ramp, s, h, &mut motion, &mut error).unwrap();
         }
-        assert_eq!((rodas.factorizations, rodas.solves), (steps as u64, 12 * steps as u64));
-        (motion.q[0].x, sensitivity[0].q[0].x)
+        assert_eq!((rodas.work.factorizations, rodas.work.solves), (steps as u64, 12 * steps as u64));
+        (motion.q[0].x, rodas.sensitivity[0].q[0].x)
     }
 
     /// Halving the step divides the error by about 2⁴ on a nonlinear, driven oscillator.

@@ -269,6 +269,17 @@ pub struct VoltageSource {
     pub voltage: f64,
 }
 
+/// How a heated beam loses its strength against pressure along it, so that it is shortened for good (backbending).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Yield {
+    /// Index of the beam in [`Structure::beams`].
+    pub beam: usize,
+    /// Yield stress at ambient temperature [Pa].
+    pub stress: f64,
+    /// Temperature at which no strength is left [K].
+    pub softening: f64,
+}
+
 /// An electrical port: a pair of nodes that a circuit drives.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Port {
@@ -309,6 +320,9 @@ pub struct Structure {
     pub voltage_sources: Vec<VoltageSource>,
     /// Nodes at electrical ground (SUGAR's `eground`).
     pub electrical_grounds: Vec<NodeId>,
+    /// Heated beams that can yield.
+    #[serde(default)]
+    pub yields: Vec<Yield>,
     /// Ports, in netlist order.
     pub ports: Vec<Port>,
     /// Finds nodes by name; fills itself. Takes no part in comparisons.

@@ -1,12 +1,7 @@
 //! Each analysis prints the JSON that is documented, in SI, against closed forms.
 
-use crate::bench::{Bench, CANTILEVER, PLATE};
+use crate::bench::{Bench, CANTILEVER, PLATE, number};
 use approx::assert_relative_eq;
-use serde_json::Value;
-
-fn number(value: &Value) -> f64 {
-    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
-}
 
 /// `check` counts what is there and fails nowhere.
 #[test]
@@ -75,6 +70,25 @@ fn transient() {
     assert_eq!((&found["units"]["b.y"], &found["units"]["b.rz"]), (&"m".into(), &"rad".into()));
     assert_eq!(found["release"], "F");
     assert!(found["counters"]["steps"].as_u64() > Some(10));
+}
+
+/// Every implicit method finds the same passages of a released cantilever through its middle, with times and directions, and
+/// says in the JSON which method it was and what it did.
+#[test]
+fn transient_methods() {
+    let bench = Bench::new(&[("c.net", CANTILEVER)]);
+    let words = "tran c.net --set F=1u --release F --stop 8u --points 3 --undamped --linear --band 2M --event b.y=0";
+    let times = |found: &serde_json::Value| -> Vec<f64> {
+        found["events"].as_array().expect("events").iter().map(|e| number(&e["t"])).collect()
+    };
+    let first = times(&bench.json(words));
+    assert!(!first.is_empty());
+    for method in ["avf", "midpoint", "tr-bdf2", "generalized-alpha", "newmark", "radau5"] {
+        let found = bench.json(&format!("{words} --method {method} --step 5n"));
+        assert_eq!((found["method"].as_str(), found["counters"]["steps"].as_u64()), (Some(method), Some(1600)));
+        assert_eq!((&found["events"][0]["signal"], &found["events"][0]["direction"]), (&"b.y".into(), &"down".into()));
+        assert_relative_eq!(times(&found)[0], first[0], max_relative = 1e-2);
+    }
 }
 
 /// Shards of a sweep put together are the whole sweep, to the byte, on any number of threads.

@@ -64,6 +64,11 @@ impl Bench {
     }
 }
 
+/// A number in a JSON document.
+pub(crate) fn number(value: &serde_json::Value) -> f64 {
+    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
+}
+
 /// A cantilever of 100 x 2 x 2 µm with a force F at its tip [b]; E = 165 GPa.
 pub(crate) const CANTILEVER: &str =
     "process p = [Youngsmodulus=165e9 Poisson=0.3 density=2300 viscosity=1.78e-5 fluid=2u h=2u]

@@ -2,6 +2,7 @@
 
 mod analyses;
 mod bench;
+mod chart;
 mod errors;
 mod outputs;
 mod service;

@@ -1,9 +1,15 @@
 //! What the models compute, against closed forms and published or independently computed numbers.
 
+mod backbending;
+mod baselines;
 mod beams;
 mod electrothermal;
+mod examples;
+mod formulations;
 mod gaps;
+mod integrators;
 mod motion;
+mod paths;
 mod scenes;
 
 use bimorph::analysis::statics::{NodeMotion, StaticResult, static_equilibrium};

@@ -11,7 +11,7 @@ fn run(compiled: &Compiled, options: &TransientOptions<'_>) -> (Vec<f64>, Vec<f6
 }
 
 fn options<'a>(stop: f64, release: Option<&'a Compiled>) -> TransientOptions<'a> {
-    TransientOptions { stop, signals: vec!["m.x".into()], points: 201, tol: 1e-3, voltages: vec![], release }
+    TransientOptions { stop, signals: vec!["m.x".into()], points: 201, release, ..TransientOptions::default() }
 }
 
 const OSCILLATOR: &str = "

@@ -65,10 +65,8 @@ fn quarter_stage_release() {
     let asked = TransientOptions {
         stop: 24e-6,
         signals: vec!["c.x".into()],
-        points: 1001,
-        tol: 1e-3,
-        voltages: vec![],
         release: Some(&held),
+        ..TransientOptions::default()
     };
     let found = transient(&free, &asked, &mut |_, _| {}, &mut |_| true).unwrap();
     let x = &found.signals[0].2;

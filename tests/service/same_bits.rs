@@ -1,6 +1,7 @@
 //! A model on a server and the same model in process give the same bits: trials, small signals, analyses and sweeps.
 
 use super::running::{DEADLINE, PLATE, Running, bundle, start_with};
+use bimorph::analysis::integrator::Integrator;
 use bimorph::analysis::transient::{TransientOptions, transient};
 use bimorph::analysis::{modes::modes, pull_in::pull_in, statics::static_equilibrium};
 use bimorph::compile::{CompileOptions, Compiled, compile};
@@ -117,7 +118,9 @@ fn analyses_have_the_same_bits() {
         points: 101,
         tol: 1e-4,
         voltages: volts.to_vec(),
-        release: None,
+        method: Integrator::TrBdf2,
+        events: vec![("m.x".into(), 1e-8)],
+        ..TransientOptions::default()
     };
     let local = transient(&here, &options, &mut |_, _| {}, &mut |_| true).expect("runs");
     let remote = RemoteTransient {
@@ -126,7 +129,9 @@ fn analyses_have_the_same_bits() {
         points: options.points,
         tol: options.tol,
         voltages: options.voltages.clone(),
-        release: None,
+        method: options.method,
+        events: options.events.clone(),
+        ..RemoteTransient::default()
     };
     let mut told = 0.0;
     let there = client.transient(&model, &remote, &mut |fraction| {

@@ -4,7 +4,7 @@ use super::super::drawing::Fact;
 use super::super::rotation::Rotation;
 use super::super::sink::Reported;
 use super::arguments::Site;
-use crate::structure::{Beam, Heater, Link, NodeId, Resistor};
+use crate::structure::{Beam, Heater, Link, Load, NodeId, Resistor, Yield};
 
 /// A layer's `thermcond` below this is no conductivity of a solid structural material [W/(m·K)]. The MUMPs process
 /// file of SUGAR has 2.33, which is the digits of silicon's expansion coefficient.
@@ -55,7 +55,20 @@ impl Site<'_, '_> {
     pub(super) fn add_beam(&mut self, name: String, ends: [NodeId; 2], width: f64) -> Result<(), Reported> {
         let length = self.positive_if_any("l")?;
         let beam = self.beam(name, ends, width, length)?;
+        self.bow(&beam)?;
         self.drawing.add_beam(self.instance.span, beam, length.is_some());
+        Ok(())
+    }
+
+    /// A rest curvature [1/m], positive to the left of the beam's direction, as the pair of end moments E·I·curvature that
+    /// is the same thing: the moment is constant along the beam and does not turn with it.
+    fn bow(&mut self, beam: &Beam) -> Result<(), Reported> {
+        let Some(curvature) = self.number("curvature")?.filter(|c| *c != 0.0) else { return Ok(()) };
+        let bending = beam.material.youngs_modulus * beam.thickness * beam.width.powi(3) / 12.0;
+        for (node, sign) in [(beam.a, -1.0), (beam.b, 1.0)] {
+            let name = format!("{}.bow", beam.name);
+            self.drawing.structure.loads.push(Load { name, node, force: [0.0; 2], moment: sign * bending * curvature });
+        }
         Ok(())
     }
 
@@ -127,6 +140,17 @@ pub(super) fn beam2det(site: &mut Site<'_, '_>) -> Result<(), Reported> {
     beam.temperature = None;
     beam.heater = Some(Heater { resistance, conductance: conductivity * width * height / length, time_constant });
     site.drawing.electrical(&[a, b]);
+    let ambient = beam.material.ambient_temperature;
+    if let (Some(stress), Some(softening)) = (site.positive_if_any("yieldstress")?, site.positive_if_any("softening")?)
+    {
+        if softening <= ambient {
+            let message = format!("`softening` is {softening} K, not above the ambient temperature of {ambient} K");
+            return Err(site.error("E060", message, "give the temperature at which no strength is left [K]"));
+        }
+        let beam = site.drawing.structure.beams.len();
+        site.drawing.structure.yields.push(Yield { beam, stress, softening });
+    }
+    site.bow(&beam)?;
     site.drawing.add_beam(site.instance.span, beam, true);
     Ok(())
 }

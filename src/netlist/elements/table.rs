@@ -39,6 +39,8 @@ pub(super) const LAYER_ENTRIES: &[&str] = &[
     "ambienttemperature",
     "thermcond",
     "specificheat",
+    "yieldstress",
+    "softening",
     "h",
     "layer",
 ];
@@ -47,8 +49,8 @@ pub(super) const LAYER_ENTRIES: &[&str] = &[
 pub(super) const STRAY: &[&str] =
     &["R", "R1", "R2", "Rs", "R_insulator", "G", "G1", "G2", "V", "l", "w", "w1", "w2", "h", "x", "y", "z", "T"];
 
-const BEAM: &[&str] = &["l", "w", "h", "T"];
-const BEAM_E: &[&str] = &["l", "w", "h", "T", "R", "G", "resistivity"];
+const BEAM: &[&str] = &["l", "w", "h", "T", "curvature"];
+const BEAM_E: &[&str] = &["l", "w", "h", "T", "curvature", "R", "G", "resistivity"];
 const LINK: &[&str] = &["l", "w", "h", "T", "L1", "ox1", "oy1", "oz1", "L2", "ox2", "oy2", "oz2"];
 const SIZE: &[&str] = &["l", "w", "h"];
 const GAP: &[&str] = &["l", "w", "w1", "w2", "gap", "h", "V", "permittivity"];
@@ -119,7 +121,21 @@ pub(crate) const MODELS: &[Model] = &[
         "beam2det",
         &[2],
         "[a b]",
-        &["l", "w", "h", "R", "G", "resistivity", "thermcond", "thermalexpansion", "tau", "specificheat"],
+        &[
+            "l",
+            "w",
+            "h",
+            "R",
+            "G",
+            "resistivity",
+            "thermcond",
+            "thermalexpansion",
+            "tau",
+            "specificheat",
+            "yieldstress",
+            "softening",
+            "curvature",
+        ],
         beam::beam2det,
     ),
     own("port", &[1, 2], "[plus] or [plus minus]", &[], circuit::port),
@@ -180,6 +196,9 @@ pub(super) fn meaning(name: &str) -> &'static str {
         "ambienttemperature" => "ambient temperature [K]",
         "thermcond" => "thermal conductivity [W/(m·K)]",
         "specificheat" => "specific heat [J/(kg·K)]",
+        "yieldstress" => "yield stress at ambient temperature [Pa]",
+        "softening" => "temperature without strength [K]",
+        "curvature" => "rest curvature [1/m]",
         _ => "angle [rad]",
     }
 }

@@ -38,8 +38,10 @@ pub fn prefix(size: f64) -> (f64, &'static str) {
 
 /// A quantity for people: four significant digits and an SI prefix ("86.31 kHz").
 pub fn quantity(value: f64, unit: &str) -> String {
-    let prefixed =
-        matches!(unit, "m" | "s" | "Hz" | "V" | "A" | "W" | "C" | "F" | "N" | "S" | "rad" | "m/s" | "rad/s" | "Ω");
+    let prefixed = matches!(
+        unit,
+        "m" | "s" | "Hz" | "V" | "A" | "W" | "C" | "F" | "N" | "S" | "rad" | "m/s" | "rad/s" | "Ω" | "N·m" | "Pa"
+    );
     let (factor, name) = if prefixed { prefix(value) } else { (1.0, "") };
     let scaled = value / factor;
     let digits = if scaled == 0.0 { 0 } else { (3 - scaled.abs().log10().floor() as i32).clamp(0, 9) as usize };

@@ -3,9 +3,14 @@
 //! Everything is drawn as SVG first ([`svg`]). PNG is that SVG put into pixels with a font that travels inside the
 //! program, so it needs nothing installed; HTML is a small page around it. The same result draws the same bytes.
 
+pub mod animation;
 pub mod axis;
 pub mod chart;
+pub mod log_axis;
+pub mod loglog;
 pub mod mechanism;
+mod parts;
+pub mod plane;
 #[cfg(feature = "server")]
 pub mod render;
 pub mod shapes;

@@ -1,6 +1,6 @@
 //! Outlines of drawn parts in metres: a bent beam, a plate, the fingers of a comb.
 
-use crate::structure::{Beam, Comb, Mass, Structure};
+use crate::structure::{Comb, Mass, Structure};
 
 /// Displacement of a node: x, y [m] and rotation [rad].
 pub type Motion = [f64; 3];
@@ -8,60 +8,95 @@ pub type Motion = [f64; 3];
 /// A point in the plane [m].
 pub type Point = [f64; 2];
 
-/// Pieces into which a bent beam is divided.
+/// Pieces into which a whole bent beam is divided at least.
 const PIECES: usize = 14;
 
-fn moved(structure: &Structure, node: usize, motion: &[Motion]) -> (Point, f64) {
-    let [x, y] = structure.nodes[node].position;
-    let [u, v, turn] = motion.get(node).copied().unwrap_or_default();
-    ([x + u, y + v], turn)
+/// Displacements to draw, already enlarged.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Moved<'a> {
+    /// Of each node by [`crate::structure::NodeId`]; empty: at rest.
+    pub nodes: &'a [Motion],
+    /// Of points along each beam, equally spaced, ends included; empty: from the beam's ends alone.
+    pub curves: &'a [Vec<Motion>],
+    /// Displacements are enlarged: slopes grow with them, instead of turning round and round.
+    pub enlarged: bool,
 }
 
-/// The outline of a beam whose ends moved. Its centreline is the cubic through both ends with their directions, which
-/// for small motion is the shape of a beam loaded at its ends alone.
-pub fn beam_outline(structure: &Structure, beam: &Beam, motion: &[Motion]) -> Vec<Point> {
-    let (a, turn_a) = moved(structure, beam.a.0, motion);
-    let (b, turn_b) = moved(structure, beam.b.0, motion);
-    let chord = [b[0] - a[0], b[1] - a[1]];
-    let length = chord[0].hypot(chord[1]);
-    // Where the drawing does not close, the line through the nodes is shown, not the nominal angle.
-    let [ra, rb] = [beam.a.0, beam.b.0].map(|n| structure.nodes[n].position);
-    let rest = (rb[1] - ra[1]).atan2(rb[0] - ra[0]);
-    let tangent = |turn: f64| [length * (rest + turn).cos(), length * (rest + turn).sin()];
-    let (ta, tb) = (tangent(turn_a), tangent(turn_b));
-    let straight = turn_a == 0.0 && turn_b == 0.0;
-    let pieces = if straight { 1 } else { PIECES };
+impl Moved<'_> {
+    fn node(&self, structure: &Structure, node: usize) -> (Point, f64) {
+        let [x, y] = structure.nodes[node].position;
+        let [u, v, turn] = self.nodes.get(node).copied().unwrap_or_default();
+        ([x + u, y + v], if self.enlarged { turn.atan() } else { turn })
+    }
+}
 
+/// The outline of the `index`-th beam. Its centreline is the cubic through neighbouring points with their directions, which
+/// for small motion is the shape of a beam loaded at these points alone.
+pub fn beam_outline(structure: &Structure, index: usize, moved: &Moved<'_>) -> Vec<Point> {
+    let beam = &structure.beams[index];
+    let [a, b] = [beam.a.0, beam.b.0].map(|n| structure.nodes[n].position);
+    let ends = [beam.a.0, beam.b.0].map(|n| moved.nodes.get(n).copied().unwrap_or_default());
+    let along = moved.curves.get(index).map(Vec::as_slice).filter(|c| c.len() >= 2).unwrap_or(&ends);
+    let segments = along.len() - 1;
+    let straight = along.iter().all(|m| *m == [0.0; 3]);
+    // fine enough for the eye where it turns far
+    let turns = along.windows(2).map(|m| (m[1][2] - m[0][2]).abs()).fold(0.0, f64::max);
+    let pieces = if straight { 1 } else { PIECES.div_ceil(segments).max(4).max((turns / 0.08).min(60.0) as usize) };
+    // Where the drawing does not close, the line through the nodes is shown, not the nominal angle.
+    let step = [(b[0] - a[0]) / segments as f64, (b[1] - a[1]) / segments as f64];
+    let length = step[0].hypot(step[1]);
+    let point = |k: usize| [a[0] + k as f64 * step[0] + along[k][0], a[1] + k as f64 * step[1] + along[k][1]];
+    let tangent = |k: usize, chord: f64| {
+        let turn = along[k][2];
+        if moved.enlarged {
+            [step[0] - turn * step[1], step[1] + turn * step[0]]
+        } else {
+            let (sin, cos) = turn.sin_cos();
+            let stretch = chord / length.max(f64::MIN_POSITIVE);
+            [stretch * (cos * step[0] - sin * step[1]), stretch * (sin * step[0] + cos * step[1])]
+        }
+    };
     let (mut left, mut right) = (Vec::new(), Vec::new());
-    for k in 0..=pieces {
-        let s = k as f64 / pieces as f64;
-        let (s2, s3) = (s * s, s * s * s);
-        let at = |i: usize| {
-            (2.0 * s3 - 3.0 * s2 + 1.0) * a[i]
-                + (s3 - 2.0 * s2 + s) * ta[i]
-                + (3.0 * s2 - 2.0 * s3) * b[i]
-                + (s3 - s2) * tb[i]
-        };
-        let slope = |i: usize| {
-            (6.0 * s2 - 6.0 * s) * (a[i] - b[i]) + (3.0 * s2 - 4.0 * s + 1.0) * ta[i] + (3.0 * s2 - 2.0 * s) * tb[i]
-        };
-        let direction = [slope(0), slope(1)];
-        let size = direction[0].hypot(direction[1]).max(f64::MIN_POSITIVE);
-        let normal = [-direction[1] / size * beam.width / 2.0, direction[0] / size * beam.width / 2.0];
-        left.push([at(0) + normal[0], at(1) + normal[1]]);
-        right.push([at(0) - normal[0], at(1) - normal[1]]);
+    for segment in 0..if straight { 1 } else { segments } {
+        let (p, q) = if straight { (point(0), point(segments)) } else { (point(segment), point(segment + 1)) };
+        let chord = (q[0] - p[0]).hypot(q[1] - p[1]);
+        let last = if straight { segments } else { segment + 1 };
+        let (tp, tq) = (tangent(segment, chord), tangent(last, chord));
+        for k in usize::from(segment > 0)..=pieces {
+            let s = k as f64 / pieces as f64;
+            let (at, slope) = hermite(s, [p, tp, q, tq]);
+            let size = slope[0].hypot(slope[1]).max(f64::MIN_POSITIVE);
+            let normal = [-slope[1] / size * beam.width / 2.0, slope[0] / size * beam.width / 2.0];
+            left.push([at[0] + normal[0], at[1] + normal[1]]);
+            right.push([at[0] - normal[0], at[1] - normal[1]]);
+        }
     }
     left.extend(right.into_iter().rev());
     left
 }
 
+/// Point and derivative at `s` of the cubic from p with derivative tp to q with derivative tq.
+fn hermite(s: f64, [p, tp, q, tq]: [Point; 4]) -> (Point, Point) {
+    let (s2, s3) = (s * s, s * s * s);
+    let at = |i: usize| {
+        (2.0 * s3 - 3.0 * s2 + 1.0) * p[i]
+            + (s3 - 2.0 * s2 + s) * tp[i]
+            + (3.0 * s2 - 2.0 * s3) * q[i]
+            + (s3 - s2) * tq[i]
+    };
+    let slope = |i: usize| {
+        (6.0 * s2 - 6.0 * s) * (p[i] - q[i]) + (3.0 * s2 - 4.0 * s + 1.0) * tp[i] + (3.0 * s2 - 2.0 * s) * tq[i]
+    };
+    ([at(0), at(1)], [slope(0), slope(1)])
+}
+
 /// The outline of a plate whose node moved; none for a lumped mass.
-pub fn plate_outline(structure: &Structure, mass: &Mass, motion: &[Motion]) -> Option<Vec<Point>> {
+pub fn plate_outline(structure: &Structure, mass: &Mass, motion: &Moved<'_>) -> Option<Vec<Point>> {
     let [along, across, angle] = mass.outline;
     if along <= 0.0 || across <= 0.0 {
         return None;
     }
-    let (centre, turn) = moved(structure, mass.node.0, motion);
+    let (centre, turn) = motion.node(structure, mass.node.0);
     Some(rectangle(centre, angle + turn, [-along / 2.0, along / 2.0], [-across / 2.0, across / 2.0]))
 }
 
@@ -76,9 +111,9 @@ pub fn rectangle(origin: Point, angle: f64, along: [f64; 2], across: [f64; 2]) -
 ///
 /// The roots of the two sides are two finger lengths less the overlap apart, which gives the length. How wide a finger
 /// is the netlist does not say: it is drawn as wide as its gap.
-pub fn comb_outlines(structure: &Structure, comb: &Comb, motion: &[Motion]) -> (Vec<Vec<Point>>, Vec<Vec<Point>>) {
-    let (rotor, turn) = moved(structure, comb.a.0, motion);
-    let (stator, _) = moved(structure, comb.b.0, &[]);
+pub fn comb_outlines(structure: &Structure, comb: &Comb, motion: &Moved<'_>) -> (Vec<Vec<Point>>, Vec<Vec<Point>>) {
+    let (rotor, turn) = motion.node(structure, comb.a.0);
+    let (stator, _) = Moved::default().node(structure, comb.b.0);
     let rest = structure.nodes[comb.a.0].position;
     let apart = (stator[0] - rest[0]) * comb.axis[0] + (stator[1] - rest[1]) * comb.axis[1];
     let length = ((apart + comb.overlap) / 2.0).max(comb.gap);
@@ -105,9 +140,9 @@ pub fn comb_outlines(structure: &Structure, comb: &Comb, motion: &[Motion]) -> (
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::structure::{Material, Node, NodeId};
+    use crate::structure::{Beam, Material, Node, NodeId};
 
-    fn cantilever() -> (Structure, Beam) {
+    fn cantilever() -> Structure {
         let material = Material {
             youngs_modulus: 1.0,
             poisson: 0.0,
@@ -119,7 +154,6 @@ mod tests {
             stress: 0.0,
         };
         let node = |x| Node { name: String::new(), position: [x, 0.0], mechanical: true, electrical: false };
-        let structure = Structure { nodes: vec![node(0.0), node(1.0)], ..Structure::default() };
         let beam = Beam {
             name: "b".into(),
             a: NodeId(0),
@@ -132,23 +166,38 @@ mod tests {
             temperature: None,
             heater: None,
         };
-        (structure, beam)
+        Structure { nodes: vec![node(0.0), node(1.0)], beams: vec![beam], ..Structure::default() }
+    }
+
+    /// The middle of an outline's sides.
+    fn middle(outline: &[Point]) -> f64 {
+        let half = outline.len() / 4;
+        f64::midpoint(outline[half][1], outline[outline.len() - 1 - half][1])
     }
 
     /// A beam at rest is its rectangle.
     #[test]
     fn at_rest() {
-        let (structure, beam) = cantilever();
-        assert_eq!(beam_outline(&structure, &beam, &[]), [[0.0, 0.1], [1.0, 0.1], [1.0, -0.1], [0.0, -0.1]]);
+        let outline = beam_outline(&cantilever(), 0, &Moved::default());
+        assert_eq!(outline, [[0.0, 0.1], [1.0, 0.1], [1.0, -0.1], [0.0, -0.1]]);
     }
 
-    /// The middle of an end-loaded cantilever moves by 5/16 of its tip: v(s) = (3s² − s³)/2 at s = 1/2.
+    /// The middle of an end-loaded cantilever moves by 5/16 of its tip: v(s) = (3s² − s³)/2 at s = 1/2, enlarged or not.
     #[test]
     fn bent() {
-        let (structure, beam) = cantilever();
         let tip = 1e-3;
-        let outline = beam_outline(&structure, &beam, &[[0.0; 3], [0.0, tip, 1.5 * tip]]);
-        let middle = f64::midpoint(outline[PIECES / 2][1], outline[outline.len() - 1 - PIECES / 2][1]);
-        approx::assert_relative_eq!(middle, 5.0 / 16.0 * tip, max_relative = 1e-4);
+        for enlarged in [false, true] {
+            let moved = Moved { nodes: &[[0.0; 3], [0.0, tip, 1.5 * tip]], curves: &[], enlarged };
+            let outline = beam_outline(&cantilever(), 0, &moved);
+            approx::assert_relative_eq!(middle(&outline), 5.0 / 16.0 * tip, max_relative = 1e-4);
+        }
+    }
+
+    /// A beam that bends between ends at rest shows it where points along it are known.
+    #[test]
+    fn bent_between_its_ends() {
+        let curves = [vec![[0.0; 3], [0.0, 0.1, 0.0], [0.0; 3]]];
+        let moved = Moved { nodes: &[[0.0; 3], [0.0; 3]], curves: &curves, enlarged: true };
+        approx::assert_relative_eq!(middle(&beam_outline(&cantilever(), 0, &moved)), 0.1, max_relative = 1e-12);
     }
 }

@@ -1,6 +1,7 @@
 //! Analyses and sweeps on a server.
 
 use super::link::{Link, reason};
+use crate::analysis::integrator::Integrator;
 use crate::analysis::modes::ModesResult;
 use crate::analysis::pull_in::PullInResult;
 use crate::analysis::statics::StaticResult;
@@ -54,6 +55,12 @@ pub struct RemoteTransient {
     pub voltages: Vec<(String, f64)>,
     /// Model whose static equilibrium is the initial state; none: at rest as drawn.
     pub release: Option<String>,
+    /// What integrates.
+    pub method: Integrator,
+    /// Length of equal steps [s]; none: steps follow `tol`.
+    pub step: Option<f64>,
+    /// Crossings to find: (signal name, level in the signal's unit).
+    pub events: Vec<(String, f64)>,
 }
 
 impl Client {
@@ -134,6 +141,13 @@ impl Client {
             tol: options.tol,
             voltages: named(&options.voltages),
             release_model: options.release.clone().unwrap_or_default(),
+            method: options.method.name().to_owned(),
+            rho: match options.method {
+                Integrator::GeneralizedAlpha { rho } => Some(rho),
+                _ => None,
+            },
+            step_s: options.step.unwrap_or_default(),
+            events: named(&options.events),
         };
         let mut rpc = self.link.rpc.clone();
         let mut events = self.call(rpc.transient(request))?;

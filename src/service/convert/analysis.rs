@@ -4,8 +4,9 @@ use super::{named, pairs};
 use crate::analysis::modes::ModesResult;
 use crate::analysis::pull_in::PullInResult;
 use crate::analysis::statics::{NodeMotion, StaticResult};
-use crate::analysis::transient::{Counters, TransientResult};
+use crate::analysis::transient::{Counters, Event, TransientResult};
 use crate::service::proto;
+use crate::solve::event::Direction;
 
 fn size(n: u64) -> usize {
     usize::try_from(n).unwrap_or(usize::MAX)
@@ -81,9 +82,26 @@ pub fn pull_in_from_wire(wire: proto::PullInResponse) -> PullInResult {
 
 /// The end of a transient as it travels.
 pub fn summary_to_wire(result: &TransientResult) -> proto::TransientSummary {
-    let Counters { steps, rejected, factorizations, solves } = result.counters;
+    let Counters { steps, rejected, factorizations, solves, forces, iterations } = result.counters;
+    let events = result.events.iter().map(|e| proto::Crossing {
+        signal: e.signal.clone(),
+        level: e.level,
+        t: e.t,
+        up: e.direction == Direction::Up,
+        contact: e.contact,
+    });
     let units = result.signals.iter().map(|(_, unit, _)| unit.clone()).collect();
-    proto::TransientSummary { units, steps, rejected, factorizations, solves, unknowns: result.unknowns as u64 }
+    proto::TransientSummary {
+        units,
+        steps,
+        rejected,
+        factorizations,
+        solves,
+        unknowns: result.unknowns as u64,
+        forces,
+        iterations,
+        events: events.collect(),
+    }
 }
 
 /// A transient put together from its samples and its end.
@@ -93,12 +111,30 @@ pub fn transient_from_wire(
     columns: Vec<Vec<f64>>,
     summary: proto::TransientSummary,
 ) -> TransientResult {
-    let proto::TransientSummary { units, steps, rejected, factorizations, solves, unknowns } = summary;
+    let proto::TransientSummary {
+        units,
+        steps,
+        rejected,
+        factorizations,
+        solves,
+        unknowns,
+        forces,
+        iterations,
+        events,
+    } = summary;
+    let event = |e: proto::Crossing| Event {
+        signal: e.signal,
+        level: e.level,
+        t: e.t,
+        direction: if e.up { Direction::Up } else { Direction::Down },
+        contact: e.contact,
+    };
     let signals = names.iter().cloned().zip(units).zip(columns).map(|((name, unit), values)| (name, unit, values));
     TransientResult {
         t,
         signals: signals.collect(),
-        counters: Counters { steps, rejected, factorizations, solves },
+        counters: Counters { steps, rejected, factorizations, solves, forces, iterations },
         unknowns: size(unknowns),
+        events: events.into_iter().map(event).collect(),
     }
 }

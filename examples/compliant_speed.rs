@@ -1,0 +1,94 @@
+//! Time per body or loop of this program on the mechanisms of `benches/peers`, one line each:
+//! `name,topology,count,ns_per_body_or_loop`. Thread CPU time, as the peers' scripts take it.
+//!
+//!     taskset -c 0 cargo run --release --no-default-features --example compliant_speed
+//!
+//! The compliant formulation: three coordinates a body and flexible joints. What stands beside the peers' evaluation of
+//! accelerations is a solve with its residual; beside a full Newton iteration, that and a tangent with its factorization.
+
+#[path = "../tests/topologies/mod.rs"]
+mod topologies;
+
+use bimorph::gaps::drive::Electrics;
+use bimorph::gaps::{Drive, System};
+use bimorph::multibody::planar::Pose;
+use bimorph::multibody::{BlockMatrix, forces};
+use std::hint::black_box;
+use std::time::Instant;
+use topologies::Topology;
+
+fn main() {
+    for count in [10, 100, 1000] {
+        report("chain", count, count, &topologies::chain(count));
+    }
+    for count in [10, 100, 1000] {
+        report("bank", count, count, &topologies::arms(count, 2));
+    }
+    for count in [10, 100, 1000] {
+        report("ladder", count, count, &topologies::ladder(count, 1));
+    }
+}
+
+/// Measures `topology`; figures are divided by `units`.
+fn report(name: &str, count: usize, units: usize, topology: &Topology) {
+    let model = topology.model();
+    let electrics = Electrics::default();
+    let system = System { model, gaps: Vec::new(), loads: Vec::new(), electrics, length_scale: 2e-6 };
+    let (n, pattern) = (system.bodies(), &system.model.pattern);
+    let q: Vec<Pose> = (0..n).map(|k| Pose::new(1e-8 * (k % 3) as f64, 1e-8, 1e-3 * (k % 5) as f64)).collect();
+    let drive = Drive { load: 1.0, ..Drive::default() };
+    let (mut a, mut r) = (BlockMatrix::new(pattern), vec![Pose::zeros(); n]);
+    let mut factor = |r: &mut [Pose]| {
+        system.tangent(black_box(&q), &drive, &mut a, r);
+        forces::add_inertia(&system.model, 1e16, 1e8, &mut a);
+        a.factor(pattern).unwrap_or_else(|e| panic!("{e:?}"))
+    };
+    let per_factor = median(|| {
+        black_box(factor(&mut r));
+    });
+    let mut x = r.clone();
+    let per_solve = median(|| {
+        system.residual(black_box(&q), &drive, &mut x);
+        a.solve(pattern, &mut x);
+    });
+    for (what, time) in [("solve", per_solve), ("Newton iteration", per_factor + per_solve)] {
+        println!("bimorph compliant {what},{name},{count},{:.1}", time / units as f64);
+    }
+}
+
+/// Median nanoseconds of thread CPU time of one call, over samples of 40 ms.
+fn median(mut call: impl FnMut()) -> f64 {
+    let start = Instant::now();
+    call();
+    let calls = (0.04 / start.elapsed().as_secs_f64().max(1e-8)).ceil() as usize;
+    let mut times: Vec<f64> = (0..9)
+        .map(|_| {
+            let start = Clock::now();
+            (0..calls).for_each(|_| call());
+            start.elapsed() / calls as f64
+        })
+        .collect();
+    times.sort_by(f64::total_cmp);
+    times[times.len() / 2]
+}
+
+/// Time that this thread has spent on a processor [ns] where the system tells, else wall time.
+struct Clock {
+    on_cpu: Option<f64>,
+    wall: Instant,
+}
+
+impl Clock {
+    fn now() -> Self {
+        Self { on_cpu: on_cpu(), wall: Instant::now() }
+    }
+
+    fn elapsed(&self) -> f64 {
+        let wall = self.wall.elapsed().as_secs_f64() * 1e9;
+        self.on_cpu.and_then(|before| Some(on_cpu()? - before)).unwrap_or(wall)
+    }
+}
+
+fn on_cpu() -> Option<f64> {
+    std::fs::read_to_string("/proc/thread-self/schedstat").ok()?.split(' ').next()?.parse().ok()
+}

@@ -1,0 +1,170 @@
+//! What a mechanism is after it was heated too far once: its hot arms shortened, see [`crate::gaps::backbending`].
+use super::statics::operating_point;
+use super::{AnalysisError, PortVoltages};
+use crate::compile::Compiled;
+use crate::gaps::backbending::Strength;
+use crate::multibody::BlockMatrix;
+use crate::multibody::forces::{RestStrain, add_offset_change, axial_change, axial_force};
+use crate::multibody::planar::Pose;
+use crate::solve::SolveError;
+use nalgebra::{DMatrix, DVector};
+
+/// Steps in which the voltages are raised: plastic strain depends on the way.
+const STEPS: usize = 8;
+/// Corrections of the plastic strains in one step.
+const CORRECTIONS: usize = 60;
+/// The stress keeps within this share of the cold strength.
+const TOLERANCE: f64 = 1e-6;
+
+/// A backbent mechanism.
+#[derive(Debug, Clone)]
+pub struct Backbent {
+    /// The mechanism with its hot arms shortened.
+    pub compiled: Compiled,
+    /// Permanent strain of each beam that can yield [1], by name; negative: shorter.
+    pub strains: Vec<(String, f64)>,
+}
+
+/// A beam that can yield.
+struct Arm {
+    beam: usize,
+    heater: usize,
+    strength: Strength,
+    area: f64,
+    /// Its joints in the model, with the length each stands for [m] and its rest offset as built [m].
+    joints: Vec<(usize, f64, f64)>,
+    /// Shortening so far [1].
+    strain: f64,
+}
+
+/// Raises the ports to `voltages` once and lets the beams yield.
+///
+/// The voltages are raised in steps; in each the excess of the arms that yield is driven to zero by Newton's method, with the
+/// stress that a shortening of one arm takes from every other. An arm whose strain would fall below what it was leaves.
+///
+/// # Errors
+/// [`AnalysisError::BadRequest`] when no beam can yield; see [`AnalysisError`].
+pub fn backbend(compiled: &Compiled, voltages: &PortVoltages) -> Result<Backbent, AnalysisError> {
+    let mut arms = arms(compiled);
+    if arms.is_empty() {
+        return Err(AnalysisError::BadRequest {
+            what: "backbending".into(),
+            detail: "no heated beam can yield; give beam2det or its layer `yieldstress` and `softening`".into(),
+        });
+    }
+    let mut bent = compiled.clone();
+    for step in 1..=STEPS {
+        let share = step as f64 / STEPS as f64;
+        let now: Vec<(String, f64)> = voltages.iter().map(|(name, v)| (name.clone(), share * v)).collect();
+        settle(&mut bent, &mut arms, &now)?;
+    }
+    let strains = arms.iter().map(|a| (compiled.structure.beams[a.beam].name.clone(), -a.strain)).collect();
+    Ok(Backbent { compiled: bent, strains })
+}
+
+fn arms(compiled: &Compiled) -> Vec<Arm> {
+    let model = &compiled.parts.system.model;
+    let of = |heater: usize| {
+        let mine = model.joints.iter().enumerate().filter_map(move |(k, j)| {
+            model.section(j).expansion.filter(|(group, _)| *group == heater).map(|(_, length)| (k, length, j.rest))
+        });
+        mine.collect::<Vec<_>>()
+    };
+    (compiled.structure.yields.iter())
+        .filter_map(|y| {
+            let heater = compiled.parts.heaters.iter().position(|&beam| beam == y.beam)?;
+            let beam = &compiled.structure.beams[y.beam];
+            let ambient = beam.material.ambient_temperature;
+            Some(Arm {
+                beam: y.beam,
+                heater,
+                strength: Strength { cold: y.stress, ambient, softening: y.softening },
+                area: beam.width * beam.thickness,
+                joints: of(heater),
+                strain: 0.0,
+            })
+        })
+        .filter(|arm| !arm.joints.is_empty())
+        .collect()
+}
+
+/// Finds the plastic strains at these voltages.
+fn settle(bent: &mut Compiled, arms: &mut [Arm], voltages: &PortVoltages) -> Result<(), AnalysisError> {
+    let floor: Vec<f64> = arms.iter().map(|a| a.strain).collect();
+    for _ in 0..CORRECTIONS {
+        let (excess, relief) = pressures(bent, arms, voltages)?;
+        let yields = |k: &usize| excess[*k] > TOLERANCE * arms[*k].strength.cold || arms[*k].strain > floor[*k];
+        let active: Vec<usize> = (0..arms.len()).filter(yields).collect();
+        let worst = active.iter().map(|&k| excess[k].abs() / arms[k].strength.cold).fold(0.0, f64::max);
+        if worst <= TOLERANCE {
+            return Ok(());
+        }
+        let matrix = DMatrix::from_fn(active.len(), active.len(), |i, j| relief[(active[i], active[j])]);
+        let wanted = DVector::from_fn(active.len(), |i, _| excess[active[i]]);
+        let Some(change) = matrix.lu().solve(&wanted) else { break };
+        for (&k, change) in active.iter().zip(change.iter()) {
+            arms[k].strain = (arms[k].strain + change).max(floor[k]);
+        }
+        apply(bent, arms);
+    }
+    Err(AnalysisError::NotConverged { detail: "the plastic strains of the hot arms do not settle".into() })
+}
+
+/// By how much each arm's pressure exceeds its strength [Pa], and the pressure that a unit of shortening of each arm (column)
+/// takes from each arm (row) [Pa].
+fn pressures(
+    bent: &Compiled,
+    arms: &[Arm],
+    voltages: &PortVoltages,
+) -> Result<(Vec<f64>, DMatrix<f64>), AnalysisError> {
+    let point = operating_point(bent, voltages)?;
+    let system = &bent.parts.system;
+    let model = &system.model;
+    let mut drive = system.electrics.drive();
+    system.electrics.apply(&point.sources, &point.rise, &mut drive);
+    let rest = RestStrain { expansion: &drive.expansion, built_in: 1.0 };
+    let mean = |arm: &Arm, force: &dyn Fn(usize) -> f64| {
+        arm.joints.iter().map(|(k, _, _)| force(*k)).sum::<f64>() / (arm.joints.len() as f64 * arm.area)
+    };
+    let excess = (arms.iter())
+        .map(|arm| {
+            let pressure = -mean(arm, &|k| axial_force(model, &model.joints[k], &point.q, &rest));
+            arm.strength.excess(pressure, arm.strength.ambient + point.rise[arm.heater])
+        })
+        .collect();
+    let mut tangent = BlockMatrix::new(&model.pattern);
+    let mut moved = point.q.clone();
+    system.tangent(&point.q, &drive, &mut tangent, &mut moved);
+    model.project_matrix(&mut tangent);
+    tangent.factor_holding(&model.pattern, &mut Vec::new()).map_err(|p| SolveError::singular(system, p))?;
+    let mut relief = DMatrix::zeros(arms.len(), arms.len());
+    for (column, cause) in arms.iter().enumerate() {
+        moved.fill(Pose::zeros());
+        for &(k, length, _) in &cause.joints {
+            // a rest offset that falls by `length`, as a load
+            add_offset_change(model, &model.joints[k], &point.q, length, &mut moved);
+        }
+        model.project(&mut moved);
+        tangent.solve(&model.pattern, &mut moved);
+        for (row, arm) in arms.iter().enumerate() {
+            let own = if row == column {
+                mean(arm, &|k| {
+                    let section = model.section(&model.joints[k]);
+                    section.stiffness.0[0] * section.expansion.map_or(0.0, |(_, length)| length)
+                })
+            } else {
+                0.0
+            };
+            relief[(row, column)] = own + mean(arm, &|k| axial_change(model, &model.joints[k], &point.q, &moved));
+        }
+    }
+    Ok((excess, relief))
+}
+
+fn apply(bent: &mut Compiled, arms: &[Arm]) {
+    for arm in arms {
+        for &(k, length, built) in &arm.joints {
+            bent.parts.system.model.joints[k].rest = built - length * arm.strain;
+        }
+    }
+}

@@ -1,0 +1,54 @@
+//! The mechanism of a chart at one model order, held and let go.
+
+use super::ChartError;
+use crate::analysis::AnalysisError;
+use crate::compile::{CompileOptions, Compiled, compile};
+use crate::netlist::{Bundle, Setting};
+
+/// The compiled mechanism, with what a release needs.
+#[derive(Debug, Clone)]
+pub(super) struct Variant {
+    initial: Compiled,
+    released: Option<Compiled>,
+}
+
+impl Variant {
+    /// Compiles `bundle` for one band.
+    pub(super) fn new(
+        bundle: &Bundle,
+        options: &CompileOptions,
+        band: Option<f64>,
+        release: Option<&str>,
+    ) -> Result<Self, ChartError> {
+        let options = CompileOptions { band, ..options.clone() };
+        let initial = compile(bundle, &options)?;
+        let released = release.map(|name| released(bundle, &initial, name)).transpose()?;
+        Ok(Self { initial, released })
+    }
+
+    /// The mechanism in motion.
+    pub(super) fn moving(&self) -> &Compiled {
+        self.released.as_ref().unwrap_or(&self.initial)
+    }
+
+    /// The mechanism whose equilibrium is the beginning; none: rest.
+    pub(super) fn held(&self) -> Option<&Compiled> {
+        self.released.as_ref().map(|_| &self.initial)
+    }
+}
+
+/// The same netlist with one parameter at 0.
+///
+/// # Errors
+/// `BadRequest` for a parameter that is none, or no number; those of [`compile`].
+pub fn released(bundle: &Bundle, initial: &Compiled, name: &str) -> Result<Compiled, ChartError> {
+    if !initial.parameters.iter().any(|(p, value)| p == name && matches!(value, Setting::Number(_))) {
+        let known: Vec<&str> = initial.parameters.iter().map(|(p, _)| p.as_str()).collect();
+        let detail = format!("no numeric parameter of that name; the netlist has {}", known.join(", "));
+        return Err(AnalysisError::BadRequest { what: format!("release \"{name}\""), detail }.into());
+    }
+    let mut options = initial.options.clone();
+    options.set.retain(|(parameter, _)| parameter != name);
+    options.set.push((name.to_owned(), Setting::Number(0.0)));
+    Ok(compile(bundle, &options)?)
+}

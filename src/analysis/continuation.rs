@@ -1,0 +1,162 @@
+//! Equilibrium paths: how a mechanism's equilibria go on while one load, voltage, temperature or stress grows, past folds
+//! and through bifurcations.
+use super::signal::{Signal, View};
+use super::statics::{beam_motions, node_motions, operating_point, source_vector};
+use super::{AnalysisError, BeamMotions, NodeMotions, Watch};
+use crate::compile::Compiled;
+use crate::multibody::planar::Pose;
+use crate::solve::continuation::{Branch, Continuation, ContinuationOptions, Event, PathEnd};
+use crate::solve::family::Blend;
+use serde::Serialize;
+
+/// What grows along the path.
+#[derive(Debug, Clone)]
+pub enum Growing<'a> {
+    /// Voltage of a port, by name.
+    Port(&'a str),
+    /// A netlist parameter; the netlist compiled with its last value.
+    Parameter(&'a Compiled),
+    /// The factor on all dead loads.
+    Loads,
+}
+
+/// What to trace.
+#[derive(Debug, Clone)]
+pub struct ContinuationRequest<'a> {
+    /// What grows.
+    pub growing: Growing<'a>,
+    /// Its first value [V, the parameter's unit, or 1]. The path starts at the equilibrium there.
+    pub from: f64,
+    /// Its last value.
+    pub to: f64,
+    /// Voltages held on the other ports, by name [V].
+    pub voltages: Vec<(String, f64)>,
+    /// Signals wanted along the path, see [`Signal::find`].
+    pub signals: Vec<String>,
+    /// What to do where the path loses its stability at a bifurcation.
+    pub branch: Branch,
+    /// Most points.
+    pub points: usize,
+}
+
+/// A fold or bifurcation.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct CriticalPoint {
+    /// Value of what grows.
+    pub value: f64,
+    /// Index of its point.
+    pub point: usize,
+}
+
+/// A traced path.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ContinuationResult {
+    /// Value of what grows at each point, in the order of the path.
+    pub values: Vec<f64>,
+    /// Signals along the path: (name, unit, values).
+    pub signals: Vec<(String, String, Vec<f64>)>,
+    /// Negative eigenvalues of the stiffness at each point: 0 where stable under fixed loads and voltages.
+    pub negative: Vec<usize>,
+    /// Where the value turns back.
+    pub folds: Vec<CriticalPoint>,
+    /// Where other paths cross.
+    pub bifurcations: Vec<CriticalPoint>,
+    /// Why the path ends.
+    pub end: &'static str,
+    /// Displacement of every node at the last point, by name.
+    pub last: NodeMotions,
+    /// The same along every beam.
+    #[serde(skip)]
+    pub last_curves: BeamMotions,
+    /// Mechanical unknowns.
+    pub unknowns: usize,
+    /// Newton iterations.
+    pub iterations: usize,
+}
+
+/// Traces the path of equilibria from the one at `from`.
+///
+/// # Errors
+/// See [`AnalysisError`].
+pub fn trace(
+    compiled: &Compiled,
+    request: &ContinuationRequest<'_>,
+    watch: Watch<'_>,
+) -> Result<ContinuationResult, AnalysisError> {
+    let bad = |what: &str, detail: String| AnalysisError::BadRequest { what: what.to_owned(), detail };
+    if !(request.from.is_finite() && request.to.is_finite() && request.from != request.to) {
+        return Err(bad("continue", format!("from {} to {} is no way", request.from, request.to)));
+    }
+    let signals: Vec<Signal> =
+        request.signals.iter().map(|name| Signal::find(compiled, name)).collect::<Result<_, _>>()?;
+    let mut volts = [request.voltages.clone(), request.voltages.clone()];
+    let mut last = compiled;
+    match request.growing {
+        Growing::Port(name) => {
+            for (volts, value) in volts.iter_mut().zip([request.from, request.to]) {
+                volts.retain(|(port, _)| port != name);
+                volts.push((name.to_owned(), value));
+            }
+        }
+        Growing::Parameter(to) => last = to,
+        Growing::Loads => {}
+    }
+    let system = &compiled.parts.system;
+    let sources = [source_vector(compiled, &volts[0])?, source_vector(last, &volts[1])?];
+    let mut family =
+        Blend::new(system, &sources[0], &last.parts.system, &sources[1]).map_err(|e| bad("continue", e.to_string()))?;
+    let start = if matches!(request.growing, Growing::Loads) {
+        family.scale_loads([request.from, request.to]);
+        let mut first = compiled.clone();
+        first.parts.system = family.system().clone();
+        operating_point(&first, &volts[0])?
+    } else {
+        operating_point(compiled, &volts[0])?
+    };
+    let options =
+        ContinuationOptions { branch: request.branch, points: request.points, ..ContinuationOptions::default() };
+    let mut tracer = Continuation::new(system, options);
+    let traced = tracer.trace(&mut family, &start.q, &mut |s| watch(s.clamp(0.0, 1.0)))?;
+    if traced.end == PathEnd::Stopped {
+        return Err(AnalysisError::Cancelled);
+    }
+
+    let value = |s: f64| if s == 1.0 { request.to } else { request.from + s * (request.to - request.from) };
+    let mut columns: Vec<Vec<f64>> = vec![Vec::with_capacity(traced.points.len()); signals.len()];
+    let zeros = vec![Pose::zeros(); system.bodies()];
+    let (mut u, mut rise, mut drive) = (sources[0].clone(), start.rise.clone(), system.electrics.drive());
+    for point in &traced.points {
+        for (u, (a, b)) in u.iter_mut().zip(sources[0].iter().zip(&sources[1])) {
+            *u = a + point.s * (b - a);
+        }
+        system.electrics.steady(&u, &mut rise, &mut drive);
+        let view = View { q: &point.q, v: &zeros, rise: &rise, volts: &drive.volts };
+        for (column, signal) in columns.iter_mut().zip(&signals) {
+            column.push(signal.value(compiled, &view));
+        }
+    }
+    let critical = |kind: Event| -> Vec<CriticalPoint> {
+        let of_kind = traced.events.iter().filter(|(event, _)| *event == kind);
+        of_kind.map(|&(_, point)| CriticalPoint { value: value(traced.points[point].s), point }).collect()
+    };
+    Ok(ContinuationResult {
+        values: traced.points.iter().map(|p| value(p.s)).collect(),
+        signals: (request.signals.iter().zip(&signals).zip(columns))
+            .map(|((name, signal), column)| (name.clone(), signal.unit().to_owned(), column))
+            .collect(),
+        negative: traced.points.iter().map(|p| p.negative).collect(),
+        folds: critical(Event::Fold),
+        bifurcations: critical(Event::Bifurcation),
+        end: match traced.end {
+            PathEnd::Arrived => "arrived",
+            PathEnd::TurnedBack => "turned back",
+            PathEnd::Full => "as many points as allowed",
+            PathEnd::Lost => "lost",
+            PathEnd::Stopped => "stopped",
+        },
+        last: traced.points.last().map(|p| node_motions(compiled, &p.q)).unwrap_or_default(),
+        last_curves: traced.points.last().map(|p| beam_motions(compiled, &p.q)).unwrap_or_default(),
+        unknowns: system.model.unknowns(),
+        iterations: traced.iterations,
+    })
+}

@@ -1,0 +1,305 @@
+//! Statics, modes and motion of a linear frame of cubic beam elements: the baseline that stands for SUGAR.
+//!
+//! Same drawing, same materials, same heat; small displacements and constant matrices. Results have the form of those of the
+//! product's own analyses. Electrostatic forces are not part of it: voltages across gaps are refused, contact is left out.
+
+use super::modes::{ModesResult, normalized};
+use super::signal::node_signal;
+use super::statics::{NodeMotion, StaticResult, electrical, source_vector};
+use super::transient::{Counters, TransientOptions, TransientResult, check};
+use super::{AnalysisError, BeamMotions, NodeMotions, PortVoltages, Watch};
+use crate::compile::Compiled;
+use crate::discretize::frame::{Elements, Frame, FrameOptions, assemble};
+use crate::gaps::{Point, Ramp};
+use crate::multibody::factor::ZeroPivot;
+use crate::multibody::planar::Pose;
+use crate::solve::SolveError;
+use crate::solve::consistent::lowest_consistent_modes;
+use crate::solve::linear::LinearSolver;
+use crate::solve::linear::sparse::Sparse;
+use crate::solve::newmark::Newmark;
+
+/// Steps between two output times are doubled until the motion settles, up to this many.
+const MOST_STEPS: usize = 1 << 14;
+
+/// The frame of a compiled netlist: one element for each beam, as SUGAR has it, or by the band when one was given.
+///
+/// # Errors
+/// [`AnalysisError::BadRequest`] for drawings that make no frame.
+pub fn frame(compiled: &Compiled) -> Result<Frame, AnalysisError> {
+    let options = &compiled.options;
+    let elements = options.band.map_or(Elements::Each(1), |band| Elements::Band(band, options.tol));
+    frame_with(compiled, &FrameOptions { elements, shear: false, undamped: options.undamped })
+}
+
+/// The frame with a given choice of elements.
+///
+/// # Errors
+/// [`AnalysisError::BadRequest`] for drawings that make no frame.
+pub fn frame_with(compiled: &Compiled, options: &FrameOptions) -> Result<Frame, AnalysisError> {
+    assemble(&compiled.structure, options)
+        .map_err(|e| AnalysisError::BadRequest { what: "frame".into(), detail: e.to_string() })
+}
+
+/// Linear static equilibrium, and the displacement of points along every beam.
+///
+/// # Errors
+/// See [`AnalysisError`].
+pub fn frame_statics(
+    compiled: &Compiled,
+    frame: &Frame,
+    voltages: &PortVoltages,
+) -> Result<(StaticResult, BeamMotions), AnalysisError> {
+    let (sources, rise) = steady(compiled, voltages)?;
+    let q = balance(compiled, frame, &rise)?;
+    let nodes = node_motions(compiled, frame, &q);
+    let electrical = electrical(compiled, &sources, &rise);
+    let result = StaticResult {
+        nodes,
+        temperatures_k: electrical.temperatures_k,
+        currents_a: electrical.currents_a,
+        charges_c: (0..compiled.parts.system.electrics.ports)
+            .map(|p| (compiled.parts.system.electrics.names[p].clone(), 0.0))
+            .collect(),
+        pulled_in: false,
+        free_motions: Vec::new(),
+        unknowns: frame.system.unknowns(),
+        iterations: 1,
+    };
+    Ok((result, beam_motions(frame, &q)))
+}
+
+/// Undamped modes about the drawn geometry, and for each the displacement of points along every beam.
+///
+/// # Errors
+/// See [`AnalysisError`].
+pub fn frame_modes(
+    compiled: &Compiled,
+    frame: &Frame,
+    count: usize,
+    voltages: &PortVoltages,
+) -> Result<(ModesResult, Vec<BeamMotions>), AnalysisError> {
+    steady(compiled, voltages)?;
+    let found = lowest_consistent_modes(&frame.system, count).map_err(|p| singular(frame, p))?;
+    let shape = |x: &Vec<Pose>| normalized(node_motions(compiled, frame, x), beam_motions(frame, x));
+    let (shapes, curves) = found.shapes.iter().map(shape).unzip();
+    let result = ModesResult {
+        frequencies_hz: found.lambda.iter().map(|&l| l.max(0.0).sqrt() / std::f64::consts::TAU).collect(),
+        shapes,
+        residuals: found.residuals,
+        unknowns: frame.system.unknowns(),
+    };
+    Ok((result, curves))
+}
+
+/// Linear motion in time by Newmark's rule. The step is halved until the signals change by less than the tolerance.
+///
+/// # Errors
+/// See [`AnalysisError`]; `NotConverged` when even the shortest steps do not settle.
+pub fn frame_transient(
+    compiled: &Compiled,
+    frame: &Frame,
+    options: &TransientOptions<'_>,
+    watch: Watch<'_>,
+) -> Result<TransientResult, AnalysisError> {
+    check(options)?;
+    let (sources, _) = steady(compiled, &options.voltages)?;
+    let heaters = compiled.parts.system.electrics.heating.heaters.len();
+    let zeros = vec![Pose::zeros(); frame.system.bodies()];
+    let (start, rise) = match options.release {
+        Some(initial) => {
+            let before = self::frame(initial)?;
+            if before.system.bodies() != zeros.len() {
+                return Err(AnalysisError::BadRequest {
+                    what: "release".into(),
+                    detail: "the released parameter changes the mechanism itself; release a load or a voltage".into(),
+                });
+            }
+            let (_, rise) = steady(initial, &options.voltages)?;
+            (balance(initial, &before, &rise)?, rise)
+        }
+        None => (zeros.clone(), vec![0.0; heaters]),
+    };
+    let signals: Vec<FrameSignal> =
+        options.signals.iter().map(|name| FrameSignal::find(compiled, frame, name)).collect::<Result<_, _>>()?;
+    let electrics = &compiled.parts.system.electrics;
+    let ramp = Ramp { electrics, from: &sources, to: &sources, rise: &rise, dt: options.stop };
+    let spacing = options.stop / (options.points - 1) as f64;
+    let mut counters = Counters::default();
+    let mut run = |between: usize, counters: &mut Counters| -> Result<Vec<Vec<f64>>, AnalysisError> {
+        let solver = Sparse::new(&frame.system.pattern)?;
+        let h = spacing / between as f64;
+        let mut rule = Newmark::new(solver, &frame.system, h).map_err(|p| singular(frame, p))?;
+        counters.factorizations += 1;
+        let (mut q, mut v) = (start.clone(), zeros.clone());
+        let (mut before, mut after, mut rises) = (zeros.clone(), zeros.clone(), rise.clone());
+        force(compiled, frame, &rise, &mut before);
+        let mut rows = vec![Vec::with_capacity(options.points); signals.len()];
+        let mut sample = |q: &[Pose], v: &[Pose], rise: &[f64]| {
+            for (row, signal) in rows.iter_mut().zip(&signals) {
+                row.push(signal.value(compiled, q, v, rise));
+            }
+        };
+        sample(&q, &v, &rise);
+        for k in 1..options.points {
+            for i in 1..=between {
+                let t = (k - 1) as f64 * spacing + i as f64 * h;
+                for (heater, r) in rises.iter_mut().enumerate() {
+                    *r = ramp.rise_at(heater, t);
+                }
+                force(compiled, frame, &rises, &mut after);
+                rule.step(&frame.system, &before, &after, &mut q, &mut v);
+                std::mem::swap(&mut before, &mut after);
+            }
+            counters.steps += between as u64;
+            counters.solves += between as u64;
+            sample(&q, &v, &rises);
+            if !watch(k as f64 / options.points as f64) {
+                return Err(AnalysisError::Cancelled);
+            }
+        }
+        Ok(rows)
+    };
+    let mut between = 1;
+    let mut coarse = run(between, &mut counters)?;
+    let rows = loop {
+        between *= 2;
+        let fine = run(between, &mut counters)?;
+        // the rule is of second order: the finer run is off by a third of the difference
+        let error = coarse.iter().zip(&fine).map(|(a, b)| change(a, b) / 3.0).fold(0.0, f64::max);
+        if error <= options.tol {
+            break fine;
+        }
+        if between >= MOST_STEPS {
+            return Err(AnalysisError::NotConverged {
+                detail: format!("steps of {:.1e} s still change the signals by {error:.1e}", spacing / between as f64),
+            });
+        }
+        coarse = fine;
+    };
+    let t =
+        (0..options.points).map(|k| if k + 1 == options.points { options.stop } else { k as f64 * spacing }).collect();
+    let signals = (options.signals.iter().zip(&signals).zip(rows))
+        .map(|((name, signal), row)| (name.clone(), signal.unit().to_owned(), row))
+        .collect();
+    Ok(TransientResult { t, signals, counters, unknowns: frame.system.unknowns(), events: Vec::new() })
+}
+
+/// Source voltages and steady rises; refuses voltages that would act across gaps.
+fn steady(compiled: &Compiled, voltages: &PortVoltages) -> Result<(Vec<f64>, Vec<f64>), AnalysisError> {
+    let electrics = &compiled.parts.system.electrics;
+    let sources = source_vector(compiled, voltages)?;
+    let mut rise = vec![0.0; electrics.heating.heaters.len()];
+    let mut drive = electrics.drive();
+    electrics.steady(&sources, &mut rise, &mut drive);
+    if let Some(gap) = drive.volts.iter().position(|v| *v != 0.0) {
+        return Err(AnalysisError::BadRequest {
+            what: "frame".into(),
+            detail: format!(
+                "{} carries {} V; the linear frame has no electrostatic forces",
+                compiled.parts.gap_names[gap], drive.volts[gap]
+            ),
+        });
+    }
+    Ok((sources, rise))
+}
+
+/// Forces of loads, built-in strains and heat.
+fn force(compiled: &Compiled, frame: &Frame, rise: &[f64], out: &mut [Pose]) {
+    out.copy_from_slice(&frame.load);
+    let heaters = &compiled.parts.system.electrics.heating.heaters;
+    for ((heater, rise), unit) in heaters.iter().zip(rise).zip(&frame.expansion) {
+        for (f, unit) in out.iter_mut().zip(unit) {
+            *f += unit * (heater.expansion * rise);
+        }
+    }
+}
+
+fn balance(compiled: &Compiled, frame: &Frame, rise: &[f64]) -> Result<Vec<Pose>, AnalysisError> {
+    let system = &frame.system;
+    let mut q = vec![Pose::zeros(); system.bodies()];
+    force(compiled, frame, rise, &mut q);
+    system.project(&mut q);
+    let mut matrix = system.combine(1.0, 0.0, 0.0);
+    // the recursion's test of pivots finds free motions; the solution itself is the sparse package's
+    matrix.clone().factor(&system.pattern).map_err(|p| singular(frame, p))?;
+    let mut solver = Sparse::new(&system.pattern)?;
+    solver.factor(&system.pattern, &mut matrix).map_err(|p| singular(frame, p))?;
+    solver.solve(&system.pattern, &matrix, &mut q);
+    Ok(q)
+}
+
+fn singular(frame: &Frame, pivot: ZeroPivot) -> AnalysisError {
+    let (body, direction) = (frame.system.names[pivot.body].clone(), crate::solve::DIRECTIONS[pivot.direction]);
+    SolveError::Singular { body, direction }.into()
+}
+
+fn node_motions(compiled: &Compiled, frame: &Frame, q: &[Pose]) -> NodeMotions {
+    (compiled.structure.nodes.iter().zip(&frame.nodes))
+        .filter_map(|(node, point)| Some((node.name.clone(), motion(&(*point)?, q))))
+        .collect()
+}
+
+fn beam_motions(frame: &Frame, q: &[Pose]) -> BeamMotions {
+    frame.beams.iter().map(|points| points.iter().map(|p| motion(p, q)).collect()).collect()
+}
+
+fn motion(point: &Point, q: &[Pose]) -> NodeMotion {
+    let moved = point.displacement(q, true);
+    NodeMotion { x: moved.x, y: moved.y, rz: point.rotation(q) }
+}
+
+/// Largest change of a signal between two runs, against its largest value.
+fn change(a: &[f64], b: &[f64]) -> f64 {
+    let amplitude = b.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+    let apart = a.iter().zip(b).fold(0.0, |m: f64, (a, b)| m.max((a - b).abs()));
+    if amplitude > 0.0 { apart / amplitude } else { 0.0 }
+}
+
+/// A quantity of a frame.
+enum FrameSignal {
+    /// Displacement of a node: direction 0 x, 1 y, 2 rotation; or its rate.
+    Node { point: Point, direction: usize, rate: bool },
+    /// Mean temperature of a beam, as the product's own signal has it.
+    Temperature(super::signal::Signal),
+}
+
+impl FrameSignal {
+    fn find(compiled: &Compiled, frame: &Frame, name: &str) -> Result<Self, AnalysisError> {
+        use super::signal::Signal;
+        if let Some((node, direction, rate)) = node_signal(compiled, name)
+            && let Some(point) = frame.nodes[node]
+        {
+            return Ok(Self::Node { point, direction, rate });
+        }
+        match Signal::find(compiled, name)? {
+            signal @ (Signal::Temperature(_) | Signal::Prescribed(_)) => Ok(Self::Temperature(signal)),
+            _ => Err(AnalysisError::BadRequest {
+                what: format!("signal \"{name}\""),
+                detail: "the linear frame knows the motion of nodes and the temperature of beams".into(),
+            }),
+        }
+    }
+
+    fn unit(&self) -> &'static str {
+        match self {
+            Self::Node { direction: 2, rate: false, .. } => "rad",
+            Self::Node { direction: 2, rate: true, .. } => "rad/s",
+            Self::Node { rate: false, .. } => "m",
+            Self::Node { rate: true, .. } => "m/s",
+            Self::Temperature(_) => "K",
+        }
+    }
+
+    fn value(&self, compiled: &Compiled, q: &[Pose], v: &[Pose], rise: &[f64]) -> f64 {
+        match self {
+            Self::Node { point, direction, rate } => {
+                let x = if *rate { v } else { q };
+                if *direction == 2 { point.rotation(x) } else { point.displacement(x, true)[*direction] }
+            }
+            Self::Temperature(signal) => {
+                signal.value(compiled, &super::signal::View { q: &[], v: &[], rise, volts: &[] })
+            }
+        }
+    }
+}

@@ -1,0 +1,214 @@
+//! Motion in time in joint coordinates: the recursion of the paper, an explicit integrator, loops closed after each step.
+//!
+//! Accelerations come from [`crate::multibody::rcr`] in O(n + m); Dormand and Prince's pair advances them. An explicit
+//! step is about 1/ω long, ω the highest natural frequency of the model, whatever the tolerance: joints that only turn have
+//! a moderate one, elastic axial directions a very high one. The number of steps is foretold, and refused when it is
+//! beyond [`MOST_STEPS`]: the compliant formulation steps implicitly.
+//!
+//! A release starts from the equilibrium of the same mechanism: the compliant model with its locked directions [`RIGID`]
+//! times as stiff, mapped to joint coordinates and projected onto the loops.
+
+use super::formulation::{Formulation, coordinate_scales};
+use super::integrator::Integrator;
+use super::transient::{Carrier, STEP_SHARE, TransientOptions, TransientResult, record};
+use super::{AnalysisError, Watch};
+use crate::compile::Compiled;
+use crate::gaps::{Ramp, System};
+use crate::multibody::rcr::{Linkage, Reduction};
+use crate::solve::adaptive::{Advance, Observer};
+use crate::solve::dormand_prince::{Dense, DormandPrince, IntegrationError, SecondOrder, Tolerances};
+use crate::solve::fastest::{Fastest, fastest};
+use crate::solve::joint_loads::{JointLoads, poses};
+use crate::solve::joint_motion::{JointMotion, NotFinite};
+use crate::solve::method::{Motion, Work};
+use serde::Serialize;
+use std::f64::consts::TAU;
+
+/// Steps beyond which a run is refused before it begins.
+pub const MOST_STEPS: f64 = 2e7;
+/// Stiffness of locked directions in the equilibrium that a release starts from, over that of the drawn beam.
+pub const RIGID: f64 = 1e4;
+/// Share of the size of a coordinate below which its relative error does not count.
+const FLOOR: f64 = 1e-3;
+
+/// What a run in joint coordinates has to say beside its signals.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct JointReport {
+    /// Generalized coordinates n of the tree.
+    pub coordinates: usize,
+    /// Independent loop constraints m.
+    pub constraints: usize,
+    /// n as the paper counts it: every joint a coordinate, one body afloat.
+    pub coordinates_uncut: usize,
+    /// m as the paper counts it: three for each loop.
+    pub constraints_uncut: usize,
+    /// Evaluations of the accelerations; each is one recursion.
+    pub accelerations: u64,
+    /// Evaluations near a singular configuration of the loops.
+    pub singular_evaluations: u64,
+    /// Largest gap of a loop after a step [m].
+    pub largest_gap_m: f64,
+    /// Highest natural frequency about the drawn place [Hz]; null: nothing is elastic.
+    pub highest_frequency_hz: Option<f64>,
+}
+
+/// Integrates the motion in joint coordinates, with [`Integrator::Rk45`] whatever `options` say. As
+/// [`super::transient::transient`] otherwise, with a report on the formulation.
+///
+/// # Errors
+/// See [`AnalysisError`]; [`AnalysisError::BadRequest`] where joint coordinates or explicit steps will not do.
+pub fn joint_transient(
+    compiled: &Compiled,
+    formulation: Formulation,
+    options: &TransientOptions<'_>,
+    sample: &mut dyn FnMut(f64, &[f64]),
+    watch: Watch<'_>,
+) -> Result<(TransientResult, JointReport), AnalysisError> {
+    if options.step.is_some() {
+        return Err(AnalysisError::BadRequest {
+            what: "step".into(),
+            detail: format!("steps of {} follow the tolerance; leave it out", formulation.name()),
+        });
+    }
+    let system = &compiled.parts.system;
+    let linkage = formulation.linkage(system)?;
+    let counts = formulation.lock(&system.model).counts();
+    let scale = coordinate_scales(&linkage, system.length_scale);
+    let top = fastest(&linkage, &scale, system.electrics.heating.heaters.len());
+    if let Some(top) = &top {
+        affordable(formulation, &linkage, top, options.stop)?;
+    }
+    let start = options.release.map(|start| {
+        let mut start = start.clone();
+        start.parts.system.model = formulation.lock(&start.parts.system.model).stiffened(RIGID);
+        start
+    });
+    let mut carrier = InJoints {
+        formulation,
+        system,
+        q: vec![0.0; linkage.coordinates],
+        v: vec![0.0; linkage.coordinates],
+        rtol: STEP_SHARE * options.tol,
+        rate: top.as_ref().map_or(1.0 / options.stop, |t| t.omega),
+        report: JointReport {
+            coordinates: linkage.coordinates,
+            constraints: linkage.constraints,
+            coordinates_uncut: counts.coordinates,
+            constraints_uncut: counts.constraints,
+            accelerations: 0,
+            singular_evaluations: 0,
+            largest_gap_m: 0.0,
+            highest_frequency_hz: top.map(|t| t.omega / TAU),
+        },
+        linkage,
+        scale,
+    };
+    let options = TransientOptions { release: start.as_ref(), method: Integrator::Rk45, ..options.clone() };
+    let mut result = record(compiled, &options, &mut carrier, sample, watch)?;
+    result.unknowns = carrier.linkage.coordinates.saturating_sub(carrier.linkage.constraints);
+    Ok((result, carrier.report))
+}
+
+/// Joint coordinates on the way.
+struct InJoints<'a> {
+    formulation: Formulation,
+    system: &'a System,
+    linkage: Linkage,
+    scale: Vec<f64>,
+    rtol: f64,
+    rate: f64,
+    q: Vec<f64>,
+    v: Vec<f64>,
+    report: JointReport,
+}
+
+impl Carrier for InJoints<'_> {
+    fn begin(&mut self, ramp: &Ramp<'_>, motion: &mut Motion) -> Result<(), AnalysisError> {
+        self.linkage.coordinates_at(&motion.q, &mut self.q);
+        let mut loads = JointLoads::new(self.system, &self.linkage, ramp);
+        let mut reduction = Reduction::new(&[&self.linkage]);
+        loads.place(0.0, &self.q, &self.v, &mut reduction);
+        let mut change = self.q.clone();
+        self.report.largest_gap_m = reduction.project_positions(&self.linkage, &mut self.q, &self.v, &mut change);
+        poses(&reduction, &mut motion.q, &mut motion.v);
+        Ok(())
+    }
+
+    fn advance(
+        &mut self,
+        ramp: &Ramp<'_>,
+        motion: &mut Motion,
+        observe: Observer<'_>,
+    ) -> Result<(Advance, Work), AnalysisError> {
+        let linkage = &self.linkage;
+        let mut loads = JointLoads::new(self.system, linkage, ramp);
+        let mut shown = loads.clone();
+        let mut after = Reduction::<f64>::new(&[linkage]);
+        let mut before = motion.clone();
+        let (mut q, mut v) = (self.q.clone(), self.v.clone());
+        let mut joints =
+            JointMotion::new(linkage, |t, q: &[f64], v: &[f64], r: &mut Reduction<f64>| loads.add(t, q, v, r));
+        // offsets are prescribed by the first evaluation
+        let mut see = |dense: &Dense<'_>| {
+            dense.at(dense.t + dense.h, &mut q, &mut v);
+            shown.place(dense.t + dense.h, &q, &v, &mut after);
+            poses(&after, &mut motion.q, &mut motion.v);
+            let on = observe(dense.t, dense.h, &before, motion);
+            before.clone_from(motion);
+            on
+        };
+        let tolerances = Tolerances {
+            rtol: self.rtol,
+            atol_q: self.scale.iter().map(|s| self.rtol * FLOOR * s).collect(),
+            atol_v: self.scale.iter().map(|s| self.rtol * FLOOR * s * self.rate).collect(),
+        };
+        let mut method = DormandPrince::new(joints.dimension());
+        let (span, mut h) = ((0.0, ramp.dt), 0.0);
+        let end =
+            method.integrate(&mut joints, span, &mut self.q, &mut self.v, &mut h, &tolerances, u64::MAX, &mut see);
+        let effort = method.effort;
+        self.report.accelerations = effort.accelerations;
+        self.report.singular_evaluations = joints.singular;
+        self.report.largest_gap_m = self.report.largest_gap_m.max(joints.gap);
+        let end = match end.map_err(|e| failed(self.formulation, linkage, &e))? {
+            Some(t) if t < ramp.dt => Advance::Stopped,
+            _ => Advance::Done,
+        };
+        let work =
+            Work { steps: effort.steps, rejected: effort.rejected, forces: effort.accelerations, ..Work::default() };
+        Ok((end, work))
+    }
+}
+
+fn affordable(formulation: Formulation, linkage: &Linkage, top: &Fastest, stop: f64) -> Result<(), AnalysisError> {
+    let steps = stop * top.omega;
+    if steps <= MOST_STEPS {
+        return Ok(());
+    }
+    Err(AnalysisError::BadRequest {
+        what: format!("formulation {}", formulation.name()),
+        detail: format!(
+            "its explicit steps of about {:.2e} s ({:.3e} Hz at body \"{}\") would take {steps:.1e} steps to {stop:e} s; \
+             take compliant, which steps implicitly",
+            1.0 / top.omega,
+            top.omega / TAU,
+            linkage.names[top.body]
+        ),
+    })
+}
+
+fn failed(formulation: Formulation, linkage: &Linkage, error: &IntegrationError<NotFinite>) -> AnalysisError {
+    let n = linkage.coordinates;
+    let (t, dt, worst) = match *error {
+        IntegrationError::StepTooSmall { t, h, component, .. } => (t, h, Some(component % n)),
+        IntegrationError::Accelerations { t, h, .. } => (t, h, None),
+        IntegrationError::TooManySteps { t, .. } => (t, 0.0, None),
+    };
+    let body = worst.and_then(|c| linkage.links.iter().position(|l| (l.first..l.first + l.freedom()).contains(&c)));
+    let at = body.map_or(String::new(), |b| format!(" at body \"{}\"", linkage.names[b]));
+    AnalysisError::StepFailed {
+        t,
+        dt,
+        detail: format!("{error}{at}; {} steps explicitly, compliant implicitly", formulation.name()),
+    }
+}

@@ -1,0 +1,126 @@
+//! A chart as a picture: one panel for each part.
+
+use super::Work;
+use bimorph::analysis::chart::{Chart, ChartPoint, Measured, Part};
+use bimorph::results::plot::Picture;
+use bimorph::results::plot::axis::quantity;
+use bimorph::results::plot::loglog::{self, Curve, LogChart, Panel, Slope};
+
+/// Draws a chart.
+pub(super) fn draw(title: &str, chart: &Chart, work: Work) -> Picture {
+    let panels = Part::ALL.into_iter().filter_map(|part| panel(chart, part, work)).collect();
+    let mut notes = vec![format!(
+        "Error of {}: root mean square over {}, relative to amplitude.",
+        chart.signals.join(", "),
+        quantity(chart.stop, "s")
+    )];
+    let shown = |part: Part| chart.points.iter().any(|p| p.part == part);
+    if let (Some(error), true) = (chart.reference_error, shown(Part::Precision)) {
+        notes.push(format!("Methods: one model, against Radau5 a hundred times tighter (good to {error:.0e})."));
+    }
+    if shown(Part::Order) {
+        notes.push("Model order: against the finest compliant model; figures are unknowns.".into());
+    }
+    if shown(Part::Solvers) {
+        notes.push("Solvers: one step of Rodas4, a tangent, a factorization and six solves.".into());
+    }
+    if work == Work::Time {
+        notes.push("Times are wall-clock times on one machine, medians.".into());
+    }
+    let failed = chart.points.iter().filter(|p| p.failed.is_some()).count();
+    if failed > 0 {
+        notes.push(format!(
+            "{failed} of {} runs have no result or were left out; the table says why.",
+            chart.points.len()
+        ));
+    }
+    loglog::draw(&LogChart { title: title.to_owned(), panels, notes })
+}
+
+fn panel(chart: &Chart, part: Part, work: Work) -> Option<Panel> {
+    let points: Vec<&ChartPoint> = chart.points.iter().filter(|p| p.part == part).collect();
+    let formulations = points.iter().any(|p| p.formulation != points[0].formulation);
+    let mut curves: Vec<Curve> = Vec::new();
+    for p in &points {
+        let name = match part {
+            Part::Precision if formulations => format!("{} {}", p.formulation.name(), p.method),
+            Part::Precision => p.method.to_owned(),
+            Part::Order => match p.formulation.name() {
+                "frame" => "linear frame".to_owned(),
+                name => name.to_owned(),
+            },
+            Part::Solvers => p.solver.to_owned(),
+        };
+        let k = curves.iter().position(|c| c.name == name).unwrap_or_else(|| {
+            curves.push(Curve { name, points: Vec::new(), labels: Vec::new() });
+            curves.len() - 1
+        });
+        if let Some(m) = &p.measured {
+            let work = effort(m, work);
+            match part {
+                Part::Solvers => curves[k].points.push([p.unknowns as f64, work]),
+                _ => curves[k].points.push([work, m.error.unwrap_or(f64::NAN)]),
+            }
+            if part == Part::Order {
+                curves[k].labels.push(p.unknowns.to_string());
+            }
+        }
+    }
+    if curves.is_empty() {
+        return None;
+    }
+    let run = match work {
+        Work::Time => "time of a run [s]",
+        Work::Counts => "factorizations + solves + force evaluations",
+    };
+    Some(match part {
+        Part::Precision => Panel {
+            title: "Methods, by tolerance".into(),
+            x_name: run.into(),
+            y_name: "relative error".into(),
+            curves,
+            floor: chart.reference_error.map(|e| ("reference".into(), e)),
+            slopes: Vec::new(),
+        },
+        Part::Order => Panel {
+            title: "Model order, by unknowns".into(),
+            x_name: run.into(),
+            y_name: "relative error".into(),
+            curves,
+            floor: None,
+            slopes: Vec::new(),
+        },
+        Part::Solvers => Panel {
+            title: "Solvers, one step".into(),
+            x_name: "unknowns".into(),
+            y_name: match work {
+                Work::Time => "time of a step [s]".into(),
+                Work::Counts => "multiplications of a step".into(),
+            },
+            slopes: slopes(&curves),
+            curves,
+            floor: None,
+        },
+    })
+}
+
+fn effort(m: &Measured, work: Work) -> f64 {
+    match work {
+        Work::Time => m.seconds,
+        Work::Counts => m.count() as f64,
+    }
+}
+
+/// n below the first curve, which is the recursion's where it is there, and n³ above the highest point.
+fn slopes(curves: &[Curve]) -> Vec<Slope> {
+    let largest = |c: &Curve| c.points.iter().copied().max_by(|a, b| a[0].total_cmp(&b[0]));
+    let mut slopes = Vec::new();
+    if let Some(p) = curves.first().and_then(largest) {
+        slopes.push(Slope { name: "n".into(), through: [p[0], 0.6 * p[1]], exponent: 1.0 });
+    }
+    let all = curves.iter().filter_map(largest);
+    if let Some(p) = all.max_by(|a, b| a[1].total_cmp(&b[1])).filter(|_| curves.len() > 1) {
+        slopes.push(Slope { name: "n³".into(), through: [p[0], 1.6 * p[1]], exponent: 3.0 });
+    }
+    slopes
+}

@@ -1,0 +1,100 @@
+//! The points of a chart as CSV, as cells of a page, and as a report.
+
+use crate::cli::report;
+use bimorph::analysis::chart::{Chart, ChartPoint, Part};
+use bimorph::results::csv::field;
+use bimorph::results::plot::axis::quantity;
+use std::fmt::Write;
+
+/// Columns of the CSV file. Times are wall-clock times of the machine it was made on; everything else is the same on
+/// every run.
+pub(crate) const HEADER: &str = "part,formulation,method,solver,tol,band [Hz],unknowns,error,wall-clock time [s],\
+    steps,rejected,factorizations,solves,force evaluations,multiplications,failed";
+
+/// All points, one line each. A point that failed has its reason in the last column and no numbers.
+pub(crate) fn csv(chart: &Chart) -> String {
+    let mut text = format!("{HEADER}\n");
+    for p in &chart.points {
+        let band = p.band_hz.map(|b| format!("{b:e}")).unwrap_or_default();
+        let _ = write!(
+            text,
+            "{},{},{},{},{:e},{band},{},",
+            p.part.name(),
+            p.formulation.name(),
+            p.method,
+            p.solver,
+            p.tol,
+            p.unknowns
+        );
+        match &p.measured {
+            Some(m) => {
+                let error = m.error.map(|e| format!("{e:e}")).unwrap_or_default();
+                let products = m.multiplications.map(|n| n.to_string()).unwrap_or_default();
+                let _ = write!(
+                    text,
+                    "{error},{:e},{},{},{},{},{},{products},",
+                    m.seconds, m.steps, m.rejected, m.factorizations, m.solves, m.forces
+                );
+            }
+            None => text.push_str(",,,,,,,,"),
+        }
+        let _ = writeln!(text, "{}", field(p.failed.as_deref().unwrap_or_default()));
+    }
+    text
+}
+
+/// Heads of the columns for people.
+pub(crate) const HEADS: [&str; 7] = ["run", "tolerance", "band", "unknowns", "error", "time", "work"];
+
+/// The cells of a point for people: short, in engineering units; a failure is told instead of numbers.
+pub(crate) fn cells(p: &ChartPoint) -> Vec<String> {
+    let run = match p.part {
+        Part::Precision => format!("{} {}", p.formulation.name(), p.method),
+        Part::Order => p.formulation.name().to_owned(),
+        Part::Solvers => p.solver.to_owned(),
+    };
+    let band = p.band_hz.map_or_else(|| "by shape".to_owned(), |b| quantity(b, "Hz"));
+    let mut cells = vec![run, format!("{:.0e}", p.tol), band, p.unknowns.to_string()];
+    match (&p.measured, &p.failed) {
+        (Some(m), _) => {
+            cells.push(m.error.map_or_else(|| "-".to_owned(), |e| format!("{e:.1e}")));
+            cells.push(quantity(m.seconds, "s"));
+            cells.push(m.count().to_string());
+        }
+        (None, reason) => {
+            cells.extend(["failed".to_owned(), "-".to_owned(), "-".to_owned()]);
+            let _ = reason;
+        }
+    }
+    cells
+}
+
+/// What a part's table shows, in one line.
+pub(crate) fn caption(part: Part) -> &'static str {
+    match part {
+        Part::Precision => "Methods and tolerances on one model; work: factorizations, solves and force evaluations",
+        Part::Order => "Models of growing order against the finest; work: factorizations, solves and force evaluations",
+        Part::Solvers => "One step of Rodas4 by solver; work: multiplications of its factorization and solves",
+    }
+}
+
+/// A report: one table for each part, and the reasons of what failed.
+pub(crate) fn text(chart: &Chart) -> String {
+    let mut text = String::new();
+    for part in Part::ALL {
+        let rows: Vec<Vec<String>> = chart.points.iter().filter(|p| p.part == part).map(cells).collect();
+        if !rows.is_empty() {
+            let _ = writeln!(text, "{}\n{}", caption(part), report::columns(&HEADS, &rows));
+        }
+    }
+    for p in &chart.points {
+        if let Some(reason) = &p.failed {
+            let _ = writeln!(text, "failed: {}: {reason}", cells(p)[..4].join(", "));
+        }
+    }
+    if let Some(error) = chart.reference_error {
+        let _ = writeln!(text, "errors below {error:.1e} are those of the reference");
+    }
+    let _ = writeln!(text, "end time {}; times are wall-clock times of this machine", quantity(chart.stop, "s"));
+    text
+}

@@ -1,0 +1,330 @@
+//! `bimorph path`: how equilibria go on while one thing grows.
+
+use super::failure::Failure;
+use super::model::{Context, ModelArgs, Named};
+use super::output::OutputArgs;
+use super::{progress, report, statics, value};
+use bimorph::analysis::continuation::{ContinuationRequest, ContinuationResult, CriticalPoint, Growing, trace};
+use bimorph::analysis::statics::NodeMotion;
+use bimorph::compile::{Compiled, compile};
+use bimorph::netlist::Setting;
+use bimorph::results::plot::axis::quantity;
+use bimorph::results::plot::mechanism::{self, Drawing, Scale};
+use bimorph::results::plot::plane::{self, Curve, Mark, Plane, Sign};
+use bimorph::results::plot::{chart, stack, svg::Picture};
+use bimorph::results::table::Table;
+use bimorph::solve::continuation::Branch;
+use clap::{Args, ValueEnum};
+use serde::Serialize;
+use std::fmt::Write;
+
+/// The path of equilibria while a load, voltage, temperature or stress grows: past folds, into buckling.
+///
+/// The path is followed by arc length, so that it goes on where the load must fall: snap-through, and behind pull-in. Where
+/// it loses its stability at a bifurcation it goes on along the branch that leaves there. JSON: "values" of what grows and
+/// "signals" along the path; "negative": eigenvalues below 0 (0: stable under fixed loads and voltages); "folds" and
+/// "bifurcations": value and index of the point; "last": displacement of every node at the end.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  bimorph path column.net --along F=0:260u --signals middle.y --out column.png\n  \
+    bimorph path arch.net --along F=0:10u --signals 'p(20).y' --json\n  \
+    bimorph path switch.net --along drive=0:20 --signals tip.y      past pull-in, along the unstable branch\n  \
+    bimorph path old.net --along loads=0:2 --signals tip.x          a factor on all loads of the netlist")]
+pub(crate) struct PathCommand {
+    #[command(flatten)]
+    model: ModelArgs,
+
+    /// What grows: a port [V], a netlist parameter that sets loads, temperatures or stresses, or `loads`, a factor on all
+    #[arg(long, value_name = "NAME=FROM:TO", value_parser = way)]
+    along: Way,
+
+    /// Signals wanted: a,b or repeated [default: x and y of the node that moves most]
+    #[arg(long, value_name = "NAMES")]
+    signals: Vec<String>,
+
+    /// Where to go when the path bifurcates and loses its stability
+    #[arg(long, value_enum, default_value_t = BranchArg::Plus)]
+    branch: BranchArg,
+
+    /// Most points
+    #[arg(long, default_value_t = 2000)]
+    points: usize,
+
+    /// Hold another port at a voltage [V]; others are at 0 V. Repeatable
+    #[arg(long = "port", short = 'p', value_name = "NAME=VOLTS", value_parser = value::volts)]
+    ports: Vec<(String, f64)>,
+
+    #[command(flatten)]
+    output: OutputArgs,
+}
+
+/// `NAME=FROM:TO`.
+#[derive(Debug, Clone, PartialEq)]
+struct Way {
+    name: String,
+    from: f64,
+    to: f64,
+}
+
+fn way(text: &str) -> Result<Way, String> {
+    let wrong = || format!("expected NAME=FROM:TO such as F=0:260u, got \"{text}\"");
+    let (name, range) = text.split_once('=').ok_or_else(wrong)?;
+    let (from, to) = range.split_once(':').ok_or_else(wrong)?;
+    let way = Way { name: name.trim().to_owned(), from: value::number(from)?, to: value::number(to)? };
+    if way.name.is_empty() || way.from == way.to { Err(wrong()) } else { Ok(way) }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum BranchArg {
+    /// along the buckling shape, its largest displacement positive
+    Plus,
+    /// against it
+    Minus,
+    /// straight on, unstable
+    Stay,
+}
+
+#[derive(Debug, Serialize)]
+struct Document<'a> {
+    along: &'a str,
+    values: &'a [f64],
+    signals: Named<'a, Vec<f64>>,
+    units: Named<'a, String>,
+    negative: &'a [usize],
+    folds: &'a [CriticalPoint],
+    bifurcations: &'a [CriticalPoint],
+    end: &'a str,
+    last: Named<'a, NodeMotion>,
+    unknowns: usize,
+    iterations: usize,
+    port_voltages_v: Named<'a, f64>,
+    #[serde(flatten)]
+    context: Context<'a>,
+}
+
+impl PathCommand {
+    pub(crate) fn run(&self) -> Result<(), Failure> {
+        self.output.check()?;
+        if self.points < 2 {
+            return Err(Failure::bad("--points", "at least 2", self.points.to_string()));
+        }
+        let drawn = self.model.compile()?;
+        let ends = self.ends(&drawn)?;
+        let first = ends.as_ref().map_or(&drawn, |[first, _]| first);
+        let growing = match &ends {
+            Some([_, last]) => Growing::Parameter(last),
+            None if drawn.structure.port(&self.along.name).is_some() => Growing::Port(&self.along.name),
+            None => Growing::Loads,
+        };
+        let mut request = ContinuationRequest {
+            growing,
+            from: self.along.from,
+            to: self.along.to,
+            voltages: self.ports.clone(),
+            signals: value::names(&self.signals),
+            branch: match self.branch {
+                BranchArg::Plus => Branch::Plus,
+                BranchArg::Minus => Branch::Minus,
+                BranchArg::Stay => Branch::Stay,
+            },
+            points: self.points,
+        };
+        let bar = progress::bar("path");
+        if request.signals.is_empty() {
+            let found = trace(first, &request, &mut progress::watch(&bar))?;
+            request.signals = busiest(&found);
+        }
+        let result = trace(first, &request, &mut progress::watch(&bar));
+        bar.finish_and_clear();
+        let result = result?;
+
+        let split = |k: fn(&(String, String, Vec<f64>)) -> String| -> Vec<(String, String)> {
+            result.signals.iter().map(|s| (s.0.clone(), k(s))).collect()
+        };
+        let units = split(|s| s.1.clone());
+        let signals: Vec<(String, Vec<f64>)> = result.signals.iter().map(|s| (s.0.clone(), s.2.clone())).collect();
+        let document = Document {
+            along: &self.along.name,
+            values: &result.values,
+            signals: Named(&signals),
+            units: Named(&units),
+            negative: &result.negative,
+            folds: &result.folds,
+            bifurcations: &result.bifurcations,
+            end: result.end,
+            last: Named(&result.last),
+            unknowns: result.unknowns,
+            iterations: result.iterations,
+            port_voltages_v: Named(&self.ports),
+            context: self.model.context(first),
+        };
+        let unit = self.unit(&drawn, ends.as_ref());
+        self.output.finish(
+            || self.table(&result, unit),
+            || Ok(self.picture(first, &result, unit)),
+            &document,
+            &self.text(first, &result, unit),
+        )
+    }
+
+    /// The netlist at both ends, where a parameter grows; none for ports and `loads`.
+    fn ends(&self, drawn: &Compiled) -> Result<Option<[Compiled; 2]>, Failure> {
+        let name = &self.along.name;
+        if drawn.structure.port(name).is_some() {
+            return Ok(None);
+        }
+        if !drawn.parameters.iter().any(|(p, v)| p == name && matches!(v, Setting::Number(_))) {
+            if name == "loads" {
+                return Ok(None);
+            }
+            let known = drawn.structure.ports.iter().map(|p| p.name.as_str());
+            let known: Vec<&str> = known.chain(drawn.parameters.iter().map(|(p, _)| p.as_str())).collect();
+            let got = format!("\"{name}\"; there is {}", [known, vec!["loads"]].concat().join(", "));
+            return Err(Failure::bad("--along", "a port, a numeric parameter, or loads", got));
+        }
+        let bundle = self.model.bundle()?;
+        let at = |value: f64| -> Result<Compiled, Failure> {
+            let mut options = drawn.options.clone();
+            options.set.retain(|(parameter, _)| parameter != name);
+            options.set.push((name.clone(), Setting::Number(value)));
+            Ok(compile(&bundle, &options)?)
+        };
+        Ok(Some([at(self.along.from)?, at(self.along.to)?]))
+    }
+
+    /// The unit of what grows, where what it changes tells.
+    fn unit(&self, drawn: &Compiled, ends: Option<&[Compiled; 2]>) -> &'static str {
+        let Some([first, last]) = ends else {
+            return if drawn.structure.port(&self.along.name).is_some() { "V" } else { "" };
+        };
+        let (a, b) = (&first.structure, &last.structure);
+        let loads = || a.loads.iter().zip(&b.loads);
+        let beams = || a.beams.iter().zip(&b.beams);
+        let changes = [
+            ("N", loads().any(|(x, y)| x.force != y.force)),
+            ("N·m", loads().any(|(x, y)| x.moment != y.moment)),
+            ("K", beams().any(|(x, y)| x.temperature != y.temperature)),
+            ("Pa", beams().any(|(x, y)| x.material.stress != y.material.stress)),
+        ];
+        let mut found = changes.iter().filter(|(_, changes)| *changes);
+        match (found.next(), found.next()) {
+            (Some((unit, _)), None) => unit,
+            _ => "",
+        }
+    }
+
+    fn table(&self, result: &ContinuationResult, unit: &str) -> Result<Table, Failure> {
+        let mut table = Table::new(self.model.title(), "Equilibrium Path");
+        table.push_real(&self.along.name, unit, result.values.clone())?;
+        for (name, unit, values) in &result.signals {
+            table.push_real(name, unit, values.clone())?;
+        }
+        table.push_real("negative", "", result.negative.iter().map(|&n| n as f64).collect())?;
+        Ok(table)
+    }
+
+    fn picture(&self, compiled: &Compiled, result: &ContinuationResult, unit: &str) -> Picture {
+        let mut units: Vec<&str> = Vec::new();
+        for (_, unit, _) in &result.signals {
+            if !units.contains(&unit.as_str()) {
+                units.push(unit);
+            }
+        }
+        let title = self.model.title();
+        let mut pictures: Vec<Picture> = units
+            .iter()
+            .map(|x_unit| {
+                let of_unit: Vec<_> = result.signals.iter().filter(|s| s.1 == **x_unit).collect();
+                let curves = of_unit.iter().map(|(name, _, values)| Curve {
+                    name: name.clone(),
+                    points: values.iter().zip(&result.values).map(|(x, y)| [*x, *y]).collect(),
+                    dashed: result.negative.iter().map(|n| *n > 0).collect(),
+                });
+                let marks = [(&result.folds, "fold", Sign::Dot), (&result.bifurcations, "bifurcation", Sign::Square)];
+                let marks = marks.iter().flat_map(|(list, word, sign)| {
+                    let of_unit = &of_unit;
+                    list.iter().flat_map(move |c| {
+                        of_unit.iter().enumerate().map(move |(k, s)| Mark {
+                            at: [s.2[c.point], c.value],
+                            sign: *sign,
+                            word: if k == 0 { plane::word(word, c.value, unit) } else { String::new() },
+                            below: c.point > 0 && result.values[c.point - 1] > c.value,
+                        })
+                    })
+                });
+                let x_name = match of_unit.as_slice() {
+                    [one] => one.0.clone(),
+                    _ => chart::word(x_unit).to_owned(),
+                };
+                plane::draw(&Plane {
+                    title: title.clone(),
+                    x: [x_name, (*x_unit).to_owned()],
+                    y: [self.along.name.clone(), unit.to_owned()],
+                    curves: curves.collect(),
+                    marks: marks.collect(),
+                    equal: false,
+                    note: "solid: stable; dashed: unstable under fixed loads and voltages".to_owned(),
+                })
+            })
+            .collect();
+        let end = result.values.last().copied().unwrap_or_default();
+        pictures.push(mechanism::draw(&Drawing {
+            structure: &compiled.structure,
+            title: &format!("at the end of the path, {} = {}", self.along.name, quantity(end, unit)),
+            motion: &statics::motion(compiled, &result.last),
+            curves: &statics::beams(&result.last_curves),
+            temperatures: &[],
+            scale: Scale::Visible,
+        }));
+        stack(&pictures)
+    }
+
+    fn text(&self, compiled: &Compiled, result: &ContinuationResult, unit: &str) -> String {
+        let mut rows: Vec<(usize, Vec<String>)> = Vec::new();
+        let mut row = |what: &str, point: usize| {
+            let mut cells = vec![what.to_owned(), quantity(result.values[point], unit)];
+            cells.extend(result.signals.iter().map(|(_, unit, values)| quantity(values[point], unit)));
+            cells.push(if result.negative[point] == 0 { "stable".into() } else { "unstable".into() });
+            rows.push((point, cells));
+        };
+        row("start", 0);
+        for (list, word) in [(&result.folds, "fold"), (&result.bifurcations, "bifurcation")] {
+            for critical in list {
+                row(word, critical.point);
+            }
+        }
+        row("end", result.values.len() - 1);
+        rows.sort_by_key(|(point, _)| *point);
+        let rows: Vec<Vec<String>> = rows.into_iter().map(|(_, cells)| cells).collect();
+        let mut header = vec!["point", self.along.name.as_str()];
+        header.extend(result.signals.iter().map(|(name, _, _)| name.as_str()));
+        header.push("");
+        let mut text = report::columns(&header, &rows);
+        let _ = write!(
+            text,
+            "\n{} points, {} iterations, path {}; {}",
+            result.values.len(),
+            result.iterations,
+            result.end,
+            report::footing(compiled, result.unknowns)
+        );
+        text
+    }
+}
+
+/// x and y of the node that is displaced most at the end.
+fn busiest(result: &ContinuationResult) -> Vec<String> {
+    let most = result.last.iter().max_by(|a, b| a.1.x.hypot(a.1.y).total_cmp(&b.1.x.hypot(b.1.y)));
+    most.map(|(name, _)| vec![format!("{name}.x"), format!("{name}.y")]).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Ranges take suffixes; a range without a way is refused.
+    #[test]
+    fn ways() {
+        assert_eq!(way("F=0:260u"), Ok(Way { name: "F".into(), from: 0.0, to: 2.6e-4 }));
+        assert!(way("F=1").is_err() && way("F=1:1").is_err() && way("=0:1").is_err());
+    }
+}

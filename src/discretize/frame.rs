@@ -1,0 +1,251 @@
+//! A linear frame of cubic beam elements: a baseline, and what SUGAR computes.
+//!
+//! Each beam is one or more Euler–Bernoulli elements with cubic deflection and linear stretch, consistent mass, and gas
+//! drag in proportion to it; small displacements about the drawn geometry. One element is exact for static loads at its
+//! ends; its first clamped-clamped mode it cannot see at all, so that a frame with one element for each beam misses modes.
+//!
+//! With `shear` the element is Timoshenko's: shear flexibility with Φ = 12EI/(κGA·h²), κ = 5/6, and the rotary inertia of the
+//! section, which wide beams show. SUGAR has neither.
+//!
+//! Rigid links, plates, supports, springs and loads are those of the drawing. A node that lies at r from the reference point
+//! of its rigid group moves as u = q + θ × r. Combs and gaps are left out.
+//!
+//! Reference: J. S. Przemieniecki, "Theory of Matrix Structural Analysis" (1968), §5.6 and §11.3, for the element; J. V.
+//! Clark et al., "Addressing the needs of complex MEMS design", MEMS 2002, for SUGAR.
+
+use super::rigid::Assembly;
+use super::{DiscretizeError, lay_spring, order};
+use crate::gaps::Point;
+use crate::multibody::linear_system::{LinearSystem, add_pair};
+use crate::multibody::planar::{JointFrame, Pose};
+use crate::multibody::{BodyId, BodyName, Joint};
+use crate::structure::{Beam, Structure};
+use nalgebra::{Matrix3, Matrix6, Vector2, Vector3, Vector6};
+use std::sync::Arc;
+
+/// How many elements a beam gets.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Elements {
+    /// The same number for every beam; 1 is what SUGAR does.
+    Each(usize),
+    /// By the highest frequency to be resolved [Hz] and the relative error: the rule of [`order`], since a cubic element
+    /// has the frequency error of a segment, (kh)⁴/1440.
+    Band(f64, f64),
+}
+
+/// How a drawing is made into a frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FrameOptions {
+    /// How many elements a beam gets.
+    pub elements: Elements,
+    /// With shear flexibility and rotary inertia.
+    pub shear: bool,
+    /// Leave out gas damping.
+    pub undamped: bool,
+}
+
+/// A linear frame, and where the drawing's parts went.
+#[derive(Debug, Clone)]
+pub struct Frame {
+    /// K, M, C.
+    pub system: LinearSystem,
+    /// Forces of the dead loads and of strains that are built in or prescribed.
+    pub load: Vec<Pose>,
+    /// For each heated beam, the forces per free strain [N, N·m].
+    pub expansion: Vec<Vec<Pose>>,
+    /// For each node of the structure, its material point; none for purely electrical nodes.
+    pub nodes: Vec<Option<Point>>,
+    /// For each beam, the points along its centreline, ends included.
+    pub beams: Vec<Vec<Point>>,
+}
+
+/// Assembles the frame of a drawing.
+///
+/// # Errors
+/// See [`DiscretizeError`].
+pub fn assemble(structure: &Structure, options: &FrameOptions) -> Result<Frame, DiscretizeError> {
+    let undamped = options.undamped;
+    let mut rigid = Assembly::new(structure);
+    let mut pieces: Vec<Piece<'_>> = Vec::new();
+    let mut beams: Vec<Vec<Point>> = Vec::with_capacity(structure.beams.len());
+    for beam in &structure.beams {
+        let count = match options.elements {
+            Elements::Each(n) => order::segments(beam, None, 1.0).map(|_| n.max(1)),
+            Elements::Band(band, tol) => order::segments(beam, Some(band), tol),
+        }?;
+        let (start, end) = (rigid.position(beam.a.0), rigid.position(beam.b.0));
+        let mut from = rigid.point(beam.a.0);
+        let mut points = vec![from];
+        let name = Arc::from(beam.name.as_str());
+        for k in 1..=count {
+            let at = start + (end - start) * (k as f64 / count as f64);
+            let to =
+                if k == count { rigid.point(beam.b.0) } else { rigid.add_segment(BodyName::segment(&name, k), at) };
+            pieces.push(Piece { beam, from, to, length: beam.length / count as f64 });
+            points.push(to);
+            from = to;
+        }
+        beams.push(points);
+    }
+    if rigid.bodies.is_empty() {
+        return Err(DiscretizeError::NothingMoves);
+    }
+    let (mut joints, mut dampers) = (Vec::new(), Vec::new());
+    for spring in &structure.springs {
+        lay_spring(spring, undamped, &rigid, &mut joints, &mut dampers);
+    }
+    let stiffest = pieces.iter().map(Piece::axial).fold(0.0, f64::max);
+    rigid.hold_hinges(structure, stiffest, &mut joints);
+
+    let couplings: Vec<(BodyId, BodyId)> = (pieces.iter().map(|p| (p.from.body, p.to.body)))
+        .chain(joints.iter().map(|j: &Joint| (j.a, j.b)))
+        .chain(dampers.iter().map(|d| (d.a, d.b)))
+        .collect();
+    let bodies = rigid.finish_bodies().into_iter().map(|b| (b.name.to_string(), b.free.map(|p| *p))).collect();
+    let (mut system, place) = LinearSystem::new(bodies, &couplings);
+    let moved = |id: BodyId| match id {
+        BodyId::Ground => id,
+        BodyId::Free(k) => BodyId::Free(place[k]),
+    };
+    let n = system.bodies();
+    let mut load = vec![Pose::zeros(); n];
+    let heated: Vec<&str> = structure.beams.iter().filter(|b| b.heater.is_some()).map(|b| b.name.as_str()).collect();
+    let mut expansion = vec![vec![Pose::zeros(); n]; heated.len()];
+    let add = |system: &mut LinearSystem, a: BodyId, b: BodyId, k: &Matrix6<f64>, m: &Matrix6<f64>, drag: f64| {
+        let (a, b) = (moved(a), moved(b));
+        add_pair(&mut system.stiffness, &system.pattern, a, b, k);
+        add_pair(&mut system.mass, &system.pattern, a, b, m);
+        add_pair(&mut system.damping, &system.pattern, a, b, &(m * drag));
+    };
+    for piece in &pieces {
+        let (k, m, push) = piece.matrices(options.shear);
+        add(&mut system, piece.from.body, piece.to.body, &k, &m, if undamped { 0.0 } else { piece.drag_per_mass() });
+        let ends = [(moved(piece.from.body), 0), (moved(piece.to.body), 3)];
+        let material = &piece.beam.material;
+        let strain =
+            piece.beam.temperature.map_or(0.0, |t| material.thermal_expansion * (t - material.ambient_temperature))
+                - material.stress / material.youngs_modulus;
+        let heater = heated.iter().position(|&name| name == piece.beam.name);
+        for (id, row) in ends {
+            if let BodyId::Free(body) = id {
+                let force: Vector3<f64> = push.fixed_rows::<3>(row).into_owned();
+                load[body] += force * strain;
+                if let Some(heater) = heater {
+                    expansion[heater][body] += force;
+                }
+            }
+        }
+    }
+    for joint in &joints {
+        let k = pair_matrix(&joint.frame, &joint.stiffness);
+        add(&mut system, joint.a, joint.b, &k, &Matrix6::zeros(), 0.0);
+    }
+    for damper in &dampers {
+        let c = pair_matrix(&damper.frame, &Matrix3::from_diagonal(&damper.coefficients));
+        add_pair(&mut system.damping, &system.pattern, moved(damper.a), moved(damper.b), &c);
+    }
+    for plate in &structure.masses {
+        let point = rigid.point(plate.node.0);
+        if let BodyId::Free(k) = moved(point.body) {
+            let g = carry(point.arm);
+            let diagonal = |t: f64, r: f64| g.transpose() * Matrix3::from_diagonal(&Vector3::new(t, t, r)) * g;
+            system.mass.diagonal[k] += diagonal(plate.mass, plate.inertia);
+            if !undamped {
+                system.damping.diagonal[k] += diagonal(plate.drag[0], plate.drag[1]);
+            }
+        }
+    }
+    for force in &structure.loads {
+        let point = rigid.point(force.node.0);
+        if let BodyId::Free(k) = moved(point.body) {
+            load[k] += carry(point.arm).transpose() * Vector3::new(force.force[0], force.force[1], force.moment);
+        }
+    }
+    let placed = |point: Point| Point { body: moved(point.body), ..point };
+    let nodes =
+        (0..structure.nodes.len()).map(|n| structure.nodes[n].mechanical.then(|| placed(rigid.point(n)))).collect();
+    let beams = beams.into_iter().map(|points| points.into_iter().map(placed).collect()).collect();
+    Ok(Frame { system, load, expansion, nodes, beams })
+}
+
+/// One element.
+struct Piece<'a> {
+    beam: &'a Beam,
+    from: Point,
+    to: Point,
+    length: f64,
+}
+
+impl Piece<'_> {
+    /// EA/h [N/m].
+    fn axial(&self) -> f64 {
+        self.beam.material.youngs_modulus * self.beam.width * self.beam.thickness / self.length
+    }
+
+    fn drag_per_mass(&self) -> f64 {
+        let m = &self.beam.material;
+        if m.viscosity == 0.0 { 0.0 } else { m.viscosity / (m.fluid * m.density * self.beam.thickness) }
+    }
+
+    /// Stiffness, mass, and force per free strain, on the coordinates of the two bodies.
+    fn matrices(&self, shear: bool) -> (Matrix6<f64>, Matrix6<f64>, Vector6<f64>) {
+        let h = self.length;
+        let area = self.beam.width * self.beam.thickness;
+        let modulus = self.beam.material.youngs_modulus;
+        let ei = modulus * self.beam.thickness * self.beam.width.powi(3) / 12.0;
+        // Φ: 0 for a slender beam
+        let kappa_g = 5.0 / 6.0 * modulus / (2.0 * (1.0 + self.beam.material.poisson));
+        let phi = if shear { 12.0 * ei / (kappa_g * area * h * h) } else { 0.0 };
+        let (a, b) = (modulus * area / h, ei / (h * h * h) / (1.0 + phi));
+        let (near, far) = ((4.0 + phi) * b * h * h, (2.0 - phi) * b * h * h);
+        #[rustfmt::skip]
+        let k = Matrix6::new(
+             a,   0.0,         0.0,         -a,   0.0,         0.0,
+             0.0, 12.0 * b,    6.0 * b * h,  0.0, -12.0 * b,   6.0 * b * h,
+             0.0, 6.0 * b * h, near,         0.0, -6.0 * b * h, far,
+            -a,   0.0,         0.0,          a,   0.0,         0.0,
+             0.0, -12.0 * b,  -6.0 * b * h,  0.0, 12.0 * b,   -6.0 * b * h,
+             0.0, 6.0 * b * h, far,          0.0, -6.0 * b * h, near,
+        );
+        let density = self.beam.material.density;
+        #[rustfmt::skip]
+        let mut m = Matrix6::new(
+            140.0, 0.0,       0.0,         70.0,  0.0,        0.0,
+            0.0,   156.0,     22.0 * h,    0.0,   54.0,      -13.0 * h,
+            0.0,   22.0 * h,  4.0 * h*h,   0.0,   13.0 * h,  -3.0 * h*h,
+            70.0,  0.0,       0.0,         140.0, 0.0,        0.0,
+            0.0,   54.0,      13.0 * h,    0.0,   156.0,     -22.0 * h,
+            0.0,  -13.0 * h, -3.0 * h*h,   0.0,  -22.0 * h,   4.0 * h*h,
+        ) * (density * area * h / 420.0);
+        if shear {
+            #[rustfmt::skip]
+            let rotary = Matrix6::new(
+                0.0, 0.0,      0.0,       0.0, 0.0,      0.0,
+                0.0, 36.0,     3.0 * h,   0.0, -36.0,    3.0 * h,
+                0.0, 3.0 * h,  4.0 * h*h, 0.0, -3.0 * h, -h * h,
+                0.0, 0.0,      0.0,       0.0, 0.0,      0.0,
+                0.0, -36.0,   -3.0 * h,   0.0, 36.0,    -3.0 * h,
+                0.0, 3.0 * h, -h * h,     0.0, -3.0 * h, 4.0 * h*h,
+            );
+            m += rotary * (density * ei / modulus / (30.0 * h));
+        }
+        let (s, c) = self.beam.angle.sin_cos();
+        let turn = Matrix3::new(c, s, 0.0, -s, c, 0.0, 0.0, 0.0, 1.0);
+        let mut t = Matrix6::zeros();
+        t.fixed_view_mut::<3, 3>(0, 0).copy_from(&(turn * carry(self.from.arm)));
+        t.fixed_view_mut::<3, 3>(3, 3).copy_from(&(turn * carry(self.to.arm)));
+        let push = t.transpose() * Vector6::new(-a * h, 0.0, 0.0, a * h, 0.0, 0.0);
+        (t.transpose() * k * t, t.transpose() * m * t, push)
+    }
+}
+
+/// The displacement of the point at `arm` from that of its body's reference point.
+fn carry(arm: Vector2<f64>) -> Matrix3<f64> {
+    Matrix3::new(1.0, 0.0, -arm.y, 0.0, 1.0, arm.x, 0.0, 0.0, 1.0)
+}
+
+fn pair_matrix(frame: &JointFrame, coefficients: &Matrix3<f64>) -> Matrix6<f64> {
+    let rest = Pose::zeros();
+    let rows = frame.kinematics(&rest, &rest, &[0.0; 3]).rows();
+    rows.transpose() * coefficients * rows
+}

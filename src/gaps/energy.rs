@@ -1,0 +1,42 @@
+//! The potential whose gradient the residual is, and with it the energy that an undamped motion keeps.
+//!
+//! At constant voltages and temperatures Π = U(q) − Σ ½·C(q)·V² + contact − load · displacement, and kinetic energy plus Π
+//! does not change: what the sources deliver is in −½·C·V².
+
+use super::contact;
+use super::drive::Drive;
+use super::system::{Gap, System};
+use crate::multibody::planar::{self, Pose};
+use crate::multibody::{BodyId, forces};
+
+impl System {
+    /// Potential Π(q) at a drive [J]; see [`crate::gaps::energy`].
+    pub fn potential(&self, q: &[Pose], drive: &Drive) -> f64 {
+        let mut sum = forces::strain_energy(&self.model, q, &drive.rest());
+        for (g, gap) in self.gaps.iter().enumerate() {
+            if drive.volts[g] != 0.0 {
+                sum -= 0.5 * self.capacitance(g, q) * drive.volts[g] * drive.volts[g];
+            }
+            sum += match gap {
+                Gap::Single { contact: None, .. } => 0.0,
+                Gap::Single { contact: Some(height), .. } => contact::energy(self.distance(g, q), *height),
+                Gap::Facing { ends, facing, .. } => ends
+                    .iter()
+                    .map(|end| contact::energy(facing.gap + end.value(q, self.model.linear), facing.height))
+                    .sum(),
+            };
+        }
+        for load in &self.loads {
+            if let BodyId::Free(k) = load.point.body {
+                let moved = planar::point(&q[k], load.point.arm, self.model.linear);
+                sum -= drive.load * (moved.dot(&load.force) + q[k].z * load.moment);
+            }
+        }
+        sum
+    }
+
+    /// Kinetic energy plus potential [J] of a motion (q, v) at a drive.
+    pub fn energy(&self, q: &[Pose], v: &[Pose], drive: &Drive) -> f64 {
+        forces::kinetic_energy(&self.model, v) + self.potential(q, drive)
+    }
+}

@@ -1,0 +1,168 @@
+//! Loop closures: strains of a cut joint, their rows over the accelerations of its two bodies, and what velocities add.
+//!
+//! With the opening d between the two material points and the mean frame of [`crate::multibody::planar`], the strains are
+//! e = (u + [g p]Q[g p]ᵀ, g, p), and their second derivative is A·a + b(v): the rows A and the part b of the velocities are
+//! formed here. A rotation is multiplied by the lever of its body, so that rows of one closure have one unit.
+
+use super::linkage::Closure;
+use super::motion::{Pair, Placed, minus, plus, turn};
+use super::real::Real;
+
+/// Geometry of a closure over lanes.
+#[derive(Debug, Clone)]
+pub(super) struct ClosureData<T> {
+    arm_a: Pair<T>,
+    arm_b: Pair<T>,
+    axis: Pair<T>,
+    second: [T; 3],
+    pub(super) rest: T,
+    lever: T,
+    held: Vec<[T; 3]>,
+    pub(super) locked: [bool; 3],
+}
+
+/// One direction of a closure: its value, rate, rows over bodies a and b, and the velocity part of its second derivative.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Strain<T> {
+    pub(super) value: T,
+    pub(super) rate: T,
+    pub(super) a: [T; 3],
+    pub(super) b: [T; 3],
+    pub(super) bias: T,
+}
+
+impl<T: Real> ClosureData<T> {
+    pub(super) fn new(of: &[(&Closure, f64)]) -> Self {
+        let lane = |f: &dyn Fn(&Closure, f64) -> f64| {
+            let mut out = T::ZERO;
+            for k in 0..T::LANES {
+                let (closure, lever) = of[k % of.len()];
+                out.set_lane(k, f(closure, lever));
+            }
+            out
+        };
+        let joint = |f: &dyn Fn(&crate::multibody::Joint) -> f64| {
+            lane(&|c, _| match c {
+                Closure::Joint(j) => f(j),
+                Closure::Held { .. } => 0.0,
+            })
+        };
+        let (locked, count) = match of[0].0 {
+            Closure::Joint(j) => (j.locked, 0),
+            Closure::Held { rows, .. } => ([false; 3], rows.len()),
+        };
+        let held = (0..count)
+            .map(|r| {
+                [0, 1, 2].map(|i| {
+                    lane(&|c, lever| match c {
+                        // a row that only turns gets the unit of the others
+                        Closure::Held { rows, .. } if rows[r].xy().norm() < 0.5 => rows[r][i] * lever,
+                        Closure::Held { rows, .. } => rows[r][i],
+                        Closure::Joint(_) => 0.0,
+                    })
+                })
+            })
+            .collect();
+        Self {
+            arm_a: [joint(&|j| j.frame.arm_a.x), joint(&|j| j.frame.arm_a.y)],
+            arm_b: [joint(&|j| j.frame.arm_b.x), joint(&|j| j.frame.arm_b.y)],
+            axis: [joint(&|j| j.frame.axis.x), joint(&|j| j.frame.axis.y)],
+            second: [joint(&|j| j.second[(0, 0)]), joint(&|j| j.second[(0, 1)]), joint(&|j| j.second[(1, 1)])],
+            rest: joint(&|j| j.rest),
+            lever: lane(&|_, lever| lever),
+            held,
+            locked,
+        }
+    }
+
+    /// The constraint `row` of the closure, at two placed bodies.
+    #[inline(always)]
+    pub(super) fn constraint(&self, row: usize, a: &Placed<T>, b: &Placed<T>) -> Strain<T> {
+        if let Some(r) = self.held.get(row) {
+            let dot = |x: &[T; 3]| r[0] * x[0] + r[1] * x[1] + r[2] * x[2];
+            return Strain { value: dot(&a.pose), rate: dot(&a.rate), a: *r, b: [T::ZERO; 3], bias: T::ZERO };
+        }
+        let mut left = row;
+        let strains = self.strains(a, b);
+        for (i, mut strain) in strains.into_iter().enumerate() {
+            if self.locked[i] {
+                if left == 0 {
+                    if i == 0 {
+                        strain.value -= self.rest;
+                    }
+                    return if i == 2 { strain.scaled(self.lever) } else { strain };
+                }
+                left -= 1;
+            }
+        }
+        strains[0]
+    }
+
+    /// The three strains (e_u, g, p) of a joint.
+    #[inline(always)]
+    pub(super) fn strains(&self, a: &Placed<T>, b: &Placed<T>) -> [Strain<T>; 3] {
+        let (half, two) = (T::splat(0.5), T::splat(2.0));
+        let dot = |x: Pair<T>, y: Pair<T>| x[0] * y[0] + x[1] * y[1];
+        let (sa, sb) = (a.swing(self.arm_a), b.swing(self.arm_b));
+        let (ra, rb) = (plus(self.arm_a, sa), plus(self.arm_b, sb));
+        let (ta, tb) = (turn(ra), turn(rb));
+        let d = [(b.pose[0] - a.pose[0]) + (sb[0] - sa[0]), (b.pose[1] - a.pose[1]) + (sb[1] - sa[1])];
+        let e1 = a.mean(b, self.axis);
+        let e2 = turn(e1);
+        let (u, g, p) = (dot(d, e1), dot(d, e2), b.pose[2] - a.pose[2]);
+        let (wa, wb) = (a.rate[2], b.rate[2]);
+        let dd =
+            [(b.rate[0] - a.rate[0]) + (wb * tb[0] - wa * ta[0]), (b.rate[1] - a.rate[1]) + (wb * tb[1] - wa * ta[1])];
+        let turning = half * (wa + wb);
+        let bend = minus([wa * wa * ra[0], wa * wa * ra[1]], [wb * wb * rb[0], wb * wb * rb[1]]);
+        let (along, across) = (dot(dd, e1), dot(dd, e2));
+        let axial = Strain {
+            value: u,
+            rate: along + turning * g,
+            a: [-e1[0], -e1[1], half * g - dot(e1, ta)],
+            b: [e1[0], e1[1], half * g + dot(e1, tb)],
+            bias: dot(bend, e1) + two * turning * across - turning * turning * u,
+        };
+        let shear = Strain {
+            value: g,
+            rate: across - turning * u,
+            a: [-e2[0], -e2[1], -(half * u) - dot(e2, ta)],
+            b: [e2[0], e2[1], dot(e2, tb) - half * u],
+            bias: dot(bend, e2) - two * turning * along - turning * turning * g,
+        };
+        let rotation = Strain {
+            value: p,
+            rate: wb - wa,
+            a: [T::ZERO, T::ZERO, -T::ONE],
+            b: [T::ZERO, T::ZERO, T::ONE],
+            bias: T::ZERO,
+        };
+        let [q0, q1, q2] = self.second;
+        let bent = [q0 * g + q1 * p, q1 * g + q2 * p];
+        let rates = [shear.rate, rotation.rate];
+        let bent_rate = [q0 * rates[0] + q1 * rates[1], q1 * rates[0] + q2 * rates[1]];
+        let slope = [two * bent[0], two * bent[1]];
+        let mix = |x: T, v: T, w: T| x + (slope[0] * v + slope[1] * w);
+        let second = Strain {
+            value: u + (bent[0] * g + bent[1] * p),
+            rate: mix(axial.rate, shear.rate, rotation.rate),
+            a: [0, 1, 2].map(|i| mix(axial.a[i], shear.a[i], rotation.a[i])),
+            b: [0, 1, 2].map(|i| mix(axial.b[i], shear.b[i], rotation.b[i])),
+            bias: mix(axial.bias, shear.bias, T::ZERO) + two * (bent_rate[0] * rates[0] + bent_rate[1] * rates[1]),
+        };
+        [second, shear, rotation]
+    }
+}
+
+impl<T: Real> Strain<T> {
+    #[inline(always)]
+    fn scaled(&self, k: T) -> Self {
+        Self {
+            value: k * self.value,
+            rate: k * self.rate,
+            a: self.a.map(|x| k * x),
+            b: self.b.map(|x| k * x),
+            bias: k * self.bias,
+        }
+    }
+}

@@ -1,0 +1,42 @@
+//! Recursive Coordinate Reduction in relative joint coordinates: the formulation of the paper.
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | [`linkage`] | the spanning tree and the loops: n coordinates, m constraints |
+//! | [`rotary`] | the paper's model: joints that only turn |
+//! | `coordinates` | joint coordinates of given poses |
+//! | `motion` | outward: poses, rates, joint axes, velocity parts |
+//! | `closure` | the rows of loop closures and their velocity parts |
+//! | `schedule` | who meets whom: fronts, rows passing through, places in the arenas |
+//! | `front` | elimination of one body's coordinates, with a loop's row or without |
+//! | [`reduce`] | the recursion |
+//! | `project` | positions and rates that fulfil the loops |
+//! | `elastic` | forces of the joints' springs |
+//! | `kernels` | the same for one coordinate and small fronts, in closed form |
+//! | `lanes` | the recursion over lanes of variants, in vector instructions |
+//! | `singular` | the recursion near singular configurations |
+//! | [`real`] | what it runs over: one number, or lanes of variants |
+
+// fixed-size blocks are indexed as the formulas are written
+#![allow(clippy::needless_range_loop)]
+
+mod closure;
+mod coordinates;
+mod elastic;
+mod front;
+mod kernels;
+mod lanes;
+pub mod linkage;
+mod motion;
+mod project;
+pub mod real;
+pub mod reduce;
+pub mod rotary;
+mod schedule;
+mod singular;
+
+pub use linkage::{Closure, Link, Linkage, Parent};
+pub use real::{Lanes, Real};
+pub use reduce::{Reduction, Task};
+pub use rotary::Counts;
+pub use singular::Singularity;

@@ -1,0 +1,275 @@
+//! Outward pass: from joint coordinates and their rates to the pose and rate of every body.
+//!
+//! A joint's coordinates are its strains (e_u, g, p). With the mean frame ψ = β + θ_p + s·p/2 of the joint and the opening
+//! w = (u, g), u = e_u − [g p] Q [g p]ᵀ, a body hangs on its parent by
+//! ```text
+//! θ = θ_p + s·p
+//! x = x_p + (R_p − 1)·arm_p + s·R(ψ)·w − (R − 1)·arm
+//! a = X·a_p + S·q̈ + c          X: rigid shift by d = R_p·arm_p + s·R(ψ)·w − R·arm
+//! ```
+//! S are the columns ∂(x, y, θ)/∂(e_u, g, p) of the directions that move, and c gathers the centripetal and Coriolis parts,
+//! the acceleration when q̈ = 0 and the parent's is zero.
+
+use super::linkage::{Link, Linkage, Parent};
+use super::real::Real;
+
+/// Two components.
+pub(super) type Pair<T> = [T; 2];
+
+/// Geometry and inertia of one link over lanes.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct LinkData<T> {
+    pub(super) arm_parent: Pair<T>,
+    pub(super) arm: Pair<T>,
+    axis: Pair<T>,
+    second: [T; 3],
+    pub(super) rest: [T; 3],
+    pub(super) mass: T,
+    pub(super) inertia: T,
+    pub(super) sign: T,
+}
+
+impl<T: Real> LinkData<T> {
+    pub(super) fn new(of: &[&Link]) -> Self {
+        let lane = |f: &dyn Fn(&Link) -> f64| {
+            let mut out = T::ZERO;
+            for k in 0..T::LANES {
+                out.set_lane(k, f(of[k % of.len()]));
+            }
+            out
+        };
+        Self {
+            arm_parent: [lane(&|l| l.frame.arm_a.x), lane(&|l| l.frame.arm_a.y)],
+            arm: [lane(&|l| l.frame.arm_b.x), lane(&|l| l.frame.arm_b.y)],
+            axis: [lane(&|l| l.frame.axis.x), lane(&|l| l.frame.axis.y)],
+            second: [lane(&|l| l.second[(0, 0)]), lane(&|l| l.second[(0, 1)]), lane(&|l| l.second[(1, 1)])],
+            rest: [lane(&|l| if l.moving[0] { 0.0 } else { l.rest }), T::ZERO, T::ZERO],
+            mass: lane(&|l| l.mass),
+            inertia: lane(&|l| l.inertia),
+            sign: lane(&|l| l.sign),
+        }
+    }
+}
+
+/// Where a body is and how it moves, with what the inward pass needs of it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Placed<T> {
+    /// Displacement and rotation from the drawn place.
+    pub(super) pose: [T; 3],
+    /// Rate.
+    pub(super) rate: [T; 3],
+    /// Sine and cosine of half the rotation.
+    half: Pair<T>,
+    /// Entries of R − 1: cosine less one, and sine.
+    turned: Pair<T>,
+    /// From the parent's centre of mass to this one, d [m].
+    pub(super) shift: Pair<T>,
+    /// R_p·arm_p: from the parent's centre of mass to the joint [m].
+    pub(super) lever_parent: Pair<T>,
+    /// Velocity part c of the acceleration [m/s²].
+    pub(super) bias: Pair<T>,
+}
+
+/// Cosine less one and sine of an angle, from the sine and cosine of its half: nothing cancels.
+#[inline(always)]
+fn turned<T: Real>(half: Pair<T>) -> Pair<T> {
+    let twice = half[0] + half[0];
+    [-(twice * half[0]), twice * half[1]]
+}
+
+impl<T: Real> Placed<T> {
+    pub(super) const REST: Self = Self {
+        pose: [T::ZERO; 3],
+        rate: [T::ZERO; 3],
+        half: [T::ZERO, T::ONE],
+        turned: [T::ZERO; 2],
+        shift: [T::ZERO; 2],
+        lever_parent: [T::ZERO; 2],
+        bias: [T::ZERO; 2],
+    };
+
+    /// (R − 1)·v without cancellation at small angles.
+    #[inline(always)]
+    pub(super) fn swing(&self, v: Pair<T>) -> Pair<T> {
+        let [less, s] = self.turned;
+        [less * v[0] - s * v[1], s * v[0] + less * v[1]]
+    }
+
+    /// R((θ + θ_other)/2)·v.
+    #[inline(always)]
+    pub(super) fn mean(&self, other: &Self, v: Pair<T>) -> Pair<T> {
+        let c = self.half[1] * other.half[1] - self.half[0] * other.half[0];
+        let s = self.half[0] * other.half[1] + self.half[1] * other.half[0];
+        [c * v[0] - s * v[1], s * v[0] + c * v[1]]
+    }
+}
+
+#[inline(always)]
+pub(super) fn plus<T: Real>(a: Pair<T>, b: Pair<T>) -> Pair<T> {
+    [a[0] + b[0], a[1] + b[1]]
+}
+
+#[inline(always)]
+pub(super) fn minus<T: Real>(a: Pair<T>, b: Pair<T>) -> Pair<T> {
+    [a[0] - b[0], a[1] - b[1]]
+}
+
+#[inline(always)]
+pub(super) fn times<T: Real>(k: T, v: Pair<T>) -> Pair<T> {
+    [k * v[0], k * v[1]]
+}
+
+/// Rotation by a right angle.
+#[inline(always)]
+pub(super) fn turn<T: Real>(v: Pair<T>) -> Pair<T> {
+    [-v[1], v[0]]
+}
+
+/// Places the body of `link` on `parent`. `axes` receives S for the directions that move.
+#[inline(always)]
+pub(super) fn place<T: Real>(
+    link: &Link,
+    data: &LinkData<T>,
+    parent: &Placed<T>,
+    q: &[T],
+    v: &[T],
+    axes: &mut [[T; 3]],
+) -> Placed<T> {
+    if link.parent == Parent::Free {
+        return place_free(q, v, axes);
+    }
+    place_joint(link, data, parent, q, v, axes)
+}
+
+#[inline(always)]
+fn place_free<T: Real>(q: &[T], v: &[T], axes: &mut [[T; 3]]) -> Placed<T> {
+    for (k, axis) in axes.iter_mut().enumerate() {
+        *axis = [T::ZERO; 3];
+        axis[k] = T::ONE;
+    }
+    let (s, c) = (T::splat(0.5) * q[2]).sin_cos();
+    let half = [s, c];
+    Placed { pose: [q[0], q[1], q[2]], rate: [v[0], v[1], v[2]], half, turned: turned(half), ..Placed::REST }
+}
+
+/// A pin: rotation alone, no axial second-order strain.
+#[inline(always)]
+pub(super) fn place_pin<T: Real>(data: &LinkData<T>, parent: &Placed<T>, q: T, v: T, axes: &mut [[T; 3]]) -> Placed<T> {
+    let theta = parent.pose[2] + data.sign * q;
+    let (wp, w) = (parent.rate[2], parent.rate[2] + data.sign * v);
+    let (s, c) = (T::splat(0.5) * theta).sin_cos();
+    let half = [s, c];
+    let turned = turned(half);
+    let [x, y] = data.arm;
+    let swung = [turned[0] * x - turned[1] * y, turned[1] * x + turned[0] * y];
+    let swung_parent = parent.swing(data.arm_parent);
+    let lever = plus(data.arm, swung);
+    let to = plus(data.arm_parent, swung_parent);
+    let (wp2, w2) = (wp * wp, w * w);
+    axes[0] = [data.sign * lever[1], -(data.sign * lever[0]), data.sign];
+    Placed {
+        pose: [parent.pose[0] + (swung_parent[0] - swung[0]), parent.pose[1] + (swung_parent[1] - swung[1]), theta],
+        rate: [parent.rate[0] + (w * lever[1] - wp * to[1]), parent.rate[1] + (wp * to[0] - w * lever[0]), w],
+        half,
+        turned,
+        shift: minus(to, lever),
+        lever_parent: to,
+        bias: [w2 * lever[0] - wp2 * to[0], w2 * lever[1] - wp2 * to[1]],
+    }
+}
+
+fn place_joint<T: Real>(
+    link: &Link,
+    data: &LinkData<T>,
+    parent: &Placed<T>,
+    q: &[T],
+    v: &[T],
+    axes: &mut [[T; 3]],
+) -> Placed<T> {
+    let (mut e, mut de) = (data.rest, [T::ZERO; 3]);
+    let mut next = 0;
+    for i in 0..3 {
+        if link.moving[i] {
+            (e[i], de[i]) = (q[next], v[next]);
+            next += 1;
+        }
+    }
+    let two = T::splat(2.0);
+    let [q0, q1, q2] = data.second;
+    let bent = [q0 * e[1] + q1 * e[2], q1 * e[1] + q2 * e[2]];
+    let bent_rate = [q0 * de[1] + q1 * de[2], q1 * de[1] + q2 * de[2]];
+    // axial opening, its rate, and what is left of its acceleration at constant rates
+    let w = [e[0] - (bent[0] * e[1] + bent[1] * e[2]), e[1]];
+    let dw = [de[0] - two * (bent[0] * de[1] + bent[1] * de[2]), de[1]];
+    let ddw = [-(two * (bent_rate[0] * de[1] + bent_rate[1] * de[2])), T::ZERO];
+    let theta = parent.pose[2] + data.sign * e[2];
+    let omega = parent.rate[2] + data.sign * de[2];
+    let (s, c) = (T::splat(0.5) * theta).sin_cos();
+    let half = [s, c];
+    let mut out = Placed { half, turned: turned(half), ..Placed::REST };
+    let (swung, swung_parent) = (out.swing(data.arm), parent.swing(data.arm_parent));
+    let lever = plus(data.arm, swung);
+    out.lever_parent = plus(data.arm_parent, swung_parent);
+    let e1 = out.mean(parent, data.axis);
+    let e2 = turn(e1);
+    let along = |w: Pair<T>| plus(times(w[0], e1), times(w[1], e2));
+    let (rw, rdw, rddw) = (along(w), along(dw), along(ddw));
+    let opening = times(data.sign, rw);
+    out.shift = minus(plus(out.lever_parent, opening), lever);
+    let d = minus(plus(swung_parent, opening), swung);
+    out.pose = [parent.pose[0] + d[0], parent.pose[1] + d[1], theta];
+    let wp = parent.rate[2];
+    let frame_rate = wp + data.sign * T::splat(0.5) * de[2];
+    let (to_joint, from_joint) = (turn(out.lever_parent), turn(lever));
+    let opening_rate = plus(times(frame_rate, turn(rw)), rdw);
+    let x = minus(plus(times(wp, to_joint), times(data.sign, opening_rate)), times(omega, from_joint));
+    out.rate = [parent.rate[0] + x[0], parent.rate[1] + x[1], omega];
+    let turning = plus(minus(times(two * frame_rate, turn(rdw)), times(frame_rate * frame_rate, rw)), rddw);
+    out.bias = minus(plus(times(omega * omega, lever), times(data.sign, turning)), times(wp * wp, out.lever_parent));
+    let slope = [two * bent[0], two * bent[1]];
+    let columns = [
+        [data.sign * e1[0], data.sign * e1[1], T::ZERO],
+        [data.sign * (e2[0] - slope[0] * e1[0]), data.sign * (e2[1] - slope[0] * e1[1]), T::ZERO],
+        {
+            let half = times(T::splat(0.5), turn(rw));
+            let x = minus(minus(half, times(data.sign, from_joint)), times(data.sign * slope[1], e1));
+            [x[0], x[1], data.sign]
+        },
+    ];
+    let mut next = 0;
+    for i in 0..3 {
+        if link.moving[i] {
+            axes[next] = columns[i];
+            next += 1;
+        }
+    }
+    out
+}
+
+/// Places every body, root → leaf.
+#[inline(always)]
+pub(super) fn place_all<T: Real>(
+    linkage: &Linkage,
+    data: &[LinkData<T>],
+    q: &[T],
+    v: &[T],
+    placed: &mut [Placed<T>],
+    axes: &mut [[T; 3]],
+) {
+    let rest = Placed::REST;
+    for body in (0..linkage.links.len()).rev() {
+        let link = &linkage.links[body];
+        let (before, after) = placed.split_at_mut(body + 1);
+        let parent = match link.parent {
+            Parent::Body(p) => &after[p - body - 1],
+            Parent::Ground | Parent::Free => &rest,
+        };
+        let first = link.first;
+        before[body] = if link.pin {
+            place_pin(&data[body], parent, q[first], v[first], &mut axes[first..first + 1])
+        } else {
+            let range = first..first + link.freedom();
+            place(link, &data[body], parent, &q[range.clone()], &v[range.clone()], &mut axes[range])
+        };
+    }
+}

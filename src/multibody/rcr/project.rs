@@ -1,0 +1,81 @@
+//! Positions and rates that fulfil the loops, and accelerations in any configuration.
+//!
+//! Elimination fulfils the accelerations' rows only, so the loops would open quadratically in time. Projection in the mass
+//! norm closes them after each step with the reduction itself, at one more right-hand side: min ‖Δ‖_M under J·Δ = −g. It
+//! has no gain to choose, unlike Baumgarte's feedback, whose gains would have to know the time scale of the mechanism.
+//!
+//! Reference: E. Hairer, G. Wanner, "Solving Ordinary Differential Equations II" (1996), §VII.2 (projection methods).
+
+use super::reduce::{Reduction, Task};
+use super::singular::Singularity;
+use super::{Linkage, Real};
+
+/// A loop's pivot below 1/100 of its lever loses more than 1e-12: the path for singular configurations is taken instead.
+const NEAR: f64 = 1e2;
+/// Gauss–Newton steps of a projection.
+const MOST: usize = 30;
+
+impl Reduction<f64> {
+    /// [`Reduction::reduce`], or [`Reduction::reduce_singular`] where that is too near to a singular configuration; then
+    /// says what was met.
+    pub fn solve(&mut self, linkage: &Linkage, task: Task, out: &mut [f64]) -> Option<Singularity> {
+        if self.schedule.redundant == 0 {
+            self.reduce(linkage, task, out);
+            if self.nearness <= NEAR && out.iter().all(|x| x.is_finite()) {
+                return None;
+            }
+        }
+        Some(self.reduce_singular(linkage, task, out))
+    }
+
+    /// Moves `q` onto the loops, by the shortest way in the mass norm; `change` is scratch of the same length. Leaves the
+    /// bodies placed there at rates `v`. Returns the largest gap left [m].
+    pub fn project_positions(&mut self, linkage: &Linkage, q: &mut [f64], v: &[f64], change: &mut [f64]) -> f64 {
+        self.place(linkage, q, v);
+        let mut gap = self.largest(linkage, Task::Positions);
+        for _ in 0..MOST {
+            if gap == 0.0 || linkage.constraints == 0 {
+                break;
+            }
+            self.solve(linkage, Task::Positions, change);
+            for (q, d) in q.iter_mut().zip(change.iter()) {
+                *q += d;
+            }
+            self.place(linkage, q, v);
+            let now = self.largest(linkage, Task::Positions);
+            // rounding is reached when a step no longer helps
+            if now >= 0.25 * gap {
+                if now > gap {
+                    for (q, d) in q.iter_mut().zip(change.iter()) {
+                        *q -= d;
+                    }
+                    self.place(linkage, q, v);
+                    return gap;
+                }
+                return now;
+            }
+            gap = now;
+        }
+        gap
+    }
+
+    /// Makes the rates `v` fulfil the loops at the placed configuration.
+    pub fn project_rates(&mut self, linkage: &Linkage, q: &[f64], v: &mut [f64], change: &mut [f64]) {
+        if linkage.constraints == 0 {
+            return;
+        }
+        for _ in 0..2 {
+            self.place(linkage, q, v);
+            self.solve(linkage, Task::Rates, change);
+            for (v, d) in v.iter_mut().zip(change.iter()) {
+                *v += d;
+            }
+        }
+        self.place(linkage, q, v);
+    }
+
+    /// Largest residual of the loops [m, or m/s].
+    pub fn largest(&mut self, linkage: &Linkage, task: Task) -> f64 {
+        self.write_rows(linkage, task).lane(0)
+    }
+}

@@ -1,0 +1,86 @@
+//! The model of the paper: joints of beams that only turn.
+//!
+//! A beam is then a chain of rigid bodies on pins with springs: one coordinate a joint, and constraints where chains close
+//! loops. The axial direction (type 4) is rigid too; heat and residual stress prescribe its offset, a gap function.
+//!
+//! **Counts.** The paper counts every joint as a coordinate and cuts loops through bodies, three constraints for each. A
+//! tree here hangs on the joints, so a loop is cut at a joint instead: two constraints, and its rotation no coordinate.
+//! [`Counts`] tells the paper's numbers; n − m, the freedom, is the same. With every beam in two (its question 1), a bank
+//! has 12 joints a bimorph (hot arm, tip bar, cold arm, flexure, link, and its share of yoke and tether), and the quarter
+//! stage of ten n = 10·12 + 3 = 123, the three of the free plate, and m = 20·3 = 60, which is the n and m ≈ n/2 of the paper.
+
+use crate::multibody::section::Section;
+use crate::multibody::{BodyId, Model};
+
+/// Coordinates and constraints as the paper counts them: loops cut through bodies, the last body free.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Counts {
+    /// Generalized coordinates: directions of joints that move, and three for each part that hangs together.
+    pub coordinates: usize,
+    /// Closed loops, those through ground included.
+    pub loops: usize,
+    /// Constraints: three a loop, and the directions that supports hold.
+    pub constraints: usize,
+}
+
+impl Section {
+    /// True for a segment of a beam, which bends; false for a lumped spring or a hinge.
+    pub fn is_segment(&self) -> bool {
+        self.stiffness.0[5] > 0.0 && (self.locked[1] || self.second != [0.0; 3])
+    }
+}
+
+impl Model {
+    /// The same model with joints of beams that only turn.
+    pub fn rotary(&self) -> Self {
+        let mut model = self.clone();
+        for section in model.sections.iter_mut().filter(|s| s.is_segment()) {
+            section.locked = [true, true, false];
+        }
+        model
+    }
+
+    /// The same model with the locked directions of its beams' joints `factor` times as stiff, for what needs a stiffness.
+    pub fn stiffened(&self, factor: f64) -> Self {
+        let mut model = self.clone();
+        for section in model.sections.iter_mut().filter(|s| s.is_segment()) {
+            // uu, gg and pp of the symmetric stiffness
+            for (at, _) in [0, 3, 5].into_iter().zip(section.locked).filter(|(_, locked)| *locked) {
+                section.stiffness.0[at] *= factor;
+            }
+        }
+        model
+    }
+
+    /// Coordinates, loops and constraints as the paper counts them.
+    pub fn counts(&self) -> Counts {
+        let mut part: Vec<usize> = (0..self.bodies.len()).collect();
+        let mut parts = part.len();
+        let mut edges = 0;
+        let mut coordinates = 0;
+        for joint in (0..self.joints.len()).map(|k| self.joint(k)).filter(|j| j.a != j.b) {
+            edges += 1;
+            coordinates += joint.locked.iter().filter(|&&l| !l).count();
+            if let (BodyId::Free(a), BodyId::Free(b)) = (joint.a, joint.b) {
+                let (a, b) = (root(&mut part, a), root(&mut part, b));
+                if a != b {
+                    part[a] = b;
+                    parts -= 1;
+                }
+            }
+        }
+        // every part floats on one body, so that each of its ways to ground closes a loop
+        let loops = edges + parts - self.bodies.len();
+        let held: usize =
+            self.bodies.iter().map(|b| b.free.as_ref().map_or(0, |p| 3 - p.trace().round() as usize)).sum();
+        Counts { coordinates: coordinates + 3 * parts, loops, constraints: 3 * loops + held }
+    }
+}
+
+fn root(part: &mut [usize], mut k: usize) -> usize {
+    while part[k] != k {
+        part[k] = part[part[k]];
+        k = part[k];
+    }
+    k
+}

@@ -1,0 +1,183 @@
+//! Joints as a model stores them: what the joints of one beam have in common stands once, in a section; a joint keeps its
+//! arms, its bodies and where its couplings lie. Fifty-six bytes a joint instead of some two hundred and fifty, most of
+//! which every sweep over the joints would have to read.
+
+use super::model::{BodyId, Joint};
+use super::planar::{JointFrame, Symmetric};
+use nalgebra::{Matrix2, Matrix3, Vector2};
+use std::collections::HashMap;
+
+/// What the joints that are cut from one beam share.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Section {
+    /// Cosine and sine of the drawn angle of the joints' x axis.
+    pub axis: Vector2<f64>,
+    /// Stress per strain, see [`Joint::stiffness`].
+    pub stiffness: Symmetric,
+    /// Q over (g, p) as (gg, gp, pp), see [`Joint::second`].
+    pub second: [f64; 3],
+    /// See [`Joint::expansion`].
+    pub expansion: Option<(usize, f64)>,
+    /// See [`Joint::locked`].
+    pub locked: [bool; 3],
+}
+
+/// A joint of a model.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LaidJoint {
+    /// From the centre of mass of body a to the joint, as drawn [m].
+    pub arm_a: Vector2<f64>,
+    /// From the centre of mass of body b to the joint, as drawn [m].
+    pub arm_b: Vector2<f64>,
+    /// Axial rest offset that does not change [m].
+    pub rest: f64,
+    /// Where its bodies and their coupling lie.
+    pub(crate) place: Place,
+    section: u32,
+}
+
+impl LaidJoint {
+    /// Index of its section.
+    #[inline]
+    pub fn section(&self) -> usize {
+        self.section as usize
+    }
+
+    /// Its bodies a and b.
+    pub fn bodies(&self) -> (BodyId, BodyId) {
+        (self.place.a(), self.place.b())
+    }
+
+    /// The joint as it was given.
+    pub(crate) fn whole(&self, section: &Section) -> Joint {
+        let ([uu, ug, up, gg, gp, pp], [q_gg, q_gp, q_pp]) = (section.stiffness.0, section.second);
+        let (a, b) = self.bodies();
+        Joint {
+            a,
+            b,
+            frame: self.frame(section),
+            stiffness: Matrix3::new(uu, ug, up, ug, gg, gp, up, gp, pp),
+            second: Matrix2::new(q_gg, q_gp, q_gp, q_pp),
+            expansion: section.expansion,
+            rest: self.rest,
+            locked: section.locked,
+        }
+    }
+
+    #[inline]
+    pub(crate) fn frame(&self, section: &Section) -> JointFrame {
+        JointFrame { arm_a: self.arm_a, arm_b: self.arm_b, axis: section.axis }
+    }
+}
+
+/// Where a pair of bodies and their coupling lie in the tangent. Indices are 32 bits wide: a model with more bodies or
+/// blocks would fill terabytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Place {
+    /// Body a, or [`NONE`] for ground.
+    pub(crate) a: u32,
+    /// Body b, or [`NONE`] for ground.
+    pub(crate) b: u32,
+    /// Block of their coupling, [`NONE`] where one of them is ground or both are the same.
+    pub(crate) block: u32,
+}
+
+/// Ground, or no block.
+pub(crate) const NONE: u32 = u32::MAX;
+
+impl Place {
+    fn id(index: u32) -> BodyId {
+        if index == NONE { BodyId::Ground } else { BodyId::Free(index as usize) }
+    }
+
+    pub(crate) fn a(self) -> BodyId {
+        Self::id(self.a)
+    }
+
+    pub(crate) fn b(self) -> BodyId {
+        Self::id(self.b)
+    }
+
+    /// Sorts pairs along the elimination order of their earlier body, then of their later one.
+    pub(crate) fn order(self) -> (u32, u32) {
+        // ground is the largest index
+        (self.a.min(self.b), self.a.max(self.b))
+    }
+}
+
+/// Lays joints down with one section for all that are alike in everything but place and rest offset.
+pub(crate) struct Sections {
+    pub(crate) all: Vec<Section>,
+    known: HashMap<[u64; 16], u32>,
+}
+
+impl Sections {
+    pub(crate) fn new() -> Self {
+        Self { all: Vec::new(), known: HashMap::new() }
+    }
+
+    /// The joint as it is stored, between the bodies of `place`.
+    pub(crate) fn lay(&mut self, joint: &Joint, place: Place) -> LaidJoint {
+        let (k, q) = (&joint.stiffness, &joint.second);
+        let section = Section {
+            axis: joint.frame.axis,
+            stiffness: Symmetric([k[(0, 0)], k[(0, 1)], k[(0, 2)], k[(1, 1)], k[(1, 2)], k[(2, 2)]]),
+            second: [q[(0, 0)], q[(0, 1)], q[(1, 1)]],
+            expansion: joint.expansion,
+            locked: joint.locked,
+        };
+        // neighbours along a beam are alike: look at the last one first
+        let section = match self.all.last() {
+            Some(last) if *last == section => (self.all.len() - 1) as u32,
+            _ => self.find(section),
+        };
+        LaidJoint { arm_a: joint.frame.arm_a, arm_b: joint.frame.arm_b, rest: joint.rest, place, section }
+    }
+
+    fn find(&mut self, section: Section) -> u32 {
+        let mut key = [0; 16];
+        let numbers = section.axis.iter().chain(&section.stiffness.0).chain(&section.second);
+        for (key, number) in key.iter_mut().zip(numbers) {
+            *key = number.to_bits();
+        }
+        let (group, length) = section.expansion.unwrap_or((usize::MAX, 0.0));
+        (key[11], key[12]) = (group as u64, length.to_bits());
+        for (key, locked) in key[13..].iter_mut().zip(section.locked) {
+            *key = u64::from(locked);
+        }
+        *self.known.entry(key).or_insert_with(|| {
+            self.all.push(section);
+            (self.all.len() - 1) as u32
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A stored joint takes 56 bytes; joints of one beam share a section, and each can be had back as it was given.
+    #[test]
+    fn small_and_whole() {
+        assert_eq!(size_of::<LaidJoint>(), 56);
+        let axis = Vector2::new(0.6, 0.8);
+        let joint = |rest: f64, gp: f64| Joint {
+            a: BodyId::Ground,
+            b: BodyId::Free(3),
+            frame: JointFrame { arm_a: Vector2::new(rest, 1.0), arm_b: Vector2::new(2.0, rest), axis },
+            stiffness: Matrix3::new(5.0, 0.0, 0.0, 0.0, 4.0, gp, 0.0, gp, 3.0),
+            second: Matrix2::new(0.1, 0.2, 0.2, 0.3),
+            expansion: Some((1, 2e-6)),
+            rest,
+            locked: [false, true, false],
+        };
+        let given = [joint(1.0, 0.5), joint(2.0, 0.5), joint(3.0, 0.7), joint(4.0, 0.5)];
+        let mut sections = Sections::new();
+        let place = Place { a: NONE, b: 3, block: NONE };
+        let laid: Vec<LaidJoint> = given.iter().map(|joint| sections.lay(joint, place)).collect();
+        assert_eq!(laid.iter().map(LaidJoint::section).collect::<Vec<_>>(), [0, 0, 1, 0]);
+        for (joint, laid) in given.iter().zip(&laid) {
+            assert_eq!(laid.whole(&sections.all[laid.section()]), *joint);
+        }
+    }
+}

@@ -1,0 +1,16 @@
+//! The motion inside a step: cubic Hermite interpolation between its two ends, for every method. Its error falls with the
+//! fourth power of the step.
+
+use super::method::Motion;
+
+/// The motion at the share `x` of a step of length `h` from `before` to `after`.
+pub fn interpolate(before: &Motion, after: &Motion, h: f64, x: f64, out: &mut Motion) {
+    let (a, b) = ((1.0 + 2.0 * x) * (1.0 - x) * (1.0 - x), x * x * (3.0 - 2.0 * x));
+    let (c, d) = (h * x * (1.0 - x) * (1.0 - x), -h * x * x * (1.0 - x));
+    let (da, dc, dd) = (-6.0 * x * (1.0 - x) / h, (1.0 - x) * (1.0 - 3.0 * x), x * (3.0 * x - 2.0));
+    for k in 0..out.q.len() {
+        let (q0, q1, v0, v1) = (before.q[k], after.q[k], before.v[k], after.v[k]);
+        out.q[k] = q0 * a + q1 * b + v0 * c + v1 * d;
+        out.v[k] = (q0 - q1) * da + v0 * dc + v1 * dd;
+    }
+}

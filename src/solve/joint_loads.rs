@@ -1,0 +1,82 @@
+//! What acts on a system's bodies and joints, for [`super::joint_motion::JointMotion`].
+//!
+//! Gaps, contacts and dead loads give each body its wrench, −(∂Π/∂q − load); gas and dampers −C·q̇; springs act along the
+//! joint coordinates. Heat and residual stress shift the rest length of an elastic axial direction, and prescribe a locked
+//! one: the rate of that prescribed length is taken as zero, so that inertia feels its slow change only through the
+//! bodies it moves. A time constant of heat much longer than the period of what moves makes this right.
+
+use crate::gaps::{Drive, Ramp, System};
+use crate::multibody::forces;
+use crate::multibody::planar::Pose;
+use crate::multibody::rcr::{Closure, Linkage, Reduction};
+
+/// Loads of a system while its sources go along a ramp, with storage for them.
+#[derive(Debug, Clone)]
+pub struct JointLoads<'a> {
+    system: &'a System,
+    linkage: &'a Linkage,
+    ramp: &'a Ramp<'a>,
+    drive: Drive,
+    q: Vec<Pose>,
+    v: Vec<Pose>,
+    r: Vec<Pose>,
+    prescribes: bool,
+}
+
+impl<'a> JointLoads<'a> {
+    /// Storage. `linkage` spans the bodies of `system`, in the same order.
+    pub fn new(system: &'a System, linkage: &'a Linkage, ramp: &'a Ramp<'a>) -> Self {
+        let zeros = vec![Pose::zeros(); system.bodies()];
+        let heated = linkage.links.iter().any(|l| !l.moving[0] && (l.rest != 0.0 || l.expansion.is_some()))
+            || linkage.closures.iter().any(|c| match c {
+                Closure::Joint(j) => j.locked[0] && (j.rest != 0.0 || j.expansion.is_some()),
+                Closure::Held { .. } => false,
+            });
+        Self {
+            system,
+            linkage,
+            ramp,
+            drive: system.electrics.drive(),
+            q: zeros.clone(),
+            v: zeros.clone(),
+            r: zeros,
+            prescribes: heated,
+        }
+    }
+
+    /// Places the bodies at time `t` [s] of the ramp, locked directions at their prescribed lengths.
+    pub fn place(&mut self, t: f64, q: &[f64], v: &[f64], reduction: &mut Reduction<f64>) {
+        self.ramp.at(t, &mut self.drive);
+        if self.prescribes {
+            reduction.prescribe(self.linkage, &self.drive.rest());
+        }
+        reduction.place(self.linkage, q, v);
+    }
+
+    /// Adds everything that acts at time `t` [s] to the force and torque of `reduction`, placed at `q` and `v`.
+    pub fn add(&mut self, t: f64, q: &[f64], v: &[f64], reduction: &mut Reduction<f64>) {
+        if self.prescribes {
+            self.place(t, q, v, reduction);
+        } else {
+            self.ramp.at(t, &mut self.drive);
+        }
+        poses(reduction, &mut self.q, &mut self.v);
+        self.r.fill(Pose::zeros());
+        self.system.add_body_forces(&self.q, &self.drive, &mut self.r);
+        forces::add_damping(&self.system.model, &self.v, &mut self.r);
+        for (force, r) in reduction.force.iter_mut().zip(&self.r) {
+            for i in 0..3 {
+                force[i] -= r[i];
+            }
+        }
+        reduction.add_elastic(self.linkage, q, &self.drive.rest());
+    }
+}
+
+/// Poses and rates of the placed bodies.
+pub fn poses(reduction: &Reduction<f64>, q: &mut [Pose], v: &mut [Pose]) {
+    for (k, (q, v)) in q.iter_mut().zip(v).enumerate() {
+        *q = reduction.pose(k).into();
+        *v = reduction.rate(k).into();
+    }
+}
