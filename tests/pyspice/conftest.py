@@ -1,5 +1,6 @@
 """ngspice's shared library, driven by PySpice, with the plug-in loaded."""
 
+import ctypes.util
 import os
 import pathlib
 import warnings
@@ -38,6 +39,9 @@ class Bench:
 
 @pytest.fixture(scope="session")
 def bench(tmp_path_factory):
+    # PySpice asks for libngspice.so, which only the development package holds; the library itself has a version.
+    if library := ctypes.util.find_library("ngspice"):
+        os.environ.setdefault("NGSPICE_LIBRARY_PATH", library)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # PySpice 1.5 is older than the language it runs on.
         from PySpice.Spice.NgSpice.Shared import NgSpiceShared
