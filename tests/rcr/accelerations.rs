@@ -54,7 +54,7 @@ fn compare(m: &Mechanism, seed: u64) -> Option<(f64, f64)> {
     let judge = dense::accelerations(&model, &dense::joints(&model), &reduction, &force)?;
     reduction.reduce_singular(&linkage, Task::Accelerations, &mut a);
     let general = dense::difference(&reduction.accelerations, &judge, 1.0);
-    assert!(general < 1e-14 * near * near + 1e-12, "general path: {general:e}, nearness {near:e}");
+    assert!(general < 1e-12, "general path: {general:e}, nearness {near:e}");
     Some((dense::difference(&fast, &judge, 1.0), near))
 }
 
@@ -70,14 +70,15 @@ fn open_trees() {
     }
 }
 
-/// Trees of pins with pin loops, coupled ones too: rounding times the square of the nearness to a singular configuration.
+/// Trees of pins with pin loops, coupled ones too: 1e-12 of dense pivoted elimination by the general path, and by the fast
+/// one away from singular configurations (rounding times the square of the nearness).
 #[test]
 fn trees_with_loops() {
     let mut compared = 0;
     for seed in 0..200 {
         let m = random(seed, 24, 1 + (seed % 6) as usize, &[PIN]);
         if let Some((apart, near)) = compare(&m, seed + 7) {
-            assert!(apart < 1e-14 * near * near + 1e-12, "loops {seed}: {apart:e}, nearness {near:e}");
+            assert!(apart < 1e-15 * near * near + 1e-12, "loops {seed}: {apart:e}, nearness {near:e}");
             compared += 1;
         }
     }

@@ -19,6 +19,8 @@ pub(super) struct ClosureData<T> {
     lever: T,
     held: Vec<[T; 3]>,
     pub(super) locked: [bool; 3],
+    /// Two material points coincide, whatever the turn between the bodies.
+    pin: bool,
 }
 
 /// One direction of a closure: its value, rate, rows over bodies a and b, and the velocity part of its second derivative.
@@ -72,30 +74,60 @@ impl<T: Real> ClosureData<T> {
             lever: lane(&|_, lever| lever),
             held,
             locked,
+            pin: of.iter().all(|(closure, _)| closure.is_pin()),
         }
     }
 
-    /// The constraint `row` of the closure, at two placed bodies.
+    /// The constraints of the closure at two placed bodies; those beyond their number are not filled.
     #[inline(always)]
-    pub(super) fn constraint(&self, row: usize, a: &Placed<T>, b: &Placed<T>) -> Strain<T> {
-        if let Some(r) = self.held.get(row) {
-            let dot = |x: &[T; 3]| r[0] * x[0] + r[1] * x[1] + r[2] * x[2];
-            return Strain { value: dot(&a.pose), rate: dot(&a.rate), a: *r, b: [T::ZERO; 3], bias: T::ZERO };
+    pub(super) fn constraints(&self, a: &Placed<T>, b: &Placed<T>) -> [Strain<T>; 3] {
+        let mut out = [Strain::NONE; 3];
+        if self.pin {
+            [out[0], out[1]] = self.pin_constraints(a, b);
+            return out;
         }
-        let mut left = row;
-        let strains = self.strains(a, b);
-        for (i, mut strain) in strains.into_iter().enumerate() {
-            if self.locked[i] {
-                if left == 0 {
-                    if i == 0 {
-                        strain.value -= self.rest;
-                    }
-                    return if i == 2 { strain.scaled(self.lever) } else { strain };
+        for (out, r) in out.iter_mut().zip(&self.held) {
+            let dot = |x: &[T; 3]| r[0] * x[0] + r[1] * x[1] + r[2] * x[2];
+            *out = Strain { value: dot(&a.pose), rate: dot(&a.rate), a: *r, b: [T::ZERO; 3], bias: T::ZERO };
+        }
+        if self.held.is_empty() {
+            let [mut axial, shear, rotation] = self.strains(a, b);
+            axial.value -= self.rest;
+            let mut count = 0;
+            for (strain, locked) in [axial, shear, rotation.scaled(self.lever)].into_iter().zip(self.locked) {
+                if locked {
+                    out[count] = strain;
+                    count += 1;
                 }
-                left -= 1;
             }
         }
-        strains[0]
+        out
+    }
+
+    /// A pin keeps two material points together: rows along x and y need no joint axes.
+    #[inline(always)]
+    fn pin_constraints(&self, a: &Placed<T>, b: &Placed<T>) -> [Strain<T>; 2] {
+        let (sa, sb) = (a.swing(self.arm_a), b.swing(self.arm_b));
+        let (ra, rb) = (plus(self.arm_a, sa), plus(self.arm_b, sb));
+        let (wa, wb) = (a.rate[2], b.rate[2]);
+        let (wa2, wb2) = (wa * wa, wb * wb);
+        let (one, zero) = (T::ONE, T::ZERO);
+        [
+            Strain {
+                value: (b.pose[0] - a.pose[0]) + (sb[0] - sa[0]),
+                rate: (b.rate[0] - a.rate[0]) + (wa * ra[1] - wb * rb[1]),
+                a: [-one, zero, ra[1]],
+                b: [one, zero, -rb[1]],
+                bias: wa2 * ra[0] - wb2 * rb[0],
+            },
+            Strain {
+                value: (b.pose[1] - a.pose[1]) + (sb[1] - sa[1]),
+                rate: (b.rate[1] - a.rate[1]) + (wb * rb[0] - wa * ra[0]),
+                a: [zero, -one, -ra[0]],
+                b: [zero, one, rb[0]],
+                bias: wa2 * ra[1] - wb2 * rb[1],
+            },
+        ]
     }
 
     /// The three strains (e_u, g, p) of a joint.
@@ -155,6 +187,8 @@ impl<T: Real> ClosureData<T> {
 }
 
 impl<T: Real> Strain<T> {
+    const NONE: Self = Self { value: T::ZERO, rate: T::ZERO, a: [T::ZERO; 3], b: [T::ZERO; 3], bias: T::ZERO };
+
     #[inline(always)]
     fn scaled(&self, k: T) -> Self {
         Self {

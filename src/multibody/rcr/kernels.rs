@@ -1,90 +1,11 @@
-//! Turns of bodies with one coordinate, in closed form: a pin of an open branch, and a front of one or two bodies with the
-//! rows of loops. They do what [`super::front`] does, with nothing left to decide while running.
+//! Turns of bodies with one coordinate and a front of one or two bodies, with the rows of loops, in closed form. They do what
+//! [`super::front`] does, with nothing left to decide while running.
 
 use super::real::Real;
 use super::reduce::{Reduction, Task};
-use super::schedule::{Kind, NONE};
+use super::schedule::NONE;
 
 impl<T: Real> Reduction<T> {
-    /// The articulated-body steps of a run of pins without loops, from body `first` on: what reaches a parent is a
-    /// translational inertia at the pin. Returns the body after the run.
-    #[inline(always)]
-    pub(super) fn pins_inward(&mut self, task: Task, first: usize) -> usize {
-        let steps = &self.schedule.steps[first..];
-        let run = steps.iter().position(|s| s.kind != Kind::Pin).unwrap_or(steps.len());
-        let bodies = first..first + run;
-        let zipped = (steps.iter().zip(&self.links[bodies.clone()]))
-            .zip(self.placed[bodies.clone()].iter().zip(&self.force[bodies.clone()]));
-        for (k, ((step, link), (placed, own))) in zipped.enumerate() {
-            let coordinate = step.first as usize;
-            let (inner, outer) = self.nodes.split_at_mut(first + k + 1);
-            let node = &mut inner[first + k];
-            let [mut a, b, mut c, d, e, mut f] = std::mem::replace(&mut node.inertia, [T::ZERO; 6]);
-            let mut force = std::mem::replace(&mut node.momentum, [T::ZERO; 3]);
-            a += link.mass;
-            c += link.mass;
-            f += link.inertia;
-            let s = self.axes[coordinate];
-            let u = [a * s[0] + b * s[1] + d * s[2], b * s[0] + c * s[1] + e * s[2], d * s[0] + e * s[1] + f * s[2]];
-            let inverse = T::ONE / (s[0] * u[0] + s[1] * u[1] + s[2] * u[2]);
-            let mut torque = T::ZERO;
-            if task == Task::Accelerations {
-                let bias = placed.bias;
-                force[0] += own[0] - (a * bias[0] + b * bias[1]);
-                force[1] += own[1] - (b * bias[0] + c * bias[1]);
-                force[2] += own[2] - (d * bias[0] + e * bias[1]);
-                torque = self.torque[coordinate];
-            }
-            let base = (torque + (s[0] * force[0] + s[1] * force[1] + s[2] * force[2])) * inverse;
-            node.base = base;
-            if step.parent == u32::MAX {
-                continue;
-            }
-            let [dx, dy] = placed.shift;
-            let v = [u[0] * inverse, u[1] * inverse];
-            let (kxx, kxy, kyy) = (a - u[0] * v[0], b - u[0] * v[1], c - u[1] * v[1]);
-            node.slope = [v[0], v[1], (u[2] * inverse) + (v[1] * dx - v[0] * dy)];
-            // the inertia left has no moment about the pin: shift it from there
-            let [px, py] = placed.lever_parent;
-            let (mx, my) = (kxy * px - kxx * py, kyy * px - kxy * py);
-            let parent = &mut outer[step.parent as usize - (first + k + 1)];
-            let inertia = &mut parent.inertia;
-            inertia[0] += kxx;
-            inertia[1] += kxy;
-            inertia[2] += kyy;
-            inertia[3] += mx;
-            inertia[4] += my;
-            inertia[5] += my * px - mx * py;
-            let (fx, fy) = (force[0] - u[0] * base, force[1] - u[1] * base);
-            let momentum = &mut parent.momentum;
-            momentum[0] += fx;
-            momentum[1] += fy;
-            momentum[2] += (fy * px - fx * py) - torque * s[2];
-        }
-        first + run
-    }
-
-    /// Acceleration of a pin's body.
-    #[inline(always)]
-    pub(super) fn pin_outward(&mut self, task: Task, body: usize, out: &mut [T]) {
-        let step = self.schedule.steps[body];
-        let first = step.first as usize;
-        let (placed, node) = (&self.placed[body], &self.nodes[body]);
-        let s = self.axes[first];
-        let mut x = node.base;
-        let mut a = if task == Task::Accelerations { [placed.bias[0], placed.bias[1], T::ZERO] } else { [T::ZERO; 3] };
-        if step.parent != u32::MAX {
-            let up = self.accelerations[step.parent as usize];
-            let c = node.slope;
-            x -= c[0] * up[0] + c[1] * up[1] + c[2] * up[2];
-            a[0] += up[0] - placed.shift[1] * up[2];
-            a[1] += up[1] + placed.shift[0] * up[2];
-            a[2] = up[2];
-        }
-        out[first] = x;
-        self.accelerations[body] = [a[0] + s[0] * x, a[1] + s[1] * x, a[2] + s[2] * x];
-    }
-
     /// A body with one coordinate, a front of `W` bodies and `H` constraint rows.
     #[inline(always)]
     pub(super) fn one_inward<const W: usize, const H: usize>(&mut self, task: Task, body: usize) {
@@ -310,8 +231,8 @@ impl<T: Real> Reduction<T> {
             x -= c[0] * other[0] + c[1] * other[1] + c[2] * other[2];
         }
         let mut a = if task == Task::Accelerations { [placed.bias[0], placed.bias[1], T::ZERO] } else { [T::ZERO; 3] };
-        if step.parent != u32::MAX {
-            let up = self.accelerations[step.parent as usize];
+        if let Some(parent) = step.parent() {
+            let up = self.accelerations[parent];
             a[0] += up[0] - placed.shift[1] * up[2];
             a[1] += up[1] + placed.shift[0] * up[2];
             a[2] = up[2];

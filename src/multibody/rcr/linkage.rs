@@ -97,6 +97,19 @@ impl Closure {
         }
     }
 
+    /// True for a joint that keeps two material points together and leaves the rotation free.
+    pub fn is_pin(&self) -> bool {
+        match self {
+            Self::Held { .. } => false,
+            Self::Joint(joint) => {
+                joint.locked == [true, true, false]
+                    && joint.rest == 0.0
+                    && joint.expansion.is_none()
+                    && joint.second[(1, 1)] == 0.0
+            }
+        }
+    }
+
     /// Number of constraints.
     pub fn constraints(&self) -> usize {
         match self {

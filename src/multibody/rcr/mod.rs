@@ -12,7 +12,8 @@
 //! | [`reduce`] | the recursion |
 //! | `project` | positions and rates that fulfil the loops |
 //! | `elastic` | forces of the joints' springs |
-//! | `kernels` | the same for one coordinate and small fronts, in closed form |
+//! | `pins` | runs of pins without loops |
+//! | `kernels` | one coordinate and small fronts, in closed form |
 //! | `lanes` | the recursion over lanes of variants, in vector instructions |
 //! | `singular` | the recursion near singular configurations |
 //! | [`real`] | what it runs over: one number, or lanes of variants |
@@ -28,6 +29,7 @@ mod kernels;
 mod lanes;
 pub mod linkage;
 mod motion;
+mod pins;
 mod project;
 pub mod real;
 pub mod reduce;

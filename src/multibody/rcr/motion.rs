@@ -12,6 +12,7 @@
 
 use super::linkage::{Link, Linkage, Parent};
 use super::real::Real;
+use super::schedule::Step;
 
 /// Two components.
 pub(super) type Pair<T> = [T; 2];
@@ -60,8 +61,6 @@ pub(super) struct Placed<T> {
     pub(super) rate: [T; 3],
     /// Sine and cosine of half the rotation.
     half: Pair<T>,
-    /// Entries of R − 1: cosine less one, and sine.
-    turned: Pair<T>,
     /// From the parent's centre of mass to this one, d [m].
     pub(super) shift: Pair<T>,
     /// R_p·arm_p: from the parent's centre of mass to the joint [m].
@@ -82,7 +81,6 @@ impl<T: Real> Placed<T> {
         pose: [T::ZERO; 3],
         rate: [T::ZERO; 3],
         half: [T::ZERO, T::ONE],
-        turned: [T::ZERO; 2],
         shift: [T::ZERO; 2],
         lever_parent: [T::ZERO; 2],
         bias: [T::ZERO; 2],
@@ -91,7 +89,7 @@ impl<T: Real> Placed<T> {
     /// (R − 1)·v without cancellation at small angles.
     #[inline(always)]
     pub(super) fn swing(&self, v: Pair<T>) -> Pair<T> {
-        let [less, s] = self.turned;
+        let [less, s] = turned(self.half);
         [less * v[0] - s * v[1], s * v[0] + less * v[1]]
     }
 
@@ -125,67 +123,44 @@ pub(super) fn turn<T: Real>(v: Pair<T>) -> Pair<T> {
     [-v[1], v[0]]
 }
 
-/// Places the body of `link` on `parent`. `axes` receives S for the directions that move.
+/// A body that nothing holds: its coordinates are its pose, its axes the directions themselves.
 #[inline(always)]
-pub(super) fn place<T: Real>(
-    link: &Link,
-    data: &LinkData<T>,
-    parent: &Placed<T>,
-    q: &[T],
-    v: &[T],
-    axes: &mut [[T; 3]],
-) -> Placed<T> {
-    if link.parent == Parent::Free {
-        return place_free(q, v, axes);
-    }
-    place_joint(link, data, parent, q, v, axes)
-}
-
-#[inline(always)]
-fn place_free<T: Real>(q: &[T], v: &[T], axes: &mut [[T; 3]]) -> Placed<T> {
+fn place_free<T: Real>(out: &mut Placed<T>, q: &[T], v: &[T], axes: &mut [[T; 3]]) {
     for (k, axis) in axes.iter_mut().enumerate() {
         *axis = [T::ZERO; 3];
         axis[k] = T::ONE;
     }
-    let (s, c) = (T::splat(0.5) * q[2]).sin_cos();
-    let half = [s, c];
-    Placed { pose: [q[0], q[1], q[2]], rate: [v[0], v[1], v[2]], half, turned: turned(half), ..Placed::REST }
+    (out.pose[0], out.pose[1]) = (q[0], q[1]);
+    (out.rate[0], out.rate[1]) = (v[0], v[1]);
 }
 
 /// A pin: rotation alone, no axial second-order strain.
 #[inline(always)]
-pub(super) fn place_pin<T: Real>(data: &LinkData<T>, parent: &Placed<T>, q: T, v: T, axes: &mut [[T; 3]]) -> Placed<T> {
-    let theta = parent.pose[2] + data.sign * q;
-    let (wp, w) = (parent.rate[2], parent.rate[2] + data.sign * v);
-    let (s, c) = (T::splat(0.5) * theta).sin_cos();
-    let half = [s, c];
-    let turned = turned(half);
-    let [x, y] = data.arm;
-    let swung = [turned[0] * x - turned[1] * y, turned[1] * x + turned[0] * y];
-    let swung_parent = parent.swing(data.arm_parent);
+fn place_pin<T: Real>(data: &LinkData<T>, parent: &Placed<T>, out: &mut Placed<T>) -> [T; 3] {
+    let (wp, w) = (parent.rate[2], out.rate[2]);
+    let (swung, swung_parent) = (out.swing(data.arm), parent.swing(data.arm_parent));
     let lever = plus(data.arm, swung);
     let to = plus(data.arm_parent, swung_parent);
     let (wp2, w2) = (wp * wp, w * w);
-    axes[0] = [data.sign * lever[1], -(data.sign * lever[0]), data.sign];
-    Placed {
-        pose: [parent.pose[0] + (swung_parent[0] - swung[0]), parent.pose[1] + (swung_parent[1] - swung[1]), theta],
-        rate: [parent.rate[0] + (w * lever[1] - wp * to[1]), parent.rate[1] + (wp * to[0] - w * lever[0]), w],
-        half,
-        turned,
-        shift: minus(to, lever),
-        lever_parent: to,
-        bias: [w2 * lever[0] - wp2 * to[0], w2 * lever[1] - wp2 * to[1]],
-    }
+    out.pose[0] = parent.pose[0] + (swung_parent[0] - swung[0]);
+    out.pose[1] = parent.pose[1] + (swung_parent[1] - swung[1]);
+    out.rate[0] = parent.rate[0] + (w * lever[1] - wp * to[1]);
+    out.rate[1] = parent.rate[1] + (wp * to[0] - w * lever[0]);
+    out.shift = minus(to, lever);
+    out.lever_parent = to;
+    out.bias = [w2 * lever[0] - wp2 * to[0], w2 * lever[1] - wp2 * to[1]];
+    [data.sign * lever[1], -(data.sign * lever[0]), data.sign]
 }
 
 fn place_joint<T: Real>(
     link: &Link,
     data: &LinkData<T>,
     parent: &Placed<T>,
+    out: &mut Placed<T>,
     q: &[T],
     v: &[T],
     axes: &mut [[T; 3]],
-) -> Placed<T> {
+) {
     let (mut e, mut de) = (data.rest, [T::ZERO; 3]);
     let mut next = 0;
     for i in 0..3 {
@@ -202,11 +177,7 @@ fn place_joint<T: Real>(
     let w = [e[0] - (bent[0] * e[1] + bent[1] * e[2]), e[1]];
     let dw = [de[0] - two * (bent[0] * de[1] + bent[1] * de[2]), de[1]];
     let ddw = [-(two * (bent_rate[0] * de[1] + bent_rate[1] * de[2])), T::ZERO];
-    let theta = parent.pose[2] + data.sign * e[2];
-    let omega = parent.rate[2] + data.sign * de[2];
-    let (s, c) = (T::splat(0.5) * theta).sin_cos();
-    let half = [s, c];
-    let mut out = Placed { half, turned: turned(half), ..Placed::REST };
+    let omega = out.rate[2];
     let (swung, swung_parent) = (out.swing(data.arm), parent.swing(data.arm_parent));
     let lever = plus(data.arm, swung);
     out.lever_parent = plus(data.arm_parent, swung_parent);
@@ -217,13 +188,13 @@ fn place_joint<T: Real>(
     let opening = times(data.sign, rw);
     out.shift = minus(plus(out.lever_parent, opening), lever);
     let d = minus(plus(swung_parent, opening), swung);
-    out.pose = [parent.pose[0] + d[0], parent.pose[1] + d[1], theta];
+    (out.pose[0], out.pose[1]) = (parent.pose[0] + d[0], parent.pose[1] + d[1]);
     let wp = parent.rate[2];
     let frame_rate = wp + data.sign * T::splat(0.5) * de[2];
     let (to_joint, from_joint) = (turn(out.lever_parent), turn(lever));
     let opening_rate = plus(times(frame_rate, turn(rw)), rdw);
     let x = minus(plus(times(wp, to_joint), times(data.sign, opening_rate)), times(omega, from_joint));
-    out.rate = [parent.rate[0] + x[0], parent.rate[1] + x[1], omega];
+    (out.rate[0], out.rate[1]) = (parent.rate[0] + x[0], parent.rate[1] + x[1]);
     let turning = plus(minus(times(two * frame_rate, turn(rdw)), times(frame_rate * frame_rate, rw)), rddw);
     out.bias = minus(plus(times(omega * omega, lever), times(data.sign, turning)), times(wp * wp, out.lever_parent));
     let slope = [two * bent[0], two * bent[1]];
@@ -243,13 +214,16 @@ fn place_joint<T: Real>(
             next += 1;
         }
     }
-    out
 }
 
-/// Places every body, root → leaf.
+/// Bodies whose sines are taken together.
+const BLOCK: usize = 16;
+
+/// Places every body, root → leaf, in blocks: angles first, so that the sines of a block are taken side by side.
 #[inline(always)]
 pub(super) fn place_all<T: Real>(
     linkage: &Linkage,
+    steps: &[Step],
     data: &[LinkData<T>],
     q: &[T],
     v: &[T],
@@ -257,19 +231,48 @@ pub(super) fn place_all<T: Real>(
     axes: &mut [[T; 3]],
 ) {
     let rest = Placed::REST;
-    for body in (0..linkage.links.len()).rev() {
-        let link = &linkage.links[body];
-        let (before, after) = placed.split_at_mut(body + 1);
-        let parent = match link.parent {
-            Parent::Body(p) => &after[p - body - 1],
-            Parent::Ground | Parent::Free => &rest,
-        };
-        let first = link.first;
-        before[body] = if link.pin {
-            place_pin(&data[body], parent, q[first], v[first], &mut axes[first..first + 1])
-        } else {
+    let mut end = steps.len();
+    while end > 0 {
+        let start = end.saturating_sub(BLOCK);
+        let mut halves = [[T::ZERO; BLOCK]; 2];
+        for body in (start..end).rev() {
+            let step = &steps[body];
+            let (mut theta, mut omega) = match step.parent() {
+                Some(p) => (placed[p].pose[2], placed[p].rate[2]),
+                None => (T::ZERO, T::ZERO),
+            };
+            if let Some(k) = step.turning() {
+                theta += data[body].sign * q[k];
+                omega += data[body].sign * v[k];
+            }
+            (placed[body].pose[2], placed[body].rate[2]) = (theta, omega);
+            halves[0][body - start] = T::splat(0.5) * theta;
+        }
+        let [sin, cos] = &mut halves;
+        T::sin_cos_each(&mut sin[..end - start], &mut cos[..end - start]);
+        for body in (start..end).rev() {
+            let step = &steps[body];
+            let (before, after) = placed.split_at_mut(body + 1);
+            let out = &mut before[body];
+            out.half = [halves[0][body - start], halves[1][body - start]];
+            let parent = match step.parent() {
+                Some(p) => &after[p - body - 1],
+                None => &rest,
+            };
+            let first = step.first as usize;
+            if step.pin {
+                axes[first] = place_pin(&data[body], parent, out);
+                continue;
+            }
+            let link = &linkage.links[body];
             let range = first..first + link.freedom();
-            place(link, &data[body], parent, &q[range.clone()], &v[range.clone()], &mut axes[range])
-        };
+            let (q, v, axes) = (&q[range.clone()], &v[range.clone()], &mut axes[range]);
+            if link.parent == Parent::Free {
+                place_free(out, q, v, axes);
+            } else {
+                place_joint(link, &data[body], parent, out, q, v, axes);
+            }
+        }
+        end = start;
     }
 }

@@ -36,6 +36,13 @@ pub trait Real:
     fn set_lane(&mut self, k: usize, x: f64);
     /// Sine and cosine.
     fn sin_cos(self) -> (Self, Self);
+    /// Replaces each angle in `sin` by its sine and writes its cosine to `cos`: the bits of [`Real::sin_cos`].
+    #[inline(always)]
+    fn sin_cos_each(sin: &mut [Self], cos: &mut [Self]) {
+        for (s, c) in sin.iter_mut().zip(cos) {
+            (*s, *c) = s.sin_cos();
+        }
+    }
     /// Square root.
     fn sqrt(self) -> Self;
     /// Magnitude of `self` with the sign of `sign`.
@@ -65,6 +72,19 @@ impl Real for f64 {
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
         if self.abs() > REDUCED { f64::sin_cos(self) } else { reduced_sin_cos(self) }
+    }
+    /// Eight at a time, in vector instructions.
+    #[inline(always)]
+    fn sin_cos_each(sin: &mut [Self], cos: &mut [Self]) {
+        let (eights, ones) = sin.as_chunks_mut::<8>();
+        let (cos_eights, cos_ones) = cos.as_chunks_mut::<8>();
+        for (s, c) in eights.iter_mut().zip(cos_eights) {
+            let (sines, cosines) = Lanes(*s).sin_cos();
+            (*s, *c) = (sines.0, cosines.0);
+        }
+        for (s, c) in ones.iter_mut().zip(cos_ones) {
+            (*s, *c) = s.sin_cos();
+        }
     }
     #[inline(always)]
     fn sqrt(self) -> Self {

@@ -35,14 +35,14 @@ pub(super) struct Node<T> {
     pub(super) inertia: [T; 6],
     /// Wrench that they hand on.
     pub(super) momentum: [T; 3],
-    /// A pin's coordinate per acceleration of its parent.
-    pub(super) slope: [T; 3],
-    /// A pin's coordinate when the parent rests.
+    /// A pin body's angular acceleration per acceleration of the pin.
+    pub(super) slope: [T; 2],
+    /// A pin body's angular acceleration when the pin rests.
     pub(super) base: T,
 }
 
 impl<T: Real> Node<T> {
-    const CLEAN: Self = Self { inertia: [T::ZERO; 6], momentum: [T::ZERO; 3], slope: [T::ZERO; 3], base: T::ZERO };
+    const CLEAN: Self = Self { inertia: [T::ZERO; 6], momentum: [T::ZERO; 3], slope: [T::ZERO; 2], base: T::ZERO };
 }
 
 /// The recursion with its storage, over one model or over lanes of variants.
@@ -145,7 +145,7 @@ impl<T: Real> Reduction<T> {
     /// Places all bodies for coordinates `q` and rates `v`.
     #[inline(always)]
     pub fn place(&mut self, linkage: &Linkage, q: &[T], v: &[T]) {
-        place_all(linkage, &self.links, q, v, &mut self.placed, &mut self.axes);
+        place_all(linkage, &self.schedule.steps, &self.links, q, v, &mut self.placed, &mut self.axes);
     }
 
     /// Displacement and rotation of a body from its drawn place [m, m, rad].
@@ -165,22 +165,23 @@ impl<T: Real> Reduction<T> {
         if self.closures.is_empty() {
             return largest;
         }
+        let rest = Placed::REST;
         for (c, closure) in linkage.closures.iter().enumerate() {
             let entry = self.schedule.entries[c];
             let turn = &self.schedule.turns[entry.body];
             let width = 3 + 3 * turn.front + 1;
             let (a, b, first_is_a) = match closure {
-                super::Closure::Held { body, .. } => (self.placed[*body], Placed::REST, true),
+                super::Closure::Held { body, .. } => (&self.placed[*body], &rest, true),
                 super::Closure::Joint(joint) => {
                     let at = |id| match id {
-                        crate::multibody::BodyId::Free(k) => self.placed[k],
-                        crate::multibody::BodyId::Ground => Placed::REST,
+                        crate::multibody::BodyId::Free(k) => &self.placed[k],
+                        crate::multibody::BodyId::Ground => &rest,
                     };
                     (at(joint.a), at(joint.b), joint.a == crate::multibody::BodyId::Free(entry.body))
                 }
             };
-            for k in 0..closure.constraints() {
-                let strain = self.closures[c].constraint(k, &a, &b);
+            let constraints = self.closures[c].constraints(a, b);
+            for (k, strain) in constraints.iter().enumerate().take(closure.constraints()) {
                 let start = turn.row_start + (entry.row + k) * width;
                 let row = &mut self.rows[start..start + width];
                 row.fill(T::ZERO);
@@ -221,7 +222,11 @@ impl<T: Real> Reduction<T> {
                 body += 1;
                 continue;
             };
-            body = self.pins_inward(task, body);
+            body = if task == Task::Accelerations {
+                self.pins_inward::<true>(body)
+            } else {
+                self.pins_inward::<false>(body)
+            };
         }
     }
 

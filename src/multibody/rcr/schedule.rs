@@ -27,10 +27,30 @@ pub(super) enum Kind {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Step {
     pub(super) kind: Kind,
+    /// A pin: its one coordinate turns it.
+    pub(super) pin: bool,
+    /// Other bodies than the one before in a run of pins hand something to it.
+    pub(super) gathers: bool,
     /// Parent body; `u32::MAX`: ground or free.
-    pub(super) parent: u32,
+    parent: u32,
     /// First coordinate.
     pub(super) first: u32,
+    /// The coordinate that turns it; `u32::MAX`: none.
+    turning: u32,
+}
+
+impl Step {
+    /// Parent body; none: ground or free.
+    #[inline(always)]
+    pub(super) fn parent(&self) -> Option<usize> {
+        (self.parent != u32::MAX).then_some(self.parent as usize)
+    }
+
+    /// The coordinate that turns it, if one does.
+    #[inline(always)]
+    pub(super) fn turning(&self) -> Option<usize> {
+        (self.turning != u32::MAX).then_some(self.turning as usize)
+    }
 }
 
 /// One body's turn.
@@ -196,10 +216,26 @@ impl Schedule {
                 Parent::Body(p) => p as u32,
                 Parent::Ground | Parent::Free => u32::MAX,
             };
-            schedule.steps.push(Step { kind, parent, first: link.first as u32 });
+            let turning = if link.moving[2] { (link.first + freedom - 1) as u32 } else { u32::MAX };
+            let step = Step { kind, pin: link.pin, gathers: false, parent, first: link.first as u32, turning };
+            schedule.steps.push(step);
             schedule.turns.push(turn);
         }
+        schedule.mark_gathering(pattern);
         schedule
+    }
+}
+
+impl Schedule {
+    /// Marks the bodies that receive something by way of memory: from any front but that of a pin just before them.
+    fn mark_gathering(&mut self, pattern: &crate::multibody::Pattern) {
+        for body in 0..self.steps.len() {
+            for k in pattern.column(body) {
+                let to = pattern.row(k);
+                let handed = to == body + 1 && self.steps[body].kind == Kind::Pin && self.steps[to].kind == Kind::Pin;
+                self.steps[to].gathers |= !handed;
+            }
+        }
     }
 }
 
