@@ -15,7 +15,7 @@
 //! of the pin as its point of reference is ours.
 
 use super::real::Real;
-use super::reduce::{Reduction, Task};
+use super::reduce::{Node, Reduction};
 use super::schedule::Kind;
 
 /// What one pin's body hands to the next inward, about the pin between them.
@@ -40,14 +40,16 @@ impl<T: Real> Reduction<T> {
     /// forces and velocity parts.
     #[inline(always)]
     pub(super) fn pins_inward<const FORCED: bool>(&mut self, first: usize) -> usize {
+        let run = self.schedule.run(first);
         let mut handed = Handed::NOTHING;
-        let mut body = first;
-        while body < self.links.len() && self.schedule.steps[body].kind == Kind::Pin {
-            let step = self.schedule.steps[body];
-            let (link, placed) = (&self.links[body], &self.placed[body]);
+        let zipped = (self.schedule.steps[run.clone()].iter().zip(&self.links[run.clone()]))
+            .zip(self.placed[run.clone()].iter().zip(&self.force[run.clone()]));
+        for (k, ((step, link), (placed, own))) in zipped.enumerate() {
+            let (inner, outer) = self.nodes.split_at_mut(first + k + 1);
+            let node = &mut inner[first + k];
             let [px, py] = placed.lever_parent;
             let (lx, ly) = (px - placed.shift[0], py - placed.shift[1]);
-            let own = if FORCED { self.force[body] } else { [T::ZERO; 3] };
+            let own = if FORCED { *own } else { [T::ZERO; 3] };
             let [cx, cy] = placed.bias;
             // own mass, and what came by way of memory
             let (mut kxx, mut kxy, mut kyy) = (link.mass, T::ZERO, link.mass);
@@ -59,7 +61,6 @@ impl<T: Real> Reduction<T> {
                 fy -= link.mass * cy;
             }
             if step.gathers {
-                let node = &mut self.nodes[body];
                 let [a, b, c, d_, e, f] = std::mem::replace(&mut node.inertia, [T::ZERO; 6]);
                 let momentum = std::mem::replace(&mut node.momentum, [T::ZERO; 3]);
                 let (gx, gy) = ((a * ly - b * lx) + d_, (b * ly - c * lx) + e);
@@ -77,7 +78,7 @@ impl<T: Real> Reduction<T> {
             let [hxx, hxy, hyy] = handed.inertia;
             let (rx, ry) = (handed.lever[0] - lx, handed.lever[1] - ly);
             let (hx, hy) = (hxy * rx - hxx * ry, hyy * rx - hxy * ry);
-            d += rx * hy - ry * hx;
+            d += (rx * rx * hyy + ry * ry * hxx) - (rx * ry + rx * ry) * hxy;
             let inverse = T::ONE / d;
             let [mut gx, mut gy] = handed.force;
             if FORCED {
@@ -89,59 +90,70 @@ impl<T: Real> Reduction<T> {
             let base = push * inverse;
             (ux, uy) = (ux + hx, uy + hy);
             let (vx, vy) = (ux * inverse, uy * inverse);
-            let node = &mut self.nodes[body];
             (node.base, node.slope) = (base, [vx, vy]);
             let left = Handed {
-                inertia: [(kxx + hxx) - ux * vx, (kxy + hxy) - ux * vy, (kyy + hyy) - uy * vy],
+                inertia: [
+                    (kxx + hxx) - (ux * ux) * inverse,
+                    (kxy + hxy) - (ux * uy) * inverse,
+                    (kyy + hyy) - (uy * uy) * inverse,
+                ],
                 force: [(fx + gx) - ux * base, (fy + gy) - uy * base],
                 moment: -drive,
                 lever: [px, py],
             };
-            body += 1;
-            handed = match step.parent() {
-                None => Handed::NOTHING,
-                Some(parent) if parent == body && self.schedule.steps[body].kind == Kind::Pin => left,
-                Some(parent) => {
-                    self.give(parent, &left);
-                    Handed::NOTHING
+            handed = left;
+            if !step.hands_on {
+                handed = Handed::NOTHING;
+                if let Some(parent) = step.parent() {
+                    left.give(&mut outer[parent - (first + k + 1)]);
                 }
-            };
+            }
         }
-        body
+        run.end
     }
 
-    /// Adds what a pin hands on to the node of `parent`, about its centre of mass.
+    /// Accelerations of the bodies of a run of pins that ends before `end`, root → leaf. Returns its first body.
     #[inline(always)]
-    fn give(&mut self, parent: usize, left: &Handed<T>) {
-        let ([kxx, kxy, kyy], [px, py], [fx, fy]) = (left.inertia, left.lever, left.force);
+    pub(super) fn pins_outward<const FORCED: bool>(&mut self, end: usize, out: &mut [T]) -> usize {
+        let steps = &self.schedule.steps[..end];
+        let first = steps.iter().rposition(|s| s.kind != Kind::Pin).map_or(0, |k| k + 1);
+        let run = first..end;
+        let zipped = (steps[run.clone()].iter().zip(&self.links[run.clone()]))
+            .zip(self.placed[run.clone()].iter().zip(&self.nodes[run.clone()]));
+        // of the body after, which is the parent along a chain
+        let mut after = [T::ZERO; 3];
+        for (k, ((step, link), (placed, node))) in zipped.enumerate().rev() {
+            let up = match step.parent() {
+                _ if step.hands_on => after,
+                Some(parent) => self.accelerations[parent],
+                None => [T::ZERO; 3],
+            };
+            let [px, py] = placed.lever_parent;
+            let (lx, ly) = (px - placed.shift[0], py - placed.shift[1]);
+            let mut a = [up[0] - py * up[2], up[1] + px * up[2]];
+            let angular = (node.base - node.slope[0] * a[0]) - node.slope[1] * a[1];
+            out[step.first as usize] = link.sign * (angular - up[2]);
+            if FORCED {
+                a = [a[0] + placed.bias[0], a[1] + placed.bias[1]];
+            }
+            after = [a[0] + ly * angular, a[1] - lx * angular, angular];
+            self.accelerations[first + k] = after;
+        }
+        first
+    }
+}
+
+impl<T: Real> Handed<T> {
+    /// Adds it to the node of the next body, about that one's centre of mass.
+    #[inline(always)]
+    fn give(&self, node: &mut Node<T>) {
+        let ([kxx, kxy, kyy], [px, py], [fx, fy]) = (self.inertia, self.lever, self.force);
         let (mx, my) = (kxy * px - kxx * py, kyy * px - kxy * py);
-        let node = &mut self.nodes[parent];
         for (sum, x) in node.inertia.iter_mut().zip([kxx, kxy, kyy, mx, my, my * px - mx * py]) {
             *sum += x;
         }
-        for (sum, x) in node.momentum.iter_mut().zip([fx, fy, (fy * px - fx * py) + left.moment]) {
+        for (sum, x) in node.momentum.iter_mut().zip([fx, fy, (fy * px - fx * py) + self.moment]) {
             *sum += x;
         }
-    }
-
-    /// Acceleration of a pin's body.
-    #[inline(always)]
-    pub(super) fn pin_outward(&mut self, task: Task, body: usize, out: &mut [T]) {
-        let step = self.schedule.steps[body];
-        let (placed, node) = (&self.placed[body], &self.nodes[body]);
-        let [px, py] = placed.lever_parent;
-        let (lx, ly) = (px - placed.shift[0], py - placed.shift[1]);
-        let (mut a, mut turn) = ([T::ZERO; 2], T::ZERO);
-        if let Some(parent) = step.parent() {
-            let up = &self.accelerations[parent];
-            turn = up[2];
-            a = [up[0] - py * turn, up[1] + px * turn];
-        }
-        let angular = (node.base - node.slope[0] * a[0]) - node.slope[1] * a[1];
-        out[step.first as usize] = self.links[body].sign * (angular - turn);
-        if task == Task::Accelerations {
-            a = [a[0] + placed.bias[0], a[1] + placed.bias[1]];
-        }
-        self.accelerations[body] = [a[0] + ly * angular, a[1] - lx * angular, angular];
     }
 }

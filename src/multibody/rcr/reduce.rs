@@ -475,13 +475,17 @@ impl<T: Real> Reduction<T> {
 
     #[inline(always)]
     fn outward(&mut self, linkage: &Linkage, task: Task, out: &mut [T]) {
-        for body in (0..self.links.len()).rev() {
+        let mut end = self.links.len();
+        while end > 0 {
+            let body = end - 1;
             match self.schedule.steps[body].kind {
-                Kind::Pin => self.pin_outward(task, body, out),
+                Kind::Pin if task == Task::Accelerations => end = self.pins_outward::<true>(end, out),
+                Kind::Pin => end = self.pins_outward::<false>(end, out),
                 Kind::One(_) => self.one_outward::<1>(task, body, out),
                 Kind::Two(_) => self.one_outward::<2>(task, body, out),
                 Kind::Any => self.any_outward(linkage, task, body, out),
             }
+            end = end.min(body);
         }
     }
 

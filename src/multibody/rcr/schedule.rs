@@ -31,6 +31,8 @@ pub(super) struct Step {
     pub(super) pin: bool,
     /// Other bodies than the one before in a run of pins hand something to it.
     pub(super) gathers: bool,
+    /// Its parent is the body after it, and both are of a run of pins.
+    pub(super) hands_on: bool,
     /// Parent body; `u32::MAX`: ground or free.
     parent: u32,
     /// First coordinate.
@@ -217,25 +219,41 @@ impl Schedule {
                 Parent::Ground | Parent::Free => u32::MAX,
             };
             let turning = if link.moving[2] { (link.first + freedom - 1) as u32 } else { u32::MAX };
-            let step = Step { kind, pin: link.pin, gathers: false, parent, first: link.first as u32, turning };
+            let step = Step {
+                kind,
+                pin: link.pin,
+                gathers: false,
+                hands_on: false,
+                parent,
+                first: link.first as u32,
+                turning,
+            };
             schedule.steps.push(step);
             schedule.turns.push(turn);
         }
-        schedule.mark_gathering(pattern);
+        schedule.mark_runs(pattern);
         schedule
     }
 }
 
 impl Schedule {
-    /// Marks the bodies that receive something by way of memory: from any front but that of a pin just before them.
-    fn mark_gathering(&mut self, pattern: &crate::multibody::Pattern) {
+    /// Marks what goes from pin to pin within a run, and who receives anything else.
+    fn mark_runs(&mut self, pattern: &crate::multibody::Pattern) {
         for body in 0..self.steps.len() {
-            for k in pattern.column(body) {
-                let to = pattern.row(k);
-                let handed = to == body + 1 && self.steps[body].kind == Kind::Pin && self.steps[to].kind == Kind::Pin;
-                self.steps[to].gathers |= !handed;
+            let pin = |k: usize| self.steps.get(k).is_some_and(|s| s.kind == Kind::Pin);
+            let hands_on = self.steps[body].parent() == Some(body + 1) && pin(body) && pin(body + 1);
+            self.steps[body].hands_on = hands_on;
+            for k in pattern.column(body).filter(|_| !hands_on) {
+                self.steps[pattern.row(k)].gathers = true;
             }
         }
+    }
+
+    /// The bodies after `first` that are pins of its run, itself included.
+    #[inline(always)]
+    pub(super) fn run(&self, first: usize) -> std::ops::Range<usize> {
+        let steps = &self.steps[first..];
+        first..first + steps.iter().position(|s| s.kind != Kind::Pin).unwrap_or(steps.len())
     }
 }
 
