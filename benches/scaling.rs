@@ -1,5 +1,6 @@
-//! Time against size, from 10² to 10⁶ coordinates, for the kernels and the Rodas4 step of every topology: nanoseconds per
-//! body at each size, and the least-squares exponent of time against size.
+//! Time against size, from 10² to 10⁶ coordinates, for the kernels and the Rodas4 step of every topology with flexible joints,
+//! and for the accelerations of the same on pins by recursive coordinate reduction: nanoseconds per body at each size, and the
+//! least-squares exponent of time against size, over all sizes and over those that outgrow the caches (from 10⁴ on).
 //!
 //!     taskset -c 0 cargo bench --no-default-features --bench scaling [-- TOPOLOGY …]
 //!
@@ -12,6 +13,7 @@ mod topologies;
 use bimorph::gaps::drive::Electrics;
 use bimorph::gaps::{Drive, Ramp, System};
 use bimorph::multibody::planar::Pose;
+use bimorph::multibody::rcr::{Linkage, Reduction};
 use bimorph::multibody::{BlockMatrix, forces};
 use bimorph::solve::method::{Method, Motion};
 use bimorph::solve::rodas4::Rodas4;
@@ -19,11 +21,14 @@ use std::hint::black_box;
 use std::time::Instant;
 
 const SIZES: [usize; 9] = [100, 316, 1_000, 3_160, 10_000, 31_600, 100_000, 316_000, 1_000_000];
-const WHAT: [&str; 6] = ["residual", "tangent + residual", "tangent + factor", "factor", "solve", "Rodas4 step"];
+const WHAT: [&str; 7] =
+    ["residual", "tangent + residual", "tangent + factor", "factor", "solve", "Rodas4 step", "reduction on pins"];
 
 /// Nanoseconds of each kind of work on a topology of about `coordinates` coordinates, and its number of bodies.
-fn measure(name: &str, coordinates: usize) -> (usize, [f64; 6]) {
-    let model = topologies::sized(name, coordinates).model();
+fn measure(name: &str, coordinates: usize) -> (usize, [f64; 7]) {
+    let topology = topologies::sized(name, coordinates);
+    let reduction = reduction(&topology);
+    let model = topology.model();
     let electrics = Electrics::default();
     let system = System { model, gaps: Vec::new(), loads: Vec::new(), electrics, length_scale: 2e-6 };
     let (n, model) = (system.bodies(), &system.model);
@@ -61,7 +66,17 @@ fn measure(name: &str, coordinates: usize) -> (usize, [f64; 6]) {
         motion.v.fill(Pose::zeros());
         rodas.step(&system, &ramp, 0.0, 4e-8, &mut motion, &mut error).unwrap_or_else(|e| panic!("{e:?}"));
     });
-    (n, [residual, tangent, both, factor, solve, step])
+    (n, [residual, tangent, both, factor, solve, step, reduction])
+}
+
+/// Nanoseconds of one evaluation of accelerations on pins.
+fn reduction(topology: &topologies::Topology) -> f64 {
+    let linkage = Linkage::new(&topology.pinned());
+    let mut reduction = Reduction::<f64>::new(&[&linkage]);
+    reduction.force.fill([1e-9, -1e-8, 0.0]);
+    let q: Vec<f64> = (0..linkage.coordinates).map(|k| 1e-2 * (k as f64 * 0.7).sin()).collect();
+    let mut out = vec![0.0; q.len()];
+    median(1, |_| reduction.accelerate(&linkage, black_box(&q), &q, &mut out))
 }
 
 /// Median nanoseconds of `work`, which does `repeat` units of work at a call.
@@ -115,14 +130,17 @@ fn exponent(points: &[(f64, f64)]) -> f64 {
 fn main() {
     let asked: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
     for name in topologies::NAMES.into_iter().filter(|n| asked.is_empty() || asked.iter().any(|a| a == n)) {
-        let mut points: Vec<(f64, [f64; 6])> = Vec::new();
+        let mut points: Vec<(f64, [f64; 7])> = Vec::new();
         println!("{name}, ns per body\n{:>9}{}", "bodies", WHAT.map(|w| format!("{w:>20}")).concat());
         for size in SIZES {
             let (n, times) = measure(name, size);
             println!("{n:>9}{}", times.map(|t| format!("{:>20.1}", t / n as f64)).concat());
             points.push((n as f64, times));
         }
-        let slope = |k: usize| exponent(&points.iter().map(|(n, t)| (*n, t[k])).collect::<Vec<_>>());
-        println!("{:>9}{}\n", "exponent", (0..6).map(|k| format!("{:>20.3}", slope(k))).collect::<String>());
+        for (what, from) in [("exponent", 0), ("from 1e4", SIZES.len() - 5)] {
+            let slope = |k: usize| exponent(&points[from..].iter().map(|(n, t)| (*n, t[k])).collect::<Vec<_>>());
+            println!("{what:>9}{}", (0..WHAT.len()).map(|k| format!("{:>20.3}", slope(k))).collect::<String>());
+        }
+        println!();
     }
 }

@@ -1,7 +1,7 @@
 //! Mechanisms of any size, as code: what the scaling tests and benches measure.
 //!
 //! A [`Topology`] names no formulation: bodies with centre, mass and inertia, and joints with place and angle. It can be read
-//! as rods with flexible joints between them ([`Topology::model`]) or as rods on pins. All are of 2 µm polysilicon
+//! as rods with flexible joints between them ([`Topology::model`]) or as rods on pins ([`Topology::pinned`]). All are of 2 µm polysilicon
 //! (E = 160 GPa, ρ = 2330 kg/m³), cut into rods 10 µm long and 2 µm wide.
 //!
 //! | generator | what it is | loops left when ground is taken out |
@@ -90,6 +90,15 @@ impl Topology {
 
     /// The mechanism with flexible joints: segments of beams, with gas drag.
     pub fn model(&self) -> Model {
+        self.lay([false; 3])
+    }
+
+    /// The mechanism on pins: every joint leaves the rotation alone free.
+    pub fn pinned(&self) -> Model {
+        self.lay([true, true, false])
+    }
+
+    fn lay(&self, locked: [bool; 3]) -> Model {
         let name: Arc<str> = Arc::from("rod");
         let (area, second) = (WIDTH * THICKNESS, THICKNESS * WIDTH.powi(3) / 12.0);
         let (ea, ei) = (MODULUS * area, MODULUS * second);
@@ -116,10 +125,10 @@ impl Topology {
                     axis: Vector2::new(pin.angle.cos(), pin.angle.sin()),
                 },
                 stiffness: Matrix3::from_diagonal(&Vector3::new(ea / ROD, 12.0 * ei / ROD.powi(3), ei / ROD)),
-                second: Matrix2::new(0.6 / ROD, 0.0, 0.0, -ROD / 12.0),
+                second: if locked[0] { Matrix2::zeros() } else { Matrix2::new(0.6 / ROD, 0.0, 0.0, -ROD / 12.0) },
                 expansion: None,
                 rest: 0.0,
-                locked: [false; 3],
+                locked,
             }
         }));
         Model::new(bodies, joints, Vec::new(), &[], false).0
