@@ -1,5 +1,5 @@
-//! Sine and cosine of a small angle together, inlined: no call, no reduction of the argument, the same bits on every
-//! machine. Within 1 ulp for |x| ≤ π/4; larger angles go to the platform's library.
+//! Sine and cosine together, inlined and the same bits on every machine: [`sin_cos`] for mostly small angles, without a
+//! reduction of the argument; [`reduced`] for any within [`REDUCED`], without a branch.
 //!
 //! Reference: the minimax polynomials of K. C. Ng, FreeBSD msun `k_sin.c` and `k_cos.c` (1993), which carry |x| ≤ π/4 with an
 //! error of the series below 2⁻⁵⁸.
@@ -20,7 +20,7 @@ const COS: [f64; 6] = [
     -2.755_731_435_139_066_330_35e-7, 2.087_572_321_298_174_827_90e-9, -1.135_964_755_778_819_482_65e-11,
 ];
 
-/// (sin x, cos x) for x in rad.
+/// (sin x, cos x) for x in rad, within 1 ulp for |x| ≤ π/4; larger angles go to the platform's library.
 #[inline]
 pub fn sin_cos(x: f64) -> (f64, f64) {
     // false for NaN too
@@ -36,6 +36,42 @@ fn small(x: f64) -> (f64, f64) {
     let half = 0.5 * z;
     let less = 1.0 - half;
     (x + z * x * (SIN[0] + z * s), less + (((1.0 - less) - half) + z * c))
+}
+
+/// Largest angle of [`reduced`] [rad].
+pub const REDUCED: f64 = 1e5;
+
+/// (sin x, cos x) for |x| ≤ [`REDUCED`] to about one unit in the last place, without a branch, so that a loop over lanes
+/// becomes vector instructions.
+///
+/// Reduction by π/2 in three parts: W. J. Cody, W. Waite, "Software Manual for the Elementary Functions" (1980).
+#[inline(always)]
+pub fn reduced(x: f64) -> (f64, f64) {
+    const SHIFT: f64 = 6_755_399_441_055_744.0; // 1.5·2^52: adding it rounds to an integer in the lowest bits
+    let shifted = x * std::f64::consts::FRAC_2_PI + SHIFT;
+    let quadrant = shifted.to_bits();
+    let k = shifted - SHIFT;
+    let t = x - k * 1.570_796_326_734_125_6;
+    let w = k * 6.077_100_506_303_966e-11;
+    let r = t - w;
+    let w = k * 2.022_266_248_795_950_6e-21 - ((t - r) - w);
+    let y = r - w;
+    let tail = (r - y) - w;
+    let z = y * y;
+    let v = z * y;
+    let s = SIN[1] + z * (SIN[2] + z * (SIN[3] + z * (SIN[4] + z * SIN[5])));
+    let sin = y - ((z * (0.5 * tail - v * s) - tail) - v * SIN[0]);
+    let c = z * (COS[0] + z * (COS[1] + z * (COS[2] + z * (COS[3] + z * (COS[4] + z * COS[5])))));
+    let half = 0.5 * z;
+    let one = 1.0 - half;
+    let cos = one + (((1.0 - one) - half) + (z * c - y * tail));
+    // odd quadrants swap, and the sign bits follow the quadrant
+    let odd = 0u64.wrapping_sub(quadrant & 1);
+    let (sin_bits, cos_bits) = (sin.to_bits(), cos.to_bits());
+    let swap = (sin_bits ^ cos_bits) & odd;
+    let sin = f64::from_bits((sin_bits ^ swap) ^ ((quadrant & 2) << 62));
+    let cos = f64::from_bits((cos_bits ^ swap) ^ ((quadrant.wrapping_add(1) & 2) << 62));
+    (sin, cos)
 }
 
 #[cfg(test)]

@@ -13,6 +13,7 @@
 //! | `project` | positions and rates that fulfil the loops |
 //! | `elastic` | forces of the joints' springs |
 //! | `pins` | runs of pins without loops |
+//! | `general` | the turn of any body |
 //! | `kernels` | one coordinate and small fronts, in closed form |
 //! | `lanes` | the recursion over lanes of variants, in vector instructions |
 //! | `singular` | the recursion near singular configurations |
@@ -25,6 +26,7 @@ mod closure;
 mod coordinates;
 mod elastic;
 mod front;
+mod general;
 mod kernels;
 mod lanes;
 pub mod linkage;

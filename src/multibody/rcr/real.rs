@@ -3,6 +3,7 @@
 //! Both go through the same additions and multiplications in the same order, without fused operations and with the same
 //! sine and cosine, so that a lane's bits are those of the serial run, whatever the width of the processor's vectors.
 
+use crate::multibody::sine::{REDUCED, reduced};
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
@@ -71,7 +72,7 @@ impl Real for f64 {
     }
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
-        if self.abs() > REDUCED { f64::sin_cos(self) } else { reduced_sin_cos(self) }
+        if self.abs() > REDUCED { f64::sin_cos(self) } else { reduced(self) }
     }
     /// Eight at a time, in vector instructions.
     #[inline(always)]
@@ -181,7 +182,7 @@ impl<const N: usize> Real for Lanes<N> {
             far |= self.0[k].abs() > REDUCED;
         }
         for k in 0..N {
-            (sin.0[k], cos.0[k]) = reduced_sin_cos(self.0[k]);
+            (sin.0[k], cos.0[k]) = reduced(self.0[k]);
         }
         if far {
             for k in 0..N {
@@ -218,50 +219,6 @@ impl<const N: usize> Real for Lanes<N> {
         }
         self
     }
-}
-
-/// Angles beyond this go through the standard library.
-const REDUCED: f64 = 1e5;
-
-/// Sine and cosine for |x| ≤ 1e5 to about one unit in the last place, without a branch, so that a loop over lanes becomes
-/// vector instructions.
-///
-/// Reduction by π/2 in three parts (W. J. Cody, W. Waite, "Software Manual for the Elementary Functions", 1980) and the
-/// minimax polynomials of FreeBSD's msun (`k_sin.c`, `k_cos.c`, Sun Microsystems 1993).
-#[inline(always)]
-fn reduced_sin_cos(x: f64) -> (f64, f64) {
-    const SHIFT: f64 = 6_755_399_441_055_744.0; // 1.5·2^52: adding it rounds to an integer in the lowest bits
-    let shifted = x * std::f64::consts::FRAC_2_PI + SHIFT;
-    let quadrant = shifted.to_bits();
-    let k = shifted - SHIFT;
-    let t = x - k * 1.570_796_326_734_125_6;
-    let w = k * 6.077_100_506_303_966e-11;
-    let r = t - w;
-    let w = k * 2.022_266_248_795_950_6e-21 - ((t - r) - w);
-    let y = r - w;
-    let tail = (r - y) - w;
-    let z = y * y;
-    let v = z * y;
-    let s = 8.333_333_333_322_49e-3
-        + z * (-1.984_126_982_985_795e-4
-            + z * (2.755_731_370_707_006_8e-6 + z * (-2.505_076_025_340_686_3e-8 + z * 1.589_690_995_211_55e-10)));
-    let sin = y - ((z * (0.5 * tail - v * s) - tail) + v * 1.666_666_666_666_663_2e-1);
-    let c = z
-        * (4.166_666_666_666_66e-2
-            + z * (-1.388_888_888_887_411e-3
-                + z * (2.480_158_728_947_673e-5
-                    + z * (-2.755_731_435_139_066_3e-7
-                        + z * (2.087_572_321_298_175e-9 + z * -1.135_964_755_778_819_5e-11)))));
-    let half = 0.5 * z;
-    let one = 1.0 - half;
-    let cos = one + (((1.0 - one) - half) + (z * c - y * tail));
-    // odd quadrants swap, and the sign bits follow the quadrant
-    let odd = 0u64.wrapping_sub(quadrant & 1);
-    let (sin_bits, cos_bits) = (sin.to_bits(), cos.to_bits());
-    let swap = (sin_bits ^ cos_bits) & odd;
-    let sin = f64::from_bits((sin_bits ^ swap) ^ ((quadrant & 2) << 62));
-    let cos = f64::from_bits((cos_bits ^ swap) ^ ((quadrant.wrapping_add(1) & 2) << 62));
-    (sin, cos)
 }
 
 #[cfg(test)]
