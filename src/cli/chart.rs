@@ -57,7 +57,8 @@ pub(crate) struct Chart {
     #[arg(long, value_name = "NAMES")]
     parts: Vec<String>,
 
-    /// Formulations: a,b [default: compliant,frame; the frame is linear]
+    /// Formulations: compliant, frame (linear), rcr, rcr-elastic (explicit steps: few and soft joints) [default:
+    /// compliant,frame]
     #[arg(long, value_name = "NAMES")]
     formulations: Vec<String>,
 
@@ -197,7 +198,7 @@ impl Chart {
             release: self.release.clone(),
             formulations: choose(
                 "--formulations",
-                &all(&self.formulations, &formulation_names),
+                &all(&self.formulations, &Formulation::DEFAULT.map(Formulation::name)),
                 &formulation_names,
                 &Formulation::ALL,
             )?,

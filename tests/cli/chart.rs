@@ -33,6 +33,19 @@ fn errors_fall_with_work() {
     assert!(compliant[1] < compliant[0], "{compliant:?}");
 }
 
+/// Joint coordinates are charted against themselves, integrated far more tightly, by their own method.
+#[test]
+fn joint_coordinates_converge() {
+    let bench = Bench::new(&[("c.net", CANTILEVER)]);
+    let chart = bench.json(&format!("{CHART} --parts precision --formulations rcr"));
+    let points = part(&chart, "precision");
+    assert_eq!(points.len(), 3);
+    assert!(points.iter().all(|p| p["formulation"] == "rcr" && p["method"] == "rk45"));
+    let errors: Vec<f64> = points.iter().map(|p| number(&p["measured"]["error"])).collect();
+    assert!(errors[2] < 0.1 * errors[0], "{errors:?}");
+    assert!(number(&chart["reference_error"]) < errors[2]);
+}
+
 /// All solvers are measured on the same sizes, and the multiplications of the recursion grow linearly with the unknowns, those
 /// of dense elimination with their cube.
 #[test]

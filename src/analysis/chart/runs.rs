@@ -3,18 +3,22 @@
 use super::error::relative_error;
 use super::variant::Variant;
 use super::{Chart, ChartError, ChartPoint, ChartSpec, Formulation, Measured, Part};
+use crate::analysis::formulation::Formulation as Joints;
 use crate::analysis::frame::{frame, frame_transient};
 use crate::analysis::integrator::Integrator;
+use crate::analysis::joint_transient::joint_transient;
 use crate::analysis::transient::{TransientOptions, TransientResult, transient};
 use crate::analysis::{AnalysisError, Watch};
 use crate::solve::linear::SolverKind;
 use std::time::Instant;
 
-/// What integrates references, and what checks them.
+/// What integrates references.
 const REFERENCE: Integrator = Integrator::Radau5;
+/// What checks them.
 const SECOND: Integrator = Integrator::Rodas4;
 /// How much tighter than the tightest tolerance of the list a reference is.
 const TIGHTER: f64 = 1e-2;
+
 /// Counts runs, and tells the watch.
 pub(super) struct Progress<'a> {
     pub(super) watch: Watch<'a>,
@@ -62,6 +66,10 @@ impl Request<'_> {
         let result = match formulation {
             Formulation::Compliant => {
                 transient(model.moving(), &options, &mut |_, _| {}, &mut |fraction| progress.run(fraction))
+            }
+            Formulation::Rcr | Formulation::RcrElastic => {
+                let joints = if formulation == Formulation::Rcr { Joints::Rcr } else { Joints::RcrElastic };
+                joint_transient(model.moving(), joints, &options, &mut |_, _| {}, &mut |f| progress.run(f)).map(|r| r.0)
             }
             Formulation::Frame => frame(model.moving()).and_then(|frame| {
                 frame_transient(model.moving(), &frame, &options, &mut |fraction| progress.run(fraction))
@@ -111,12 +119,16 @@ pub(super) fn precision(
 ) -> Result<(), ChartError> {
     let spec = request.spec;
     let tight = TIGHTER * spec.tols.iter().copied().fold(f64::INFINITY, f64::min);
-    for &formulation in spec.formulations.iter().filter(|f| f.takes_methods()) {
+    for &formulation in &spec.formulations {
+        let methods = formulation.methods(&spec.methods);
+        if methods.is_empty() {
+            continue;
+        }
         let (reference, _) = request.run(formulation, model, (REFERENCE, tight), progress)?;
         let (second, _) = request.run(formulation, model, (SECOND, 10.0 * tight), progress)?;
         let apart = relative_error(&reference, &second);
         chart.reference_error = Some(chart.reference_error.unwrap_or(0.0).max(apart));
-        for &method in &spec.methods {
+        for method in methods {
             for &tol in &spec.tols {
                 let found = request.point(formulation, model, (method, tol), progress)?;
                 chart.points.push(ChartPoint {
@@ -147,7 +159,8 @@ pub(super) fn order(
     let Some(last) = models.len().checked_sub(1) else { return Ok(()) };
     let (finest, _) = request.run(Formulation::Compliant, &models[last], (REFERENCE, tol), progress)?;
     for &formulation in &spec.formulations {
-        let own = formulation.takes_methods();
+        let method = formulation.methods(&[REFERENCE]).first().map_or("newmark", |m| m.name());
+        let solver = if formulation == Formulation::Frame { SolverKind::Sparse } else { SolverKind::Recursion };
         for (k, model) in models.iter().enumerate() {
             if formulation == Formulation::Compliant && k == last {
                 continue;
@@ -157,8 +170,8 @@ pub(super) fn order(
             chart.points.push(ChartPoint {
                 part: Part::Order,
                 formulation,
-                method: if own { REFERENCE.name() } else { "newmark" },
-                solver: if own { SolverKind::Recursion.name() } else { SolverKind::Sparse.name() },
+                method,
+                solver: solver.name(),
                 tol,
                 band_hz: model.moving().options.band,
                 unknowns,
