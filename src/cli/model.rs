@@ -33,7 +33,7 @@ pub(crate) struct ModelArgs {
     band: Option<f64>,
 
     /// How beams meet. centreline: in points, as in SUGAR; offset: at the edges of rigid junctions; calibrated: with springs
-    /// there, from two-dimensional elasticity [default: centreline]
+    /// there, from two-dimensional elasticity [default: calibrated]
     #[arg(long, value_name = "KIND")]
     junctions: Option<String>,
 
@@ -76,8 +76,22 @@ impl ModelArgs {
 
     /// Compiles the netlist and shows its warnings on standard error.
     pub(crate) fn compile(&self) -> Result<Compiled, Failure> {
-        let options = self.options()?;
-        let compiled = compile(&self.bundle()?, &options)?;
+        self.compiled(&self.options()?)
+    }
+
+    /// The same for a frame of cubic beams, whose centrelines meet in points.
+    pub(crate) fn compile_frame(&self) -> Result<Compiled, Failure> {
+        let mut options = self.options()?;
+        if self.junctions.is_some() && options.junctions != Junctions::Centreline {
+            let got = format!("\"{}\" with --solver frame, which has no other", options.junctions.name());
+            return Err(Failure::bad("--junctions", "centreline", got));
+        }
+        options.junctions = Junctions::Centreline;
+        self.compiled(&options)
+    }
+
+    fn compiled(&self, options: &CompileOptions) -> Result<Compiled, Failure> {
+        let compiled = compile(&self.bundle()?, options)?;
         warn(&compiled);
         Ok(compiled)
     }

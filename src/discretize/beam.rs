@@ -119,7 +119,7 @@ pub fn drag_per_mass(beam: &Beam, undamped: bool) -> f64 {
 fn add_rod(beam: &Beam, length: f64, along: Vector2<f64>, undamped: bool, node: Point, rigid: &mut Assembly) {
     if length > 0.0 {
         let mass = beam.material.density * beam.width * beam.thickness * length;
-        let second = mass * length * length / 3.0;
+        let second = mass * (length * length / 3.0 + beam.width * beam.width / 12.0);
         let lump = Lump { amount: mass, first: along * (0.5 * length * mass), second };
         rigid.add_mass(node, &lump, drag_per_mass(beam, undamped));
     }

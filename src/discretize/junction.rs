@@ -29,12 +29,12 @@ use std::f64::consts::PI;
 #[serde(rename_all = "lowercase")]
 pub enum Junctions {
     /// Centrelines meet in points, as in SUGAR.
-    #[default]
     Centreline,
     /// Beams end at the edge of the junction, which is rigid, and mass that is drawn twice counts once.
     Offset,
     /// The same with springs at the edge, calibrated on plane stress; beams also give way to shear, and their sections
     /// have rotary inertia.
+    #[default]
     Calibrated,
 }
 

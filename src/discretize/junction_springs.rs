@@ -76,10 +76,13 @@ mod tests {
         assert_eq!(row, table::CORNER[4][6]);
     }
 
-    /// Two equal beams in line, and every halving of a width as the other branch sees it, agree with the table's symmetry:
-    /// no spring where nothing changes.
+    /// No spring where nothing changes, and half a widths' offset at a right angle.
     #[test]
-    fn nothing_happens_in_line() {
-        assert!(table::CORNER[4][0].iter().all(|x| x.abs() < 2e-3), "{:?}", table::CORNER[4][0]);
+    fn landmarks() {
+        assert_eq!(table::CORNER[4][0], [0.0; 7]);
+        assert_eq!(
+            [table::CORNER[4][6][0], table::STEM[0][0][0], table::BAR[8][3][0], table::CROSS[2][0][0]],
+            [0.5; 4]
+        );
     }
 }
