@@ -75,7 +75,7 @@ pub fn lay(
         });
     }
     if calibrated {
-        add_rotary_inertia(beam, length, &points, rigid);
+        add_rotary_inertia(beam, h, ends, drawn, rigid);
     }
     points[0] = drawn[0];
     points[segments] = drawn[1];
@@ -125,13 +125,16 @@ fn add_rod(beam: &Beam, length: f64, along: Vector2<f64>, undamped: bool, node: 
     }
 }
 
-/// Rotary inertia of the sections of the flexible length: ρI for each length, half of a segment's at the ends.
-fn add_rotary_inertia(beam: &Beam, length: f64, points: &[Point], rigid: &mut Assembly) {
-    let last = points.len() - 1;
-    let unit = beam.material.density * beam.thickness * beam.width.powi(3) / 12.0 * length / last as f64;
-    for (k, &point) in points.iter().enumerate() {
-        let share = if k == 0 || k == last { 0.5 } else { 1.0 };
-        rigid.add_mass(point, &Lump { second: share * unit, ..Lump::default() }, 0.0);
+/// Rotary inertia of the sections next to nodes where something else is, ρI for each length: half of the first and the last
+/// segment's.
+///
+/// Inner bodies and those at free ends turn with next to no inertia of their own. A little would let them swing at a
+/// frequency that means nothing but costs steps, and what it takes off the frequencies of bending, ½·(k·w)²/12 of each, is
+/// small wherever a beam is long enough to have inner bodies.
+fn add_rotary_inertia(beam: &Beam, h: f64, ends: &[End; 2], points: [Point; 2], rigid: &mut Assembly) {
+    let second = 0.5 * h * beam.material.density * beam.thickness * beam.width.powi(3) / 12.0;
+    for (point, _) in points.into_iter().zip(ends).filter(|(_, end)| !end.free) {
+        rigid.add_mass(point, &Lump { second, ..Lump::default() }, 0.0);
     }
 }
 

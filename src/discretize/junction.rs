@@ -98,6 +98,8 @@ pub fn find(structure: &Structure, rigid: &Assembly, kind: Junctions) -> Ends {
             meet(branches, &structure.beams, &mut ends.beams);
             let strips = branches.iter().map(|b| Strip { angle: b.angle, width: b.width }).collect();
             ends.meetings.push((node, strips, branches[0].beam));
+        } else if let [b] = branches.as_slice() {
+            ends.beams[b.beam][b.end].free = true;
         }
     }
     for (beam, [start, end]) in structure.beams.iter().zip(&mut ends.beams) {

@@ -17,6 +17,8 @@ pub struct End {
     pub offset: f64,
     /// Compliance of the spring at the edge over (N, V, M) [m/N, rad/N, rad/(N·m)], of the branch seen from the node.
     pub spring: Matrix3<f64>,
+    /// Nothing else is there: neither another beam nor something rigid.
+    pub free: bool,
 }
 
 impl End {

@@ -27,6 +27,13 @@ fn static_equilibrium() {
     assert_eq!(number(&found["tol"]), 1e-4);
     assert!(found["unknowns"].as_u64() > Some(0) && found["iterations"].as_u64() > Some(0));
 
+    // unless it is told otherwise, a beam also gives way to shear: 12(1 + ν)/5·(w/l)²/4 = 3.1e-4 of the deflection
+    let stout = number(&bench.json("static c.net --linear --set F=2u")["nodes"]["b"]["y"]);
+    let slender = number(&found["nodes"]["b"]["y"]);
+    assert!(stout > slender * (1.0 - 1e-3) && stout < slender * (1.0 + 1e-3), "{stout:e} {slender:e}");
+    assert_eq!(bench.json("modes c.net")["junctions"], "calibrated");
+    assert_eq!(bench.json("modes c.net --solver frame")["junctions"], "centreline");
+
     let report = bench.run("static c.net --linear");
     assert!(report.stdout.contains("1.515 µm"), "{}", report.stdout);
 }
