@@ -120,9 +120,7 @@ impl ModelArgs {
 /// The kind of junctions of that name.
 fn junctions(name: &str) -> Result<Junctions, Failure> {
     let name = if name == "centerline" { "centreline" } else { name };
-    Junctions::ALL
-        .into_iter()
-        .find(|kind| kind.name() == name)
+    Junctions::named(name)
         .ok_or_else(|| Failure::bad("--junctions", "centreline, offset or calibrated", format!("\"{name}\"")))
 }
 

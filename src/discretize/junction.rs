@@ -32,8 +32,8 @@ pub enum Junctions {
     Centreline,
     /// Beams end at the edge of the junction, which is rigid, and mass that is drawn twice counts once.
     Offset,
-    /// The same with springs at the edge, calibrated on plane stress; beams also give way to shear, and their sections
-    /// have rotary inertia.
+    /// The same with springs at the edge, calibrated on plane stress; beams also give way to shear, and next to junctions
+    /// their sections have rotary inertia.
     #[default]
     Calibrated,
 }
@@ -41,6 +41,11 @@ pub enum Junctions {
 impl Junctions {
     /// Every kind.
     pub const ALL: [Self; 3] = [Self::Centreline, Self::Offset, Self::Calibrated];
+
+    /// The kind of that name.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.name() == name)
+    }
 
     /// The name that stands for it in options and outputs.
     pub fn name(self) -> &'static str {
