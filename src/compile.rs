@@ -3,17 +3,9 @@
 use crate::discretize::{DiscretizeError, DiscretizeOptions, Discretized, discretize};
 use crate::netlist::{Bundle, Diagnostics, Setting};
 use crate::structure::Structure;
-use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// How beams meet.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Junctions {
-    /// Centrelines meet in points, as in SUGAR.
-    #[default]
-    Centreline,
-}
+pub use crate::discretize::Junctions;
 
 /// What a compilation may be told. `Default` is the only place where the numbers stand.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,14 +26,7 @@ pub struct CompileOptions {
 
 impl Default for CompileOptions {
     fn default() -> Self {
-        Self {
-            set: Vec::new(),
-            band: None,
-            tol: 1e-3,
-            linear: false,
-            undamped: false,
-            junctions: Junctions::Centreline,
-        }
+        Self { set: Vec::new(), band: None, tol: 1e-3, linear: false, undamped: false, junctions: Junctions::default() }
     }
 }
 
@@ -78,8 +63,13 @@ pub enum CompileError {
 /// See [`CompileError`].
 pub fn compile(bundle: &Bundle, options: &CompileOptions) -> Result<Compiled, CompileError> {
     let loaded = crate::netlist::load(bundle, &options.set).map_err(CompileError::Netlist)?;
-    let choices =
-        DiscretizeOptions { band: options.band, tol: options.tol, linear: options.linear, undamped: options.undamped };
+    let choices = DiscretizeOptions {
+        band: options.band,
+        tol: options.tol,
+        linear: options.linear,
+        undamped: options.undamped,
+        junctions: options.junctions,
+    };
     let parts = discretize(&loaded.structure, &choices)?;
     Ok(Compiled {
         structure: loaded.structure,

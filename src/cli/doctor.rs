@@ -3,7 +3,7 @@
 use super::failure::Failure;
 use super::output::print;
 use bimorph::analysis::statics::static_equilibrium;
-use bimorph::compile::{CompileOptions, compile};
+use bimorph::compile::{CompileOptions, Junctions, compile};
 use bimorph::cosim::{self, CosimOptions, find_ngspice, find_plugin};
 use bimorph::netlist::Bundle;
 use bimorph::results::raw;
@@ -68,7 +68,7 @@ fn bundle() -> Bundle {
 }
 
 fn options() -> CompileOptions {
-    CompileOptions { linear: true, ..CompileOptions::default() }
+    CompileOptions { linear: true, junctions: Junctions::Centreline, ..CompileOptions::default() }
 }
 
 /// The tip of a cantilever against theory.

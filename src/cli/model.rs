@@ -32,9 +32,10 @@ pub(crate) struct ModelArgs {
     #[arg(long, value_name = "HZ", value_parser = value::number, allow_negative_numbers = true)]
     band: Option<f64>,
 
-    /// How beams meet; centreline: in points, as in SUGAR
-    #[arg(long, default_value = "centreline", value_name = "KIND")]
-    junctions: String,
+    /// How beams meet. centreline: in points, as in SUGAR; offset: at the edges of rigid junctions; calibrated: with springs
+    /// there, from two-dimensional elasticity [default: calibrated]
+    #[arg(long, value_name = "KIND")]
+    junctions: Option<String>,
 
     /// Small displacements about the drawn geometry, as SUGAR
     #[arg(long)]
@@ -62,14 +63,7 @@ impl ModelArgs {
         if let Some(band) = self.band.filter(|band| *band <= 0.0) {
             return Err(Failure::bad("--band", "a frequency above 0 Hz", band.to_string()));
         }
-        let junctions = match self.junctions.as_str() {
-            "centreline" | "centerline" => Junctions::Centreline,
-            "offset" | "calibrated" => {
-                let got = format!("\"{}\", which this version does not have yet", self.junctions);
-                return Err(Failure::bad("--junctions", "centreline", got));
-            }
-            other => return Err(Failure::bad("--junctions", "centreline", format!("\"{other}\""))),
-        };
+        let junctions = self.junctions.as_deref().map_or(Ok(defaults.junctions), junctions)?;
         Ok(CompileOptions {
             set: self.set.clone(),
             band: self.band,
@@ -82,8 +76,22 @@ impl ModelArgs {
 
     /// Compiles the netlist and shows its warnings on standard error.
     pub(crate) fn compile(&self) -> Result<Compiled, Failure> {
-        let options = self.options()?;
-        let compiled = compile(&self.bundle()?, &options)?;
+        self.compiled(&self.options()?)
+    }
+
+    /// The same for a frame of cubic beams, whose centrelines meet in points.
+    pub(crate) fn compile_frame(&self) -> Result<Compiled, Failure> {
+        let mut options = self.options()?;
+        if self.junctions.is_some() && options.junctions != Junctions::Centreline {
+            let got = format!("\"{}\" with --solver frame, which has no other", options.junctions.name());
+            return Err(Failure::bad("--junctions", "centreline", got));
+        }
+        options.junctions = Junctions::Centreline;
+        self.compiled(&options)
+    }
+
+    fn compiled(&self, options: &CompileOptions) -> Result<Compiled, Failure> {
+        let compiled = compile(&self.bundle()?, options)?;
         warn(&compiled);
         Ok(compiled)
     }
@@ -107,6 +115,13 @@ impl ModelArgs {
     pub(crate) fn title(&self) -> String {
         self.file.file_name().map_or_else(|| self.file.display().to_string(), |n| n.to_string_lossy().into_owned())
     }
+}
+
+/// The kind of junctions of that name.
+fn junctions(name: &str) -> Result<Junctions, Failure> {
+    let name = if name == "centerline" { "centreline" } else { name };
+    Junctions::named(name)
+        .ok_or_else(|| Failure::bad("--junctions", "centreline, offset or calibrated", format!("\"{name}\"")))
 }
 
 /// Shows the warnings of a netlist on standard error.

@@ -68,7 +68,10 @@ impl Modes {
         if self.count == 0 {
             return Err(Failure::bad("--count", "at least one mode", "0"));
         }
-        let compiled = self.model.compile()?;
+        let compiled = match self.solver {
+            ModelChoice::Recursion => self.model.compile()?,
+            ModelChoice::Frame => self.model.compile_frame()?,
+        };
         let busy = progress::spinner("modes");
         let result = match self.solver {
             ModelChoice::Recursion => modes_with_curves(&compiled, self.count, &self.ports),

@@ -46,7 +46,7 @@ pub(crate) fn options(compiled: &Compiled) -> String {
     if let Some(band) = options.band {
         let _ = write!(text, ", band {}", quantity(band, "Hz"));
     }
-    text.push_str(", junctions centreline");
+    let _ = write!(text, ", junctions {}", options.junctions.name());
     for (on, word) in [(options.linear, ", linear"), (options.undamped, ", undamped")] {
         if on {
             text.push_str(word);

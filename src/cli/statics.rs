@@ -68,7 +68,10 @@ struct Document<'a> {
 impl Static {
     pub(crate) fn run(&self) -> Result<(), Failure> {
         self.output.check()?;
-        let mut compiled = self.model.compile()?;
+        let mut compiled = match self.solver {
+            ModelChoice::Recursion => self.model.compile()?,
+            ModelChoice::Frame => self.model.compile_frame()?,
+        };
         let mut permanent_strains = Vec::new();
         if !self.backbend.is_empty() {
             if self.solver == ModelChoice::Frame {

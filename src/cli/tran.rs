@@ -138,7 +138,10 @@ impl Tran {
         }
         let formulation = self.formulation()?;
         let method = self.integrator(formulation)?;
-        let initial = self.model.compile()?;
+        let initial = match self.solver {
+            SolverChoice::Frame => self.model.compile_frame()?,
+            _ => self.model.compile()?,
+        };
         let released = match &self.release {
             Some(name) => Some(released(&self.model.bundle()?, &initial, name)?),
             None => None,

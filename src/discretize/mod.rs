@@ -11,6 +11,10 @@
 //! | [`order`] | model order: how many segments a beam gets |
 //! | [`rigid`] | nodes → rigid groups, supports → ground and held directions |
 //! | [`beam`] | the E4 segment: joints, second-order axial strain, masses |
+//! | [`junction`] | which beams meet where, and what that does to their ends |
+//! | [`junction_springs`] | offset and spring at the end of a beam |
+//! | [`junction_table`] | the springs' numbers, from plane stress |
+//! | [`overlap`] | mass that is drawn twice where beams meet |
 //! | [`frame`] | the same drawing as a linear frame of cubic beam elements: a baseline |
 //! | [`gap`] | combs, plates and facing beams → gap functions |
 //! | [`ports`] | resistors, heaters, sources and ports → network and quadratic forms of temperature |
@@ -18,7 +22,11 @@
 pub mod beam;
 pub mod frame;
 pub mod gap;
+pub mod junction;
+pub mod junction_springs;
+pub mod junction_table;
 pub mod order;
+pub mod overlap;
 pub mod ports;
 pub mod rigid;
 
@@ -27,6 +35,8 @@ use crate::multibody::{Damper, Joint, Model};
 use crate::structure::Structure;
 use nalgebra::{Matrix2, Matrix3, Vector2};
 use thiserror::Error;
+
+pub use junction::Junctions;
 
 /// How a drawing is to be discretized. `Default` is the only place where the numbers stand.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,11 +49,13 @@ pub struct DiscretizeOptions {
     pub linear: bool,
     /// Leave out gas damping.
     pub undamped: bool,
+    /// How beams meet.
+    pub junctions: Junctions,
 }
 
 impl Default for DiscretizeOptions {
     fn default() -> Self {
-        Self { band: None, tol: 1e-3, linear: false, undamped: false }
+        Self { band: None, tol: 1e-3, linear: false, undamped: false, junctions: Junctions::default() }
     }
 }
 
@@ -103,14 +115,17 @@ pub fn discretize(structure: &Structure, options: &DiscretizeOptions) -> Result<
     let mut dampers: Vec<Damper> = Vec::new();
     let mut beams = Vec::with_capacity(structure.beams.len());
     let mut heaters = Vec::new();
+    let ends = junction::find(structure, &rigid, options.junctions);
     for (index, drawn) in structure.beams.iter().enumerate() {
         let segments = order::segments(drawn, options.band, options.tol)?;
         let heater = drawn.heater.is_some().then(|| {
             heaters.push(index);
             heaters.len() - 1
         });
-        beams.push(beam::lay(drawn, segments, heater, options.undamped, &mut rigid, &mut joints));
+        let meeting = (options.junctions, &ends.beams[index]);
+        beams.push(beam::lay(drawn, segments, heater, options.undamped, meeting, &mut rigid, &mut joints));
     }
+    ends.correct_mass(structure, options.undamped, &mut rigid);
     for mass in &structure.masses {
         rigid.add_plate(mass, options.undamped);
     }

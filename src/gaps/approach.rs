@@ -14,6 +14,14 @@ pub struct Point {
 }
 
 impl Point {
+    /// The point of the same body that lies `shift` further as drawn [m]; ground has no places.
+    pub fn beyond(&self, shift: Vector2<f64>) -> Self {
+        match self.body {
+            BodyId::Ground => *self,
+            BodyId::Free(_) => Self { body: self.body, arm: self.arm + shift },
+        }
+    }
+
     /// Displacement of the point [m].
     #[inline]
     pub fn displacement(&self, q: &[Pose], linear: bool) -> Vector2<f64> {

@@ -27,6 +27,13 @@ fn static_equilibrium() {
     assert_eq!(number(&found["tol"]), 1e-4);
     assert!(found["unknowns"].as_u64() > Some(0) && found["iterations"].as_u64() > Some(0));
 
+    // unless it is told otherwise, a beam gives way to shear, 3.1e-4 of the deflection, and its clamped edge cannot contract
+    let stout = number(&bench.json("static c.net --linear --set F=2u")["nodes"]["b"]["y"]);
+    let slender = number(&found["nodes"]["b"]["y"]);
+    assert!(stout > slender * (1.0 - 1e-3) && stout < slender * (1.0 + 1e-3), "{stout:e} {slender:e}");
+    assert_eq!(bench.json("modes c.net")["junctions"], "calibrated");
+    assert_eq!(bench.json("modes c.net --solver frame")["junctions"], "centreline");
+
     let report = bench.run("static c.net --linear");
     assert!(report.stdout.contains("1.515 µm"), "{}", report.stdout);
 }
@@ -59,7 +66,8 @@ fn pull_in() {
 #[test]
 fn transient() {
     let bench = Bench::new(&[("c.net", CANTILEVER)]);
-    let words = "tran c.net --set F=1u --release F --stop 8u --points 161 --undamped --linear --signals b.y,b.rz";
+    let words = "tran c.net --set F=1u --release F --stop 8u --points 161 --undamped --linear --junctions centreline \
+                 --signals b.y,b.rz";
     let found = bench.json(words);
     let y: Vec<f64> = found["signals"]["b.y"].as_array().expect("samples").iter().map(number).collect();
     let t: Vec<f64> = found["t"].as_array().expect("times").iter().map(number).collect();
@@ -95,7 +103,7 @@ fn transient_methods() {
 #[test]
 fn sweep() {
     let bench = Bench::new(&[("c.net", CANTILEVER)]);
-    let words = "sweep c.net --linear --param F=1u:2u:5 --signals b.y";
+    let words = "sweep c.net --linear --junctions centreline --param F=1u:2u:5 --signals b.y";
     let whole = bench.run(words);
     assert_eq!(whole.status, 0, "{}", whole.stderr);
     assert!(whole.stderr.contains("5 points"), "{}", whole.stderr);

@@ -131,7 +131,7 @@ fn solvers_on_the_command_line() {
         assert!((a - b).abs() <= 2e-2 * want[0].abs(), "frame: {a:e} {b:e}");
     }
     let exact = bench.json("static c.net --set F=1u --solver frame");
-    let own = bench.json("static c.net --set F=1u --linear");
+    let own = bench.json("static c.net --set F=1u --linear --junctions centreline");
     assert!((number(&exact["nodes"]["b"]["y"]) / number(&own["nodes"]["b"]["y"]) - 1.0).abs() < 1e-9);
     assert_eq!(bench.json("modes c.net --count 2 --solver frame")["solver"], "frame");
     assert_eq!(bench.run("tran c.net --stop 1u --solver lu").status, 2);

@@ -4,7 +4,7 @@ use crate::{balance, close, linear, model, node};
 use bimorph::analysis::frame::{frame, frame_modes, frame_statics, frame_transient, frame_with};
 use bimorph::analysis::modes::modes;
 use bimorph::analysis::transient::{TransientOptions, transient};
-use bimorph::compile::{CompileOptions, Compiled, compile};
+use bimorph::compile::{CompileOptions, Compiled, Junctions, compile};
 use bimorph::discretize::frame::{Elements, FrameOptions};
 use bimorph::netlist::{Bundle, Setting};
 use bimorph::solve::linear::SolverKind;
@@ -12,7 +12,7 @@ use std::path::Path;
 
 fn bank(band: Option<f64>) -> Compiled {
     let bundle = Bundle::read(Path::new("examples/bank/bank.net"), &[]).unwrap();
-    compile(&bundle, &CompileOptions { band, ..CompileOptions::default() }).unwrap()
+    compile(&bundle, &CompileOptions { band, junctions: Junctions::Centreline, ..CompileOptions::default() }).unwrap()
 }
 
 /// On the heated bank every solver makes the same steps as the recursion, and the same motion to 1e-9 of its amplitude: the

@@ -8,12 +8,13 @@ mod examples;
 mod formulations;
 mod gaps;
 mod integrators;
+mod junctions;
 mod motion;
 mod paths;
 mod scenes;
 
 use bimorph::analysis::statics::{NodeMotion, StaticResult, static_equilibrium};
-use bimorph::compile::{CompileOptions, Compiled, compile};
+use bimorph::compile::{CompileOptions, Compiled, Junctions, compile};
 use bimorph::netlist::Bundle;
 
 /// Structural polysilicon with the constants of SUGAR's MUMPs process file, 2 µm thick.
@@ -22,10 +23,11 @@ process p1 = [ Poisson=0.3 Youngsmodulus=165e9 density=2300 viscosity=1.78e-5 fl
   sheetresistance=20 stress=0 straingradient=0 thermalexpansion=2.33e-6 ambienttemperature=293 thermcond=41 h=2u ]
 ";
 
-/// Compiles [`POLY`] followed by `text`.
+/// Compiles [`POLY`] followed by `text`, beams meeting in points: what closed forms and SUGAR describe.
 pub(crate) fn model(text: &str, options: &CompileOptions) -> Compiled {
     let bundle = Bundle::from_text("model.net", &format!("{POLY}{text}"));
-    compile(&bundle, options).unwrap_or_else(|e| panic!("{e}"))
+    compile(&bundle, &CompileOptions { junctions: Junctions::Centreline, ..options.clone() })
+        .unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// Small displacements, as SUGAR.

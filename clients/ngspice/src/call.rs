@@ -51,6 +51,7 @@ pub(crate) unsafe fn card(param: *mut *mut Parameter, count: c_int) -> RawCard {
         linear: flag(7),
         undamped: flag(8),
         deadline: real(9),
+        junctions: string(10, 0),
     }
 }
 

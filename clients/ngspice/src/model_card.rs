@@ -1,7 +1,7 @@
 //! The `.model` line of a device: what was given, checked and with its defaults.
 
 use crate::settings::{self, Monitor};
-use bimorph::compile::CompileOptions;
+use bimorph::compile::{CompileOptions, Junctions};
 use std::time::Duration;
 use thiserror::Error;
 
@@ -28,6 +28,8 @@ pub struct RawCard {
     pub undamped: Option<bool>,
     /// `deadline` [s]
     pub deadline: Option<f64>,
+    /// `junctions`
+    pub junctions: Option<String>,
 }
 
 /// A checked `.model` line.
@@ -62,6 +64,12 @@ pub enum CardError {
     /// An address that ngspice cut at its `//`.
     #[error("remote: ngspice takes // for a comment; write remote=\"unix:/PATH\" or remote=\"HOST:PORT\"")]
     Address,
+    /// No such kind of junctions.
+    #[error("junctions=\"{name}\": expected centreline, offset or calibrated")]
+    Junctions {
+        /// What was given.
+        name: String,
+    },
     /// A number is not positive.
     #[error("{name}={value} must be positive")]
     NotPositive {
@@ -110,7 +118,10 @@ impl ModelCard {
                 tol: positive("tol", raw.tol)?.unwrap_or(defaults.tol),
                 linear: raw.linear.unwrap_or(defaults.linear),
                 undamped: raw.undamped.unwrap_or(defaults.undamped),
-                ..defaults
+                junctions: match &raw.junctions {
+                    Some(name) => Junctions::named(name).ok_or_else(|| CardError::Junctions { name: name.clone() })?,
+                    None => defaults.junctions,
+                },
             },
             deadline: Duration::from_secs_f64(positive("deadline", raw.deadline)?.unwrap_or(DEADLINE).min(1e6)),
         })
@@ -162,11 +173,13 @@ mod tests {
             linear: Some(true),
             undamped: Some(true),
             deadline: Some(0.5),
+            junctions: Some("offset".into()),
             ..raw()
         };
         let card = ModelCard::new(&raw, None).unwrap();
         assert_eq!(card.remote.as_deref(), Some("unix:///a"));
         assert_eq!((card.options.tol, card.options.band), (1e-4, Some(1e6)));
+        assert_eq!(card.options.junctions, Junctions::Offset);
         assert!(card.options.linear && card.options.undamped && card.options.set.len() == 1);
         assert_eq!(card.deadline, Duration::from_millis(500));
         assert_eq!(ModelCard::new(&raw, Some("b:1".into())).unwrap().remote.as_deref(), Some("b:1"));
@@ -180,6 +193,8 @@ mod tests {
         assert_eq!(ModelCard::new(&RawCard::default(), None), Err(CardError::NoFile));
         let bad = RawCard { tol: Some(0.0), ..raw() };
         assert_eq!(ModelCard::new(&bad, None), Err(CardError::NotPositive { name: "tol", value: 0.0 }));
+        let bad = RawCard { junctions: Some("welded".into()), ..raw() };
+        assert_eq!(ModelCard::new(&bad, None), Err(CardError::Junctions { name: "welded".into() }));
         let bad = RawCard { remote: Some("unix:".into()), ..raw() };
         assert_eq!(ModelCard::new(&bad, None), Err(CardError::Address));
         let bad = RawCard { set: vec!["w".into()], ..raw() };

@@ -19,7 +19,7 @@ type Declaration = (&'static CStr, c_int, c_int, &'static CStr);
 const STRINGS: c_int = kind::IF_STRING | kind::IF_VECTOR;
 
 /// Parameters of a `.model` line, in the order of [`crate::call::card`].
-pub(crate) const PARAMETERS: [Declaration; 10] = [
+pub(crate) const PARAMETERS: [Declaration; 11] = [
     (c"file", kind::STRING, kind::IF_STRING, c"netlist of the mechanical part"),
     (c"ports", kind::STRING, STRINGS, c"names of the electrical ports, in the order of the node pairs"),
     (c"monitors", kind::STRING, STRINGS, c"signals shown as voltages, NAME or NAME:SCALE"),
@@ -30,6 +30,7 @@ pub(crate) const PARAMETERS: [Declaration; 10] = [
     (c"linear", kind::BOOLEAN, kind::IF_FLAG, c"small displacements about the drawn geometry"),
     (c"undamped", kind::BOOLEAN, kind::IF_FLAG, c"leave out gas damping"),
     (c"deadline", kind::REAL, kind::IF_REAL, c"longest wait for the server [s]"),
+    (c"junctions", kind::STRING, kind::IF_STRING, c"how beams meet: centreline, offset, calibrated"),
 ];
 
 static ZERO: c_int = 0;

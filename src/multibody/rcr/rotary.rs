@@ -9,8 +9,10 @@
 //! has 12 joints a bimorph (hot arm, tip bar, cold arm, flexure, link, and its share of yoke and tether), and the quarter
 //! stage of ten n = 10·12 + 3 = 123, the three of the free plate, and m = 20·3 = 60, which is the n and m ≈ n/2 of the paper.
 
+use crate::multibody::planar::Symmetric;
 use crate::multibody::section::Section;
 use crate::multibody::{BodyId, Model};
+use nalgebra::Matrix3;
 
 /// Coordinates and constraints as the paper counts them: loops cut through bodies, the last body free.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -24,6 +26,18 @@ pub struct Counts {
 }
 
 impl Section {
+    /// Takes the couplings of its directions away and keeps what each gives way by alone: where the others are rigid, a
+    /// spring half a segment away must not stiffen the rotation.
+    fn uncouple(&mut self) {
+        let [uu, ug, up, gg, gp, pp] = self.stiffness.0;
+        if (ug, up, gp) == (0.0, 0.0, 0.0) {
+            return;
+        }
+        if let Some(c) = Matrix3::new(uu, ug, up, ug, gg, gp, up, gp, pp).try_inverse() {
+            self.stiffness = Symmetric([1.0 / c[(0, 0)], 0.0, 0.0, 1.0 / c[(1, 1)], 0.0, 1.0 / c[(2, 2)]]);
+        }
+    }
+
     /// True for a segment of a beam, which bends; false for a lumped spring or a hinge.
     pub fn is_segment(&self) -> bool {
         self.stiffness.0[5] > 0.0 && (self.locked[1] || self.second != [0.0; 3])
@@ -36,6 +50,7 @@ impl Model {
         let mut model = self.clone();
         for section in model.sections.iter_mut().filter(|s| s.is_segment()) {
             section.locked = [true, true, false];
+            section.uncouple();
         }
         model
     }

@@ -59,7 +59,7 @@ pub fn options_to_wire(options: &CompileOptions) -> proto::CompileOptions {
         tol: Some(options.tol),
         linear: options.linear,
         undamped: options.undamped,
-        junctions: junctions_name(options.junctions),
+        junctions: options.junctions.name().to_owned(),
     }
 }
 
@@ -92,14 +92,7 @@ pub fn options_from_wire(options: Option<proto::CompileOptions>) -> Result<Compi
     })
 }
 
-/// The name under which serde writes the variant, which is the name of the command's flag too.
-fn junctions_name(junctions: Junctions) -> String {
-    match serde_json::to_value(junctions) {
-        Ok(serde_json::Value::String(name)) => name,
-        _ => String::new(),
-    }
-}
-
+/// The variant that serde, and so the command's flag, calls so.
 fn junctions_from_name(name: &str) -> Result<Junctions, Violation> {
     let deserializer: StrDeserializer<'_, NameError> = name.into_deserializer();
     Junctions::deserialize(deserializer).map_err(|error| Violation::new("options.junctions", error.to_string()))
@@ -136,6 +129,10 @@ mod tests {
 
     #[test]
     fn options_survive_the_wire() {
+        for junctions in Junctions::ALL {
+            let named = proto::CompileOptions { junctions: junctions.name().into(), ..Default::default() };
+            assert_eq!(options_from_wire(Some(named)).map(|options| options.junctions), Ok(junctions));
+        }
         let options = CompileOptions {
             set: vec![("w".into(), Setting::Number(2e-6)), ("layer".into(), Setting::Text("p1".into()))],
             band: Some(1e6),

@@ -31,7 +31,7 @@ fn accepted_forms() {
     for (parameters, instance) in [
         (r#"file="plate" ports=["drive" "sense"] monitors=["plate.x:1e6"]"#, PLAIN),
         (
-            r#"file="plate" monitors=["plate.x"] set=["w=2.1u" "F=0"] tol=1e-4 band=1e6 linear=true undamped=true"#,
+            r#"file="plate" monitors=["plate.x"] set=["w=2.1u" "F=0"] tol=1e-4 band=1e6 linear=true undamped=true junctions="offset""#,
             PLAIN,
         ),
         (r#"file="plate" monitors=["plate.x"] set=["w:2.1u" "mode:fast"] deadline=2"#, PLAIN),

@@ -53,7 +53,8 @@ class Client:
         """Compiles a netlist (a path, or a :class:`Netlist`).
 
         ``set`` overrides netlist parameters [SI]. ``band`` is the highest frequency to resolve [Hz], ``tol`` the relative
-        error aimed at [1], ``linear`` small displacements about the drawn geometry, ``undamped`` leaves out gas damping.
+        error aimed at [1], ``linear`` small displacements about the drawn geometry, ``undamped`` leaves out gas damping,
+        ``junctions`` how beams meet: "centreline", "offset" or "calibrated" (the default).
 
         Raises :class:`NetlistError` with all diagnostics.
         """

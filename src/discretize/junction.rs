@@ -1,0 +1,262 @@
+//! Which beams meet where, what kind of junction that is, and what it does to their ends and to the mass.
+//!
+//! | beams at a node | rows of the table |
+//! |---|---|
+//! | one, at an anchor, a plate, a rigid link or a guide that holds the angle | the clamped end |
+//! | two | the corner, by turn and ratio of widths; turn 0 is a step of the width, and nothing without one |
+//! | three or more, two of them in line within 50° | these are a bar; each other one is a stem, each half of the bar feels every stem |
+//! | four, two and two in line | a cross |
+//! | otherwise | each branch has a corner with the widest of the others: a makeshift |
+//!
+//! Where a bar changes its width, the step is added, as far as no stem covers it. Offsets of one beam take at most nine
+//! tenths of its length: more is cut down in proportion. A node whose beams all lie on one rigid part has no junction of its
+//! own: there each beam ends where it is drawn.
+//!
+//! Not in the table: Poisson's ratios other than 0.3, branches of different stiffness or thickness (each takes its own),
+//! ratios of widths beyond 8 and stems that lean by more than 45° (the last row holds).
+
+use super::junction_springs::{End, interpolate};
+use super::junction_table as table;
+use super::overlap::{self, IN_LINE, Strip, turn};
+use super::rigid::Assembly;
+use crate::multibody::BodyId;
+use crate::structure::{Beam, Structure};
+use serde::{Deserialize, Serialize};
+use std::f64::consts::PI;
+
+/// How beams meet.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Junctions {
+    /// Centrelines meet in points, as in SUGAR.
+    Centreline,
+    /// Beams end at the edge of the junction, which is rigid, and mass that is drawn twice counts once.
+    Offset,
+    /// The same with springs at the edge, calibrated on plane stress; beams also give way to shear, and next to junctions
+    /// their sections have rotary inertia.
+    #[default]
+    Calibrated,
+}
+
+impl Junctions {
+    /// Every kind.
+    pub const ALL: [Self; 3] = [Self::Centreline, Self::Offset, Self::Calibrated];
+
+    /// The kind of that name.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.name() == name)
+    }
+
+    /// The name that stands for it in options and outputs.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Centreline => "centreline",
+            Self::Offset => "offset",
+            Self::Calibrated => "calibrated",
+        }
+    }
+}
+
+/// Share of a beam that its two offsets may take together.
+const MOST: f64 = 0.9;
+
+/// One beam as its junction sees it.
+#[derive(Debug, Clone, Copy)]
+struct Branch {
+    beam: usize,
+    /// 0 where the beam starts, 1 where it ends.
+    end: usize,
+    /// Direction from the node outwards [rad].
+    angle: f64,
+    width: f64,
+}
+
+/// What junctions do to a drawing.
+#[derive(Debug, Clone)]
+pub struct Ends {
+    /// For each beam, its start and its end.
+    pub beams: Vec<[End; 2]>,
+    /// Junctions with two beams or more: node, its strips, a beam whose material they are taken to be of.
+    meetings: Vec<(usize, Vec<Strip>, usize)>,
+}
+
+/// Finds the junctions of a drawing.
+pub fn find(structure: &Structure, rigid: &Assembly, kind: Junctions) -> Ends {
+    let mut ends = Ends { beams: vec![[End::default(); 2]; structure.beams.len()], meetings: Vec::new() };
+    if kind == Junctions::Centreline {
+        return ends;
+    }
+    let held = rigid_nodes(structure, rigid);
+    let mut at: Vec<Vec<Branch>> = vec![Vec::new(); structure.nodes.len()];
+    for (k, beam) in structure.beams.iter().enumerate() {
+        for (end, node) in [beam.a.0, beam.b.0].into_iter().enumerate() {
+            at[node].push(Branch { beam: k, end, angle: beam.angle + PI * end as f64, width: beam.width });
+        }
+    }
+    let guided: Vec<usize> = structure.supports.iter().filter(|s| s.held[2]).map(|s| s.node.0).collect();
+    for (node, branches) in at.iter().enumerate() {
+        if held[node] || (branches.len() == 1 && guided.contains(&node)) {
+            for b in branches {
+                ends.beams[b.beam][b.end].add(&table::CLAMP, &structure.beams[b.beam], b.width, false);
+            }
+        } else if branches.len() > 1 {
+            meet(branches, &structure.beams, &mut ends.beams);
+            let strips = branches.iter().map(|b| Strip { angle: b.angle, width: b.width }).collect();
+            ends.meetings.push((node, strips, branches[0].beam));
+        } else if let [b] = branches.as_slice() {
+            ends.beams[b.beam][b.end].free = true;
+        }
+    }
+    for (beam, [start, end]) in structure.beams.iter().zip(&mut ends.beams) {
+        let share = (start.offset + end.offset) / (MOST * beam.length);
+        for end in [start, end] {
+            if share > 1.0 {
+                end.offset /= share;
+            }
+            if kind == Junctions::Offset {
+                end.spring.fill(0.0);
+            }
+        }
+    }
+    ends
+}
+
+impl Ends {
+    /// Takes away the mass that junctions have twice, and adds what corners lack.
+    pub fn correct_mass(&self, structure: &Structure, undamped: bool, rigid: &mut Assembly) {
+        for (node, strips, beam) in &self.meetings {
+            let beam = &structure.beams[*beam];
+            let m = &beam.material;
+            let mut excess = overlap::overlap(strips);
+            // beams shorter than the junction have no such overlap
+            let shortest = (structure.beams.iter().filter(|b| b.a.0 == *node || b.b.0 == *node))
+                .map(|b| b.length)
+                .fold(f64::INFINITY, f64::min);
+            let widest = strips.iter().map(|s| s.width).fold(0.0, f64::max);
+            let scale = -m.density * beam.thickness * (shortest / widest).min(1.0);
+            excess.amount *= scale;
+            excess.first *= scale;
+            excess.second *= scale;
+            rigid.add_mass(rigid.point(*node), &excess, super::beam::drag_per_mass(beam, undamped));
+        }
+    }
+}
+
+/// Nodes on anchors, plates and rigid links: beams end there where they are drawn.
+fn rigid_nodes(structure: &Structure, rigid: &Assembly) -> Vec<bool> {
+    let mut held: Vec<bool> = (0..structure.nodes.len()).map(|n| rigid.point(n).body == BodyId::Ground).collect();
+    for link in &structure.links {
+        held[link.a.0] = true;
+        held[link.b.0] = true;
+    }
+    for mass in structure.masses.iter().filter(|m| m.outline[0] > 0.0 && m.outline[1] > 0.0) {
+        held[mass.node.0] = true;
+    }
+    held
+}
+
+/// Adds what a junction does to the ends of its branches.
+fn meet(branches: &[Branch], beams: &[Beam], ends: &mut [[End; 2]]) {
+    let mut add = |b: &Branch, row: &table::Row, other: f64, mirrored: bool| {
+        ends[b.beam][b.end].add(row, &beams[b.beam], other, mirrored);
+    };
+    let pairs = in_line(branches);
+    match (branches, pairs.as_slice()) {
+        ([a, b], _) => {
+            let between = turn(a.angle, b.angle).to_degrees();
+            for (one, other) in [(a, b), (b, a)] {
+                let row = interpolate(&table::CORNER, other.width / one.width, &table::TURNS, between);
+                add(one, &row, other.width, left_of(one, other) < 0.0);
+            }
+        }
+        ([_, _, _, _], &[(a, b), (c, d)]) => {
+            for ((a, b), (c, d)) in [((a, b), (c, d)), ((c, d), (a, b))] {
+                let wide = branches[c].width.max(branches[d].width);
+                for k in [a, b] {
+                    let own = &branches[k];
+                    let tilt = -0.5 * (angle_to(own, &branches[c]) + angle_to(own, &branches[d])).to_degrees();
+                    let row = interpolate(&table::CROSS, wide / own.width, &table::TILTS, tilt.abs());
+                    add(own, &row, wide, tilt < 0.0);
+                }
+                step(&branches[a], &branches[b], wide, &mut add);
+            }
+        }
+        (_, &[(a, b), ..]) => {
+            let (i, j) = (&branches[a], &branches[b]);
+            let wide = i.width.max(j.width);
+            let mut covered: f64 = 0.0;
+            for (k, stem) in branches.iter().enumerate() {
+                if k == a || k == b {
+                    continue;
+                }
+                covered = covered.max(stem.width);
+                // half the difference of the angles to both halves: positive when it leans towards i
+                let lean = 0.5 * (angle_to(stem, j).abs() - angle_to(stem, i).abs()).to_degrees();
+                let near = if lean > 0.0 { i } else { j };
+                let row = interpolate(&table::STEM, wide / stem.width, &table::TILTS, lean.abs());
+                add(stem, &row, wide, left_of(stem, near) > 0.0);
+                for (half, lean) in [(i, lean), (j, -lean)] {
+                    let row = interpolate(&table::BAR, stem.width / half.width, &table::LEANS, lean);
+                    add(half, &row, stem.width, left_of(half, stem) < 0.0);
+                }
+            }
+            step(i, j, covered, &mut add);
+        }
+        _ => {
+            for (k, own) in branches.iter().enumerate() {
+                let others = branches.iter().enumerate().filter(|&(i, _)| i != k).map(|(_, b)| b);
+                if let Some(other) = others.max_by(|a, b| a.width.total_cmp(&b.width)) {
+                    let between = turn(own.angle, other.angle).to_degrees();
+                    let row = interpolate(&table::CORNER, other.width / own.width, &table::TURNS, between);
+                    add(own, &row, other.width, left_of(own, other) < 0.0);
+                }
+            }
+        }
+    }
+}
+
+/// The step in the width of a bar, as far as what crosses it does not cover it.
+fn step(a: &Branch, b: &Branch, covered: f64, add: &mut impl FnMut(&Branch, &table::Row, f64, bool)) {
+    let open = 1.0 - covered / a.width.max(b.width);
+    if open <= 0.0 || a.width == b.width {
+        return;
+    }
+    for (one, other) in [(a, b), (b, a)] {
+        let mut row = interpolate(&table::CORNER, other.width / one.width, &table::TURNS, 0.0);
+        row.iter_mut().for_each(|x| *x *= open);
+        add(one, &row, other.width, false);
+    }
+}
+
+/// Pairs of branches that go on in line, the straightest first; a branch is in one pair at most.
+fn in_line(branches: &[Branch]) -> Vec<(usize, usize)> {
+    let mut found: Vec<(f64, usize, usize)> = Vec::new();
+    for i in 0..branches.len() {
+        for j in i + 1..branches.len() {
+            let turn = turn(branches[i].angle, branches[j].angle);
+            if turn < IN_LINE {
+                found.push((turn, i, j));
+            }
+        }
+    }
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut taken = vec![false; branches.len()];
+    let mut pairs = Vec::new();
+    for (_, i, j) in found {
+        if !taken[i] && !taken[j] {
+            (taken[i], taken[j]) = (true, true);
+            pairs.push((i, j));
+        }
+    }
+    pairs
+}
+
+/// Angle from one branch to another, counterclockwise, −π…π [rad].
+fn angle_to(from: &Branch, to: &Branch) -> f64 {
+    (to.angle - from.angle + PI).rem_euclid(2.0 * PI) - PI
+}
+
+/// Positive where the other branch lies on the left of the first.
+fn left_of(from: &Branch, to: &Branch) -> f64 {
+    (to.angle - from.angle).sin()
+}
