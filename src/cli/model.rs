@@ -77,6 +77,7 @@ impl ModelArgs {
             linear: self.linear,
             undamped: self.undamped,
             junctions,
+            ..defaults
         })
     }
 

@@ -1,117 +1,102 @@
-//! The E4 segment: a beam as rigid bodies at N + 1 nodes and N joints at the middle of the segments.
-//!
-//! Joint of a segment of length h (axial u, shear g, rotation p): stiffness EA/h, 12EI/h³, EI/h, and the second-order axial
-//! strain e_u = u − h·p²/12 + 0.6·g²/h. Static deflections under end loads are those of the Euler–Bernoulli beam, for any N.
-//!
-//! Masses, in units of ρA·h: inner bodies 1; the end bodies 25/48 with a first moment of 5/48·h towards the inside and a
-//! second moment of 1/48·h² about the node; their neighbours 47/48 (46/48 when N = 2); for N = 1 two halves at the Gauss
-//! points. Mass, first and second moment of the beam are exact, and the frequency error is (kh)⁴/1440.
+//! A beam of the drawing as bodies and joints of a model, cut by a [`Scheme`](super::scheme::Scheme).
 
+use super::DiscretizeOptions;
 use super::rigid::{Assembly, Lump};
+use super::scheme::Bar;
 use crate::gaps::Point;
-use crate::multibody::{BodyId, BodyName, Joint};
+use crate::multibody::{BodyId, BodyName, Coupling, Joint};
 use crate::structure::Beam;
-use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
+use nalgebra::Vector2;
 use std::sync::Arc;
 
-/// Lays a beam: adds its inner bodies, masses and joints. Returns the points along it, ends included.
+/// Shear coefficient of a rectangular section: G·As = κ·G·A.
+pub const SHEAR_COEFFICIENT: f64 = 5.0 / 6.0;
+
+/// What the options leave of a beam: an Euler–Bernoulli beam unless shear or rotary inertia are asked for.
+pub fn bar(beam: &Beam, shear: bool, rotary: bool) -> Bar {
+    let m = &beam.material;
+    let area = beam.width * beam.thickness;
+    let inertia = beam.thickness * beam.width.powi(3) / 12.0;
+    let shear_modulus = m.youngs_modulus / (2.0 * (1.0 + m.poisson));
+    Bar {
+        length: beam.length,
+        ea: m.youngs_modulus * area,
+        ei: m.youngs_modulus * inertia,
+        shear: if shear { 1.0 / (SHEAR_COEFFICIENT * shear_modulus * area) } else { 0.0 },
+        line_mass: m.density * beam.width * beam.thickness,
+        rotary: if rotary { beam.width * beam.width / 12.0 } else { 0.0 },
+    }
+}
+
+/// Joints of the model in the making.
+#[derive(Debug, Clone, Default)]
+pub struct Joints {
+    /// Joints, `Free(k)` being body k of the assembly.
+    pub joints: Vec<Joint>,
+    /// Pairs of joints whose rotations are coupled.
+    pub couplings: Vec<Coupling>,
+}
+
+/// Lays a beam: adds its inner bodies, masses and joints. Returns the equally spaced points along it, ends included.
 pub fn lay(
     beam: &Beam,
     segments: usize,
     heater: Option<usize>,
-    undamped: bool,
+    options: &DiscretizeOptions,
     rigid: &mut Assembly,
-    joints: &mut Vec<Joint>,
+    out: &mut Joints,
 ) -> Vec<Point> {
     let (start, end) = (rigid.position(beam.a.0), rigid.position(beam.b.0));
-    let n = segments as f64;
-    let mut points = vec![rigid.point(beam.a.0)];
+    let cut = options.scheme.cut(&bar(beam, options.shear, options.rotary_inertia), segments, rigid.grounded(beam.b.0));
     let name = Arc::from(beam.name.as_str());
-    for k in 1..segments {
-        let position = start + (end - start) * (k as f64 / n);
-        points.push(rigid.add_segment(BodyName::segment(&name, k), position));
-    }
-    points.push(rigid.point(beam.b.0));
-    add_masses(beam, segments, undamped, &points, rigid);
-    let h = beam.length / n;
-    let area = beam.width * beam.thickness;
-    let inertia = beam.thickness * beam.width.powi(3) / 12.0;
-    let (ea, ei) = (beam.material.youngs_modulus * area, beam.material.youngs_modulus * inertia);
-    let stiffness = Matrix3::from_diagonal(&Vector3::new(ea / h, 12.0 * ei / (h * h * h), ei / h));
-    let second = Matrix2::new(0.6 / h, 0.0, 0.0, -h / 12.0);
+    let last = cut.parts.len() - 1;
+    let place = |at: f64| start + (end - start) * (at / beam.length);
+    let bodies: Vec<Point> = (0..=last)
+        .map(|k| match k {
+            0 => rigid.point(beam.a.0),
+            k if k == last => rigid.point(beam.b.0),
+            k => rigid.add_segment(BodyName::segment(&name, k), place(cut.parts[k].at)),
+        })
+        .collect();
     let m = &beam.material;
+    let drag_per_mass = if options.undamped || m.viscosity == 0.0 {
+        0.0
+    } else {
+        m.viscosity / (m.fluid * m.density * beam.thickness)
+    };
+    let along = Vector2::new(beam.angle.cos(), beam.angle.sin());
+    for (part, &point) in cut.parts.iter().zip(&bodies) {
+        if part.mass > 0.0 {
+            let lump = Lump { amount: part.mass, first: along * part.first, second: part.second };
+            rigid.add_mass(point, &lump, drag_per_mass);
+        }
+    }
     let strain = beam.temperature.map_or(0.0, |t| m.thermal_expansion * (t - m.ambient_temperature))
         - m.stress / m.youngs_modulus;
-    for k in 0..segments {
-        let (a, b) = (points[k], points[k + 1]);
+    for (pin, ends) in cut.pins.iter().zip(bodies.windows(2)) {
+        let (a, b) = (ends[0], ends[1]);
         if a.body == b.body {
             continue; // both ends on one rigid body: nothing can strain
         }
-        let middle = start + (end - start) * ((k as f64 + 0.5) / n);
-        joints.push(Joint {
+        out.joints.push(Joint {
             a: a.body,
             b: b.body,
-            frame: rigid.frame_at(a, b, middle, beam.angle),
-            stiffness,
-            second,
-            expansion: heater.map(|group| (group, h)),
-            rest: h * strain,
-            locked: [false; 3],
+            frame: rigid.frame_at(a, b, place(pin.at), beam.angle),
+            stiffness: pin.stiffness,
+            second: pin.second,
+            expansion: heater.map(|group| (group, pin.length)),
+            rest: pin.length * strain,
+            locked: pin.locked,
         });
     }
-    points
-}
-
-fn add_masses(beam: &Beam, segments: usize, undamped: bool, points: &[Point], rigid: &mut Assembly) {
-    let h = beam.length / segments as f64;
-    let unit = beam.material.density * beam.width * beam.thickness * h;
-    let m = &beam.material;
-    let drag_per_mass =
-        if undamped || m.viscosity == 0.0 { 0.0 } else { m.viscosity / (m.fluid * m.density * beam.thickness) };
-    let along = Vector2::new(beam.angle.cos(), beam.angle.sin());
-    for (k, &point) in points.iter().enumerate() {
-        if point.body == BodyId::Ground {
-            continue;
-        }
-        let (amount, first, second) = shares(segments, k);
-        let lump = Lump { amount: amount * unit, first: along * (first * h * unit), second: second * h * h * unit };
-        rigid.add_mass(point, &lump, drag_per_mass);
+    let pair = |k: usize| (bodies[k].body, bodies[k + 1].body);
+    for &(i, j, stiffness) in &cut.couplings {
+        out.couplings.push(Coupling { first: pair(i), second: pair(j), stiffness });
     }
-}
-
-/// Mass, first and second moment about node `k` of `n` segments, in units of ρA·h, ρA·h², ρA·h³.
-fn shares(n: usize, k: usize) -> (f64, f64, f64) {
-    let inwards = if k == 0 { 1.0 } else { -1.0 };
-    let gauss = 0.5 - 0.5 / 3f64.sqrt();
-    match (n, k) {
-        (1, _) => (0.5, inwards * 0.5 * gauss, 0.5 * gauss * gauss),
-        (_, k) if k == 0 || k == n => (25.0 / 48.0, inwards * 5.0 / 48.0, 1.0 / 48.0),
-        (2, _) => (46.0 / 48.0, 0.0, 0.0),
-        (_, k) if k == 1 || k == n - 1 => (47.0 / 48.0, 0.0, 0.0),
-        _ => (1.0, 0.0, 0.0),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Mass, first and second moment of the whole beam are exact for every number of segments.
-    #[test]
-    fn moments_are_exact() {
-        for n in 1..12 {
-            let (mut mass, mut first, mut second) = (0.0, 0.0, 0.0);
-            for k in 0..=n {
-                let (m, f, s) = shares(n, k);
-                let x = k as f64;
-                mass += m;
-                first += m * x + f;
-                second += m * x * x + 2.0 * f * x + s;
-            }
-            let l = n as f64;
-            assert!((mass - l).abs() < 1e-12);
-            assert!((first - l * l / 2.0).abs() < 1e-12 * l * l);
-            assert!((second - l * l * l / 3.0).abs() < 1e-12 * l * l * l, "{n}: {second}");
-        }
-    }
+    let points = cut.nodes.iter().enumerate().map(|(k, &part)| {
+        let (body, at) = (bodies[part], k as f64 * beam.length / segments as f64);
+        let beside = if body.body == BodyId::Ground { Vector2::zeros() } else { place(at) - place(cut.parts[part].at) };
+        Point { arm: body.arm + beside, ..body }
+    });
+    points.collect()
 }

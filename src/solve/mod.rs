@@ -54,6 +54,7 @@ pub mod path;
 pub mod radau5;
 pub mod rk45;
 pub mod rodas4;
+pub mod subspace;
 pub mod tr_bdf2;
 
 use crate::multibody::factor::ZeroPivot;

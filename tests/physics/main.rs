@@ -11,6 +11,7 @@ mod integrators;
 mod motion;
 mod paths;
 mod scenes;
+mod schemes;
 
 use bimorph::analysis::statics::{NodeMotion, StaticResult, static_equilibrium};
 use bimorph::compile::{CompileOptions, Compiled, compile};

@@ -89,6 +89,7 @@ pub fn options_from_wire(options: Option<proto::CompileOptions>) -> Result<Compi
         linear: options.linear,
         undamped: options.undamped,
         junctions,
+        ..CompileOptions::default()
     })
 }
 
@@ -143,6 +144,7 @@ mod tests {
             linear: true,
             undamped: true,
             junctions: Junctions::Centreline,
+            ..CompileOptions::default()
         };
         assert_eq!(options_from_wire(Some(options_to_wire(&options))), Ok(options));
         assert_eq!(options_from_wire(None), Ok(CompileOptions::default()));
