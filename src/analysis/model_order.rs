@@ -6,19 +6,25 @@
 //! until every mode is predicted to hold. The prediction is then computed; what fails is refined, what holds may be coarsened
 //! further. Beams of equal length, section and material get equal numbers, so that symmetric mechanisms stay symmetric.
 //!
+//! **Rigid beams.** Then beams whose strain does not matter become rigid: those whose share of the strain energy of every mode
+//! in the band predicts less than is left of the tolerance (half of it, as a relative rise of the frequency). This too is
+//! computed: the frequencies with rigid beams are compared with what the elastic model said those of the beams are. Beams
+//! that touch ground, that are heated or under stress, and electrodes of facing beams stay elastic, as they may matter where
+//! nothing rings.
+//!
 //! No segment is longer than kh = 3: a beam's own clamped modes (kh = 4.73) then lie above the band, and no mode within the
 //! band can hide between nodes.
 //!
 //! Reference: J. O. Dow, "A Unified Approach to the Finite Element Method and Error Analysis Procedures" (1999), for
 //! refinement led by an estimate.
 
-use super::order_error::{OrderError, of_modes};
+use super::order_error::{OrderError, of_modes, relative, strain_shares};
 use crate::discretize::{DiscretizeError, DiscretizeOptions, Discretized, discretize_with, order};
 use crate::gaps::Point;
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, BodyId, Model};
 use crate::solve::subspace;
-use crate::structure::{Beam, Structure};
+use crate::structure::{Beam, NodeId, Structure};
 use serde::Serialize;
 use std::collections::HashMap;
 
@@ -34,7 +40,7 @@ const MOST_PASSES: usize = 12;
 /// The chosen order.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ModelOrder {
-    /// Segments of each beam, in the order of the structure.
+    /// Segments of each beam, in the order of the structure; 0: a rigid beam.
     pub segments: Vec<usize>,
     /// Largest estimated relative error of a frequency within the band [1]; none where no mode lies in it or no estimate
     /// could be made.
@@ -59,13 +65,16 @@ pub fn choose(structure: &Structure, options: &DiscretizeOptions, band: f64) -> 
     for (n, floor) in segments.iter_mut().zip(&floor) {
         *n = (*n).max(*floor);
     }
-    let mut holds: Option<ModelOrder> = None;
+    let mut holds: Option<(ModelOrder, Seen)> = None;
     let mut seen: Option<Seen> = None;
     for passes in 1..=MOST_PASSES {
-        let now = look(&bare, options, band, &segments, seen.as_ref())?;
+        let before = seen.as_ref().or(holds.as_ref().map(|(_, seen)| seen));
+        let now = look(&bare, options, band, &segments, before)?;
         let Some(error) = &now.error else {
-            let unknown = ModelOrder { segments, estimated_error: None, modes_in_band: now.modes, passes };
-            return Ok(holds.unwrap_or(unknown));
+            if holds.is_some() {
+                break;
+            }
+            return Ok(ModelOrder { segments, estimated_error: None, modes_in_band: now.modes, passes });
         };
         let worst = error.relative.iter().take(now.modes).fold(0.0, |m: f64, e| m.max(e.abs()));
         let order = ModelOrder {
@@ -78,7 +87,8 @@ pub fn choose(structure: &Structure, options: &DiscretizeOptions, band: f64) -> 
         let total = |n: &[usize]| n.iter().sum::<usize>();
         if worst <= options.tol {
             let done = total(&next) >= total(&segments);
-            holds = Some(order);
+            holds = Some((order, now));
+            seen = None;
             if done {
                 break;
             }
@@ -86,22 +96,84 @@ pub fn choose(structure: &Structure, options: &DiscretizeOptions, band: f64) -> 
             for (next, n) in next.iter_mut().zip(&segments) {
                 *next = (*next).max(*n);
             }
-            if holds.as_ref().is_some_and(|h| total(&next) >= total(&h.segments)) {
+            if holds.as_ref().is_some_and(|(h, _)| total(&next) >= total(&h.segments)) {
                 break;
             }
             if next == segments || passes == MOST_PASSES {
-                return Ok(holds.unwrap_or(order));
+                if holds.is_some() {
+                    break;
+                }
+                return Ok(order);
             }
+            seen = Some(now);
         }
-        seen = Some(now);
         segments = next;
     }
-    holds.ok_or(DiscretizeError::NothingMoves)
+    let (mut order, elastic) = holds.ok_or(DiscretizeError::NothingMoves)?;
+    stiffen(structure, &bare, options, band, &groups, &elastic, &mut order)?;
+    Ok(order)
+}
+
+/// Makes beams rigid where the tolerance allows.
+fn stiffen(
+    structure: &Structure,
+    bare: &Structure,
+    options: &DiscretizeOptions,
+    band: f64,
+    groups: &Groups,
+    elastic: &Seen,
+    order: &mut ModelOrder,
+) -> Result<(), DiscretizeError> {
+    let Some(error) = &elastic.error else { return Ok(()) };
+    let modes = elastic.modes;
+    let shares = strain_shares(bare, options, &elastic.parts, &elastic.lambda[..modes], &elastic.shapes[..modes]);
+    let grounded = |node: NodeId| elastic.parts.nodes[node.0].is_some_and(|p| p.body == BodyId::Ground);
+    let electrodes: Vec<(NodeId, NodeId)> =
+        structure.beam_gaps.iter().flat_map(|g| [(g.nodes[0], g.nodes[1]), (g.nodes[2], g.nodes[3])]).collect();
+    let plain = |b: &usize| {
+        let beam = &structure.beams[*b];
+        let strained = beam.heater.is_some() || beam.temperature.is_some() || beam.material.stress != 0.0;
+        let electrode = electrodes.contains(&(beam.a, beam.b)) || electrodes.contains(&(beam.b, beam.a));
+        !strained && !electrode && !grounded(beam.a) && !grounded(beam.b)
+    };
+    let rise = |mode: usize, g: &[usize]| 0.5 * g.iter().map(|&b| shares[mode][b]).sum::<f64>();
+    let worst = |g: &[usize]| (0..modes).map(|m| rise(m, g)).fold(0.0, f64::max);
+    let mut candidates: Vec<&Vec<usize>> = groups.0.iter().filter(|g| g.iter().all(plain)).collect();
+    candidates.sort_by(|a, b| worst(a).total_cmp(&worst(b)));
+    let mut sums: Vec<f64> = error.relative[..modes].to_vec();
+    let mut chosen: Vec<&Vec<usize>> = Vec::new();
+    for group in candidates {
+        let next: Vec<f64> = sums.iter().enumerate().map(|(m, sum)| sum + rise(m, group)).collect();
+        if next.iter().any(|e| e.abs() > MARGIN * options.tol) {
+            break;
+        }
+        sums = next;
+        chosen.push(group);
+    }
+    while !chosen.is_empty() {
+        let mut segments = order.segments.clone();
+        for group in &chosen {
+            for &beam in *group {
+                segments[beam] = 0;
+            }
+        }
+        let now = look(bare, options, band, &segments, Some(elastic))?;
+        order.passes += 1;
+        let apart = relative(&now.lambda, &error.reference);
+        let worst = apart.iter().take(modes).fold(0.0, |m: f64, e| m.max(e.abs()));
+        if now.lambda.len() >= modes && worst <= options.tol {
+            (order.segments, order.estimated_error) = (segments, Some(worst));
+            break;
+        }
+        chosen.truncate(chosen.len() / 2);
+    }
+    Ok(())
 }
 
 /// A model that was computed.
 struct Seen {
     parts: Discretized,
+    lambda: Vec<f64>,
     shapes: Vec<Vec<Pose>>,
     modes: usize,
     error: Option<OrderError>,
@@ -135,11 +207,11 @@ fn look(
     before: Option<&Seen>,
 ) -> Result<Seen, DiscretizeError> {
     let parts = discretize_with(structure, options, segments)?;
-    let (modes, shapes, error) = modes_in_band(structure, options, band, &parts, before).unwrap_or_default();
-    Ok(Seen { parts, shapes, modes, error })
+    let (modes, lambda, shapes, error) = modes_in_band(structure, options, band, &parts, before).unwrap_or_default();
+    Ok(Seen { parts, lambda, shapes, modes, error })
 }
 
-type Found = (usize, Vec<Vec<Pose>>, Option<OrderError>);
+type Found = (usize, Vec<f64>, Vec<Vec<Pose>>, Option<OrderError>);
 
 fn modes_in_band(
     structure: &Structure,
@@ -190,8 +262,15 @@ fn modes_in_band(
     // far below the errors that are to be told, which are twice as large in λ
     let settled = (0.02 * options.tol).clamp(1e-9, 1e-3);
     let found = subspace::iterate(model, (&factor, shift), start, modes, settled)?;
-    let error = of_modes(structure, options, parts, (&factor, shift), &found.lambda, &found.shapes);
-    Some((modes, found.shapes, error))
+    // two more than wanted: the highest wanted one is told from its neighbours
+    let some = (modes + 2).min(found.lambda.len());
+    let rigid = parts.beams.iter().any(|points| points.len() == 2 && points[0].body == points[1].body);
+    let error = if rigid {
+        None // compared with the elastic model instead
+    } else {
+        of_modes(structure, options, parts, (&factor, shift), &found.lambda[..some], &found.shapes[..some])
+    };
+    Some((modes, found.lambda, found.shapes, error))
 }
 
 /// A shape of one model over the bodies of another, linear between the points of each beam.

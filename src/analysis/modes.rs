@@ -1,10 +1,9 @@
 //! Natural frequencies and shapes about the operating point.
-use super::order_error::of_modes;
+use super::order_error::{of_modes, own_stiffness};
 use super::signal::{Signal, View};
 use super::statics::{NodeMotion, operating_point};
 use super::{AnalysisError, BeamMotions, NodeMotions, PortVoltages};
 use crate::compile::Compiled;
-use crate::discretize::Scheme;
 use crate::gaps::Point;
 use crate::multibody::BlockMatrix;
 use crate::multibody::forces::add_inertia;
@@ -22,7 +21,8 @@ pub struct ModesResult {
     /// For each mode, the residual ‖x − λK⁻¹Mx‖ in the mass norm, about the relative error of its shape [1].
     pub residuals: Vec<f64>,
     /// For each mode, the estimated relative error of its frequency by the number of segments [1], signed; none where no
-    /// estimate can be made: for the baselines, and for schemes other than E4 and B about a loaded equilibrium.
+    /// estimate can be made: for the baselines, and about a loaded equilibrium with rigid beams or schemes other than
+    /// E4 and B.
     pub errors: Vec<Option<f64>>,
     /// Mechanical unknowns.
     pub unknowns: usize,
@@ -105,7 +105,7 @@ fn estimated(
     let options = compiled.options.discretize();
     let model = &compiled.parts.system.model;
     let none = vec![None; lambda.len()];
-    let own = matches!(options.scheme, Scheme::E4 | Scheme::B);
+    let own = own_stiffness(&options, &compiled.parts);
     let (Some(highest), true) = (lambda.last(), own || !loaded) else { return none };
     let mut shift = 0.0;
     let mut factor = tangent.clone();

@@ -30,17 +30,42 @@ use crate::gaps::Point;
 use crate::multibody::linear_system::LinearSystem;
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, BodyId, Model, Pattern};
-use crate::solve::subspace::ritz;
+use crate::solve::subspace::{columns, ritz};
 use crate::structure::Structure;
-use nalgebra::{DMatrix, Matrix6, Vector2, Vector3, Vector6};
+use nalgebra::{Matrix6, Vector2, Vector3, Vector6};
 
 /// Estimated errors of modes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OrderError {
     /// For each mode, (f − f_beam)/f_beam [1]; 0 for a rigid motion.
     pub relative: Vec<f64>,
+    /// For each mode, λ = ω² of the beams [rad²/s²].
+    pub reference: Vec<f64>,
     /// For each mode, what each beam contributes to it [1].
     pub shares: Vec<Vec<f64>>,
+}
+
+/// For each mode, the share of each beam in its strain energy [1]: a beam held rigid raises the frequency by about half of
+/// it, relatively.
+pub fn strain_shares(
+    structure: &Structure,
+    options: &DiscretizeOptions,
+    parts: &Discretized,
+    lambda: &[f64],
+    shapes: &[Vec<Pose>],
+) -> Vec<Vec<f64>> {
+    let spans = spans(structure, options, &parts.beams, false);
+    let share = |(shape, lambda): (&Vec<Pose>, &f64)| {
+        let one = |(span, beam): (&Span<'_>, &crate::structure::Beam)| {
+            let n = span.points.len() - 1;
+            let stiffness =
+                cubic::stiffness(&bar(beam, options.shear, options.rotary_inertia), beam.length / n as f64);
+            let x = span.local(shape);
+            span.segments(&x, &stiffness).iter().zip(&x).map(|(f, x)| f.dot(x)).sum::<f64>() / lambda
+        };
+        spans.iter().zip(&structure.beams).map(one).collect()
+    };
+    shapes.iter().zip(lambda).map(share).collect()
 }
 
 /// A beam over its points.
@@ -74,18 +99,23 @@ impl Span<'_> {
 
     /// (M_r − M)·x of this beam, over its points.
     fn defect(&self, x: &[Vector3<f64>], lambda: f64) -> Vec<Vector3<f64>> {
-        let segment = self.mass + self.second * lambda;
+        let mut f = self.segments(x, &(self.mass + self.second * lambda));
+        for ((f, x), lump) in f.iter_mut().zip(x).zip(&self.lumps) {
+            f.x -= lump.mass * x.x;
+            f.y -= lump.mass * x.y + lump.first * x.z;
+            f.z -= lump.first * x.y + lump.second * x.z;
+        }
+        f
+    }
+
+    /// The same matrix for every segment, times x.
+    fn segments(&self, x: &[Vector3<f64>], segment: &Matrix6<f64>) -> Vec<Vector3<f64>> {
         let mut f = vec![Vector3::zeros(); x.len()];
         for k in 0..x.len() - 1 {
             let (a, b) = (x[k], x[k + 1]);
             let both = segment * Vector6::new(a.x, a.y, a.z, b.x, b.y, b.z);
             f[k] += both.fixed_rows::<3>(0);
             f[k + 1] += both.fixed_rows::<3>(3);
-        }
-        for ((f, x), lump) in f.iter_mut().zip(x).zip(&self.lumps) {
-            f.x -= lump.mass * x.x;
-            f.y -= lump.mass * x.y + lump.first * x.z;
-            f.z -= lump.first * x.y + lump.second * x.z;
         }
         f
     }
@@ -110,7 +140,14 @@ struct Pencil<'a> {
     project: &'a dyn Fn(&mut [Pose]),
 }
 
-/// Errors of modes of the model itself: schemes E4 and B. `factor` is that of K − `shift`·M at the operating point.
+/// True where the model's tangent is that of the cubic frame: schemes E4 and B without rigid beams. Only then is the
+/// estimate that of a loaded equilibrium too.
+pub fn own_stiffness(options: &DiscretizeOptions, parts: &Discretized) -> bool {
+    let exact = matches!(options.scheme, Scheme::E4 | Scheme::B);
+    exact && parts.beams.iter().all(|points| points.len() > 2 || points[0].body != points[1].body)
+}
+
+/// Errors of modes of a model. `factor` is that of K − `shift`·M at the operating point.
 pub fn of_modes(
     structure: &Structure,
     options: &DiscretizeOptions,
@@ -120,14 +157,14 @@ pub fn of_modes(
     shapes: &[Vec<Pose>],
 ) -> Option<OrderError> {
     let model = &parts.system.model;
-    if !matches!(options.scheme, Scheme::E4 | Scheme::B) {
+    if !own_stiffness(options, parts) {
         return by_frame(structure, options, parts, lambda, shapes);
     }
     let spans = spans(structure, options, &parts.beams, true);
     let mass = |x: &[Pose]| x.iter().enumerate().map(|(k, x)| model.mass(k).component_mul(x)).collect();
     let project = |x: &mut [Pose]| model.project(x);
     let pencil = Pencil { factor, pattern: &model.pattern, shift, mass: &mass, project: &project };
-    let (relative, x, norms) = compare(&pencil, &spans, lambda, shapes)?;
+    let (reference, x, norms) = compare(&pencil, &spans, lambda, shapes)?;
     let shares = (shapes.iter().zip(&x).zip(lambda.iter().zip(&norms)))
         .map(|((y, x), (&lambda, norm))| {
             let share = |span: &Span<'_>| {
@@ -137,7 +174,14 @@ pub fn of_modes(
             spans.iter().map(share).collect()
         })
         .collect();
-    Some(OrderError { relative, shares })
+    Some(OrderError { relative: relative(lambda, &reference), reference, shares })
+}
+
+/// Relative errors of frequencies; 0 for rigid motions.
+pub fn relative(lambda: &[f64], reference: &[f64]) -> Vec<f64> {
+    let rigid = 1e-9 * lambda.last().map_or(0.0, |l| l.abs());
+    let error = |(l, r): (&f64, &f64)| if *l <= rigid || *r <= rigid { 0.0 } else { (l / r).sqrt() - 1.0 };
+    lambda.iter().zip(reference).map(error).collect()
 }
 
 fn spans<'a>(
@@ -163,7 +207,7 @@ fn spans<'a>(
 
 type Compared = (Vec<f64>, Vec<Vec<Pose>>, Vec<f64>);
 
-/// Relative errors; the inverse iterates x; and xᵀM_r·y.
+/// λ_r; the inverse iterates x; and xᵀM_r·y.
 fn compare(pencil: &Pencil<'_>, spans: &[Span<'_>], lambda: &[f64], shapes: &[Vec<Pose>]) -> Option<Compared> {
     let count = lambda.len();
     let weigh = |x: &[Pose], lambda: f64| {
@@ -174,7 +218,8 @@ fn compare(pencil: &Pencil<'_>, spans: &[Span<'_>], lambda: &[f64], shapes: &[Ve
         }
         (z, base)
     };
-    let (mut x, mut kx, mut mx, mut norms) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    let (mut x, mut kx, mut norms) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut mx, mut second) = (Vec::new(), Vec::new());
     for (y, &lambda) in shapes.iter().zip(lambda) {
         let (full, base) = weigh(y, lambda);
         let mut z: Vec<Pose> = full.iter().zip(&base).map(|(f, b)| f * lambda - b * pencil.shift).collect();
@@ -183,21 +228,29 @@ fn compare(pencil: &Pencil<'_>, spans: &[Span<'_>], lambda: &[f64], shapes: &[Ve
         pencil.factor.solve(pencil.pattern, &mut solved);
         (pencil.project)(&mut solved);
         norms.push(dot(&solved, &full));
-        let (full, base) = weigh(&solved, lambda);
+        let (full, base) = weigh(&solved, 0.0);
         kx.push(z.iter().zip(&base).map(|(z, b)| z + b * pencil.shift).collect::<Vec<Pose>>());
         mx.push(full);
+        let mut bent = vec![Pose::zeros(); solved.len()];
+        for span in spans {
+            span.scatter(&span.segments(&span.local(&solved), &span.second), &mut bent);
+        }
+        second.push(bent);
         x.push(solved);
     }
-    let a = DMatrix::from_fn(count, count, |i, j| dot(&x[i], &kx[j]));
-    let b = DMatrix::from_fn(count, count, |i, j| dot(&x[i], &mx[j]));
+    let transposed = columns(&x).transpose();
+    let a = &transposed * columns(&kx);
+    // λ·M₂ between two modes at the geometric mean of theirs, which keeps the sum definite
+    let mean = |i: usize, j: usize| (lambda[i].max(0.0) * lambda[j].max(0.0)).sqrt();
+    let mut b = &transposed * columns(&mx);
+    let bent = &transposed * columns(&second);
+    for i in 0..count {
+        for j in 0..count {
+            b[(i, j)] += mean(i, j) * bent[(i, j)];
+        }
+    }
     let (reference, _) = ritz(&a, &b)?;
-    let rigid = 1e-9 * lambda.last()?.abs();
-    let relative = lambda
-        .iter()
-        .zip(&reference)
-        .map(|(l, r)| if *l <= rigid || *r <= rigid { 0.0 } else { (l / r).sqrt() - 1.0 })
-        .collect();
-    Some((relative, x, norms))
+    Some((reference, x, norms))
 }
 
 fn dot(a: &[Pose], b: &[Pose]) -> f64 {
@@ -227,7 +280,8 @@ fn by_frame(
     let mass = |x: &[Pose]| multiply(system, x);
     let project = |x: &mut [Pose]| system.project(x);
     let pencil = Pencil { factor: &factor, pattern: &system.pattern, shift, mass: &mass, project: &project };
-    let (relative, ..) = compare(&pencil, &spans, lambda, &shapes)?;
+    let (reference, ..) = compare(&pencil, &spans, lambda, &shapes)?;
+    let relative = relative(lambda, &reference);
     let shares = (shapes.iter().zip(lambda).zip(&relative))
         .map(|((y, &lambda), error)| {
             let band = lambda.max(0.0).sqrt() / std::f64::consts::TAU;
@@ -242,7 +296,7 @@ fn by_frame(
             weights.iter().map(|w| if sum > 0.0 { error * w / sum } else { 0.0 }).collect()
         })
         .collect();
-    Some(OrderError { relative, shares })
+    Some(OrderError { relative, reference, shares })
 }
 
 fn multiply(system: &LinearSystem, x: &[Pose]) -> Vec<Pose> {

@@ -2,7 +2,7 @@
 
 use super::DiscretizeOptions;
 use super::rigid::{Assembly, Lump};
-use super::scheme::Bar;
+use super::scheme::{Bar, Scheme};
 use crate::gaps::Point;
 use crate::multibody::{BodyId, BodyName, Coupling, Joint};
 use crate::structure::Beam;
@@ -47,7 +47,11 @@ pub fn lay(
     out: &mut Joints,
 ) -> Vec<Point> {
     let (start, end) = (rigid.position(beam.a.0), rigid.position(beam.b.0));
-    let cut = options.scheme.cut(&bar(beam, options.shear, options.rotary_inertia), segments, rigid.grounded(beam.b.0));
+    let bar = bar(beam, options.shear, options.rotary_inertia);
+    // a rigid beam is the rods of a single segment, which its one body holds together
+    let scheme = if segments == 0 { Scheme::B } else { options.scheme };
+    let segments = segments.max(1);
+    let cut = scheme.cut(&bar, segments, rigid.grounded(beam.b.0));
     let name = Arc::from(beam.name.as_str());
     let last = cut.parts.len() - 1;
     let place = |at: f64| start + (end - start) * (at / beam.length);

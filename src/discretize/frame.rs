@@ -68,7 +68,7 @@ pub struct Frame {
 /// See [`DiscretizeError`].
 pub fn assemble(structure: &Structure, options: &FrameOptions) -> Result<Frame, DiscretizeError> {
     let undamped = options.undamped;
-    let mut rigid = Assembly::new(structure);
+    let mut rigid = Assembly::new(structure, &[]);
     let mut pieces: Vec<Piece<'_>> = Vec::new();
     let mut beams: Vec<Vec<Point>> = Vec::with_capacity(structure.beams.len());
     for (index, beam) in structure.beams.iter().enumerate() {

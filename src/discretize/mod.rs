@@ -125,7 +125,7 @@ pub fn discretize(structure: &Structure, options: &DiscretizeOptions) -> Result<
     discretize_with(structure, options, &order::a_priori(structure, options)?)
 }
 
-/// The same with the number of segments of each beam.
+/// The same with the number of segments of each beam; 0: a rigid beam, which makes one body of its two nodes.
 ///
 /// # Errors
 /// See [`DiscretizeError`].
@@ -134,7 +134,8 @@ pub fn discretize_with(
     options: &DiscretizeOptions,
     segments: &[usize],
 ) -> Result<Discretized, DiscretizeError> {
-    let mut rigid = rigid::Assembly::new(structure);
+    let stiff: Vec<bool> = segments.iter().map(|n| *n == 0).collect();
+    let mut rigid = rigid::Assembly::new(structure, &stiff);
     let mut laid = beam::Joints::default();
     let mut dampers: Vec<Damper> = Vec::new();
     let mut beams = Vec::with_capacity(structure.beams.len());

@@ -75,7 +75,7 @@ pub fn iterate(
                 }
             }
         }
-        let (mu, v) = ritz(&y.tr_mul(&z), &y.tr_mul(&weigh(&y)))?;
+        let (mu, v) = ritz(&(y.transpose() * z), &(y.transpose() * weigh(&y)))?;
         x = y * v;
         let settled = (mu.iter().zip(&lambda).take(wanted))
             .all(|(mu, old)| (mu + shift - old).abs() <= tolerance * (mu.abs() + shift.abs()));
@@ -90,7 +90,8 @@ pub fn iterate(
     None
 }
 
-fn columns(vectors: &[Vec<Pose>]) -> DMatrix<f64> {
+/// Body vectors as the columns of a matrix.
+pub fn columns(vectors: &[Vec<Pose>]) -> DMatrix<f64> {
     let rows = vectors.first().map_or(0, |v| 3 * v.len());
     DMatrix::from_iterator(rows, vectors.len(), vectors.iter().flatten().flat_map(|p| [p.x, p.y, p.z]))
 }

@@ -102,7 +102,7 @@ fn schemes() {
             let order = (errors[1].0 / errors[3].0).log2() / 2.0;
             let cells: Vec<String> = errors
                 .iter()
-                .map(|(e, n)| if *n < 3 { "–".into() } else { format!("{:.2e}", 100.0 * e) })
+                .map(|(e, n)| if *n < 3 || *e > 1.0 { "–".into() } else { format!("{:.2e}", 100.0 * e) })
                 .collect();
             println!("  {:3}  {}   order {order:.2}", scheme.name(), cells.join("  "));
         }
