@@ -12,6 +12,8 @@
 //! that touch ground, that are heated or under stress, and electrodes of facing beams stay elastic, as they may matter where
 //! nothing rings.
 //!
+//! More than 64 modes in the band, or a start of more than ten thousand segments, keep what the rule of [`order`] gives.
+//!
 //! No segment is longer than kh = 3: a beam's own clamped modes (kh = 4.73) then lie above the band, and no mode within the
 //! band can hide between nodes.
 //!
@@ -32,8 +34,10 @@ use std::collections::HashMap;
 const LONGEST: f64 = 3.0;
 /// Share of the tolerance that predictions may use.
 const MARGIN: f64 = 0.9;
-/// Modes looked at.
+/// Modes within the band beyond which the rule of [`order`] stands as it is.
 const MOST_MODES: usize = 64;
+/// Segments beyond which it does.
+const MOST_SEGMENTS: usize = 10_000;
 /// Models tried.
 const MOST_PASSES: usize = 12;
 
@@ -64,6 +68,9 @@ pub fn choose(structure: &Structure, options: &DiscretizeOptions, band: f64) -> 
     let mut segments = order::a_priori(&bare, options)?;
     for (n, floor) in segments.iter_mut().zip(&floor) {
         *n = (*n).max(*floor);
+    }
+    if segments.iter().sum::<usize>() > MOST_SEGMENTS {
+        return Ok(ModelOrder { segments, estimated_error: None, modes_in_band: 0, passes: 0 });
     }
     let mut holds: Option<(ModelOrder, Seen)> = None;
     let mut seen: Option<Seen> = None;
@@ -236,8 +243,8 @@ fn modes_in_band(
         a
     };
     let edge = (std::f64::consts::TAU * band).powi(2);
-    let modes = shifted(edge).factor(&model.pattern).ok()?.negative.min(MOST_MODES);
-    if modes == 0 {
+    let modes = shifted(edge).factor(&model.pattern).ok()?.negative;
+    if modes == 0 || modes > MOST_MODES {
         return None;
     }
     let mut shift = 0.0;
