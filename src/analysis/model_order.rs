@@ -84,12 +84,8 @@ pub fn choose(structure: &Structure, options: &DiscretizeOptions, band: f64) -> 
             return Ok(ModelOrder { segments, estimated_error: None, modes_in_band: now.modes, passes });
         };
         let worst = error.relative.iter().take(now.modes).fold(0.0, |m: f64, e| m.max(e.abs()));
-        let order = ModelOrder {
-            segments: segments.clone(),
-            estimated_error: Some(worst),
-            modes_in_band: now.modes,
-            passes,
-        };
+        let order =
+            ModelOrder { segments: segments.clone(), estimated_error: Some(worst), modes_in_band: now.modes, passes };
         let mut next = groups.fewest(options, error, now.modes, &segments, &floor);
         let total = |n: &[usize]| n.iter().sum::<usize>();
         if worst <= options.tol {
@@ -255,7 +251,7 @@ fn modes_in_band(
         factor.factor(&model.pattern).ok()?;
     }
     let massive: usize = (0..n).map(|j| model.mass(j).iter().filter(|m| **m > 0.0).count()).sum();
-    let block = (modes + 4 + modes / 2).min(massive);
+    let block = (modes + (4 + modes / 2).min(12)).min(massive);
     let fresh = subspace::start(n, block, system.length_scale);
     let start = match before {
         Some(before) if before.shapes.len() >= modes => {
@@ -267,7 +263,7 @@ fn modes_in_band(
         _ => fresh,
     };
     // far below the errors that are to be told, which are twice as large in λ
-    let settled = (0.02 * options.tol).clamp(1e-9, 1e-3);
+    let settled = (0.05 * options.tol).clamp(1e-9, 1e-3);
     let found = subspace::iterate(model, (&factor, shift), start, modes, settled)?;
     // two more than wanted: the highest wanted one is told from its neighbours
     let some = (modes + 2).min(found.lambda.len());

@@ -58,8 +58,7 @@ pub fn strain_shares(
     let share = |(shape, lambda): (&Vec<Pose>, &f64)| {
         let one = |(span, beam): (&Span<'_>, &crate::structure::Beam)| {
             let n = span.points.len() - 1;
-            let stiffness =
-                cubic::stiffness(&bar(beam, options.shear, options.rotary_inertia), beam.length / n as f64);
+            let stiffness = cubic::stiffness(&bar(beam, options.shear, options.rotary_inertia), beam.length / n as f64);
             let x = span.local(shape);
             span.segments(&x, &stiffness).iter().zip(&x).map(|(f, x)| f.dot(x)).sum::<f64>() / lambda
         };
@@ -87,11 +86,7 @@ impl Span<'_> {
             BodyId::Ground => Vector3::zeros(),
             BodyId::Free(k) => {
                 let (dx, dy) = (x[k].x - x[k].z * p.arm.y, x[k].y + x[k].z * p.arm.x);
-                Vector3::new(
-                    dx * self.along.x + dy * self.along.y,
-                    dy * self.along.x - dx * self.along.y,
-                    x[k].z,
-                )
+                Vector3::new(dx * self.along.x + dy * self.along.y, dy * self.along.x - dx * self.along.y, x[k].z)
             }
         };
         self.points.iter().map(at).collect()

@@ -63,11 +63,8 @@ pub fn lay(
         })
         .collect();
     let m = &beam.material;
-    let drag_per_mass = if options.undamped || m.viscosity == 0.0 {
-        0.0
-    } else {
-        m.viscosity / (m.fluid * m.density * beam.thickness)
-    };
+    let drag_per_mass =
+        if options.undamped || m.viscosity == 0.0 { 0.0 } else { m.viscosity / (m.fluid * m.density * beam.thickness) };
     let along = Vector2::new(beam.angle.cos(), beam.angle.sin());
     for (part, &point) in cut.parts.iter().zip(&bodies) {
         if part.mass > 0.0 {

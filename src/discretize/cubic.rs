@@ -6,8 +6,8 @@
 //! A beam between two ends that vibrate with λ = ω² has the dynamic stiffness D = K − λ·M − λ²·M₂ − …, of which the cubic
 //! element is the first two terms. M₂ is what the beam adds by bending between its ends under its own inertia: the work of
 //! the inertia of the element's shapes on the deflection that it causes in a beam clamped at both ends. With it, an element
-//! of bending wave number k is off by O((kh)⁸) instead of (kh)⁴/1440. M₂ leaves out shear and rotary inertia, which change
-//! it by O(Φ).
+//! of bending wave number k is off by O((kh)⁸) instead of (kh)⁴/1440, and with shear by O(h⁴) instead of O(h²). M₂ leaves
+//! the rotary inertia out.
 //!
 //! Reference: J. S. Przemieniecki, "Theory of Matrix Structural Analysis" (1968), §5.6, §11.3 and §12.2 (quadratic
 //! eigenvalue problem).
@@ -75,19 +75,26 @@ pub fn mass(bar: &Bar, h: f64) -> Matrix6<f64> {
 
 /// M₂, the second term of the dynamic stiffness [kg·s², kg·m·s², kg·m²·s²].
 pub fn second_mass(bar: &Bar, h: f64) -> Matrix6<f64> {
+    let phi = phi(bar, h);
     // shapes over ξ = x/h as polynomials: w₀, h·θ₀, w₁, h·θ₁
     #[rustfmt::skip]
     let hermite = Matrix4::new(
-        1.0, 0.0, -3.0,  2.0,
-        0.0, 1.0, -2.0,  1.0,
-        0.0, 0.0,  3.0, -2.0,
-        0.0, 0.0, -1.0,  1.0,
-    );
-    // the load ξⁿ deflects a clamped beam by c·(ξⁿ⁺⁴ + (n + 1)·ξ² − (n + 2)·ξ³), c = n!/(n + 4)!
+        1.0 + phi, -phi,            -3.0,              2.0,
+        0.0,        1.0 + 0.5 * phi, -2.0 - 0.5 * phi, 1.0,
+        0.0,        phi,              3.0,            -2.0,
+        0.0,       -0.5 * phi,       -1.0 + 0.5 * phi, 1.0,
+    ) / (1.0 + phi);
+    // the load ξⁿ bends a clamped beam, EI = h = 1, to w = c₄·ξⁿ⁺⁴ + a·ξ³/6 + b·ξ²/2 − Φ/12·(c₂·ξⁿ⁺² + a·ξ) with
+    // c_k = n!/(n + k)!, a and b from θ(1) = w(1) = 0
     let bent = Matrix4::from_fn(|m, n| {
         let (m, n) = (m as f64, n as f64);
-        let c = 1.0 / ((n + 1.0) * (n + 2.0) * (n + 3.0) * (n + 4.0));
-        c * (1.0 / (m + n + 5.0) + (n + 1.0) / (m + 3.0) - (n + 2.0) / (m + 4.0))
+        let c2 = 1.0 / ((n + 1.0) * (n + 2.0));
+        let c3 = c2 / (n + 3.0);
+        let c4 = c3 / (n + 4.0);
+        let a = -(6.0 * c3 - 12.0 * c4 + phi * c2) / (1.0 + phi);
+        let b = -c3 - 0.5 * a;
+        let bending = c4 / (m + n + 5.0) + a / (6.0 * (m + 4.0)) + b / (2.0 * (m + 3.0));
+        bending - phi / 12.0 * (c2 / (m + n + 3.0) + a / (m + 2.0))
     });
     let lengths = Matrix4::from_diagonal(&[1.0, h, 1.0, h].into());
     let shapes = lengths * hermite;
@@ -136,7 +143,11 @@ mod tests {
             assert!((energy - (h.powi(3) / 3.0 + bar.rotary * h)).abs() < 1e-14, "{energy}");
             assert!((mass(&bar, h) - mass(&bar, h).transpose()).norm() < 1e-15);
         }
-        assert!((second_mass(&SLENDER, h) - second_mass(&SLENDER, h).transpose()).norm() < 1e-15);
+        for bar in [SLENDER, thick] {
+            let second = second_mass(&bar, h);
+            assert!((second - second.transpose()).norm() < 1e-15);
+            assert!(second.symmetric_eigenvalues().min() > -1e-15);
+        }
     }
 
     /// One element of a cantilever, with M₂: ω₁ of (1.875104)² to 1e-5, where the element alone is off by 4.8e-3 (root of

@@ -290,7 +290,13 @@ fn rods(bar: &Bar, places: &[f64]) -> Vec<Part> {
             let from = if k == 0 { 0.0 } else { places[k - 1] };
             let to = if k == count { bar.length } else { places[k] };
             let (length, middle) = (to - from, 0.5 * (from + to));
-            let at = if k == 0 { 0.0 } else if k == count { bar.length } else { middle };
+            let at = if k == 0 {
+                0.0
+            } else if k == count {
+                bar.length
+            } else {
+                middle
+            };
             let (mass, off) = (length * bar.line_mass, middle - at);
             let second = mass * (length * length / 12.0 + off * off + bar.rotary);
             Part { at, mass, first: mass * off, second }

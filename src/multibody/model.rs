@@ -172,8 +172,18 @@ impl Model {
         let sections = sections.all;
         let held = (0..).zip(&bodies).filter(|(_, b)| b.free.is_some()).map(|(k, _)| k).collect();
         let couplings = Vec::new();
-        let model =
-            Self { bodies, joints: laid, sections, couplings, dampers, pattern, linear, held, damper_place, damper_matrix };
+        let model = Self {
+            bodies,
+            joints: laid,
+            sections,
+            couplings,
+            dampers,
+            pattern,
+            linear,
+            held,
+            damper_place,
+            damper_matrix,
+        };
         (model, place)
     }
 
