@@ -254,7 +254,7 @@ impl Scheme {
 const SIGMA: f64 = (1.0 - SQRT_FIFTH) / 24.0;
 /// α of Es, a rotary inertia α·ρA·h³.
 const ALPHA: f64 = (1.0 + SQRT_FIFTH) / 24.0;
-const SQRT_FIFTH: f64 = 0.447_213_595_499_957_94;
+const SQRT_FIFTH: f64 = 0.447_213_595_499_957_9;
 
 /// Mass, first and second moment of E4 about node `k` of `n` segments, in units of ρA·h, ρA·h², ρA·h³.
 fn shares(n: usize, k: usize) -> (f64, f64, f64) {
@@ -319,12 +319,13 @@ fn turning(bar: &Bar, at: f64, h: f64) -> Pin {
 /// The end correction of C1: the flexibilities of the two joints next to each end grow by h/24EI·[[3, −2], [−2, 1]].
 fn couple_ends(pins: &mut [Pin], unit: f64) -> Vec<(usize, usize, f64)> {
     let n = pins.len();
-    let ends: &[std::ops::Range<usize>] = if n < 4 { &[0..n] } else { &[0..2, n - 2..n] };
+    // ends that share a joint are one block
+    let ends = if n < 4 { vec![(0, n)] } else { vec![(0, 2), (n - 2, n)] };
     let mut couplings = Vec::new();
-    for joints in ends {
-        let size = joints.len();
+    for (start, stop) in ends {
+        let size = stop - start;
         let mut flexibility = DMatrix::<f64>::identity(size, size);
-        for (outer, inner, here) in [(0, 1, joints.start == 0), (size - 1, size - 2, joints.end == n)] {
+        for (outer, inner, here) in [(0, 1, start == 0), (size - 1, size - 2, stop == n)] {
             if here {
                 flexibility[(outer, outer)] += 3.0 / 24.0;
                 flexibility[(inner, inner)] += 1.0 / 24.0;
@@ -334,9 +335,9 @@ fn couple_ends(pins: &mut [Pin], unit: f64) -> Vec<(usize, usize, f64)> {
         }
         let Some(stiffness) = flexibility.try_inverse() else { continue };
         for i in 0..size {
-            pins[joints.start + i].stiffness[(2, 2)] = stiffness[(i, i)] * unit;
+            pins[start + i].stiffness[(2, 2)] = stiffness[(i, i)] * unit;
             for j in i + 1..size {
-                couplings.push((joints.start + i, joints.start + j, stiffness[(i, j)] * unit));
+                couplings.push((start + i, start + j, stiffness[(i, j)] * unit));
             }
         }
     }
