@@ -1,6 +1,7 @@
 //! From netlist text to a ready model: netlist → structure → discretize.
 
-use crate::discretize::{DiscretizeError, DiscretizeOptions, Discretized, discretize};
+use crate::analysis::model_order::{self, ModelOrder};
+use crate::discretize::{DiscretizeError, DiscretizeOptions, Discretized, Scheme, discretize_with, order};
 use crate::netlist::{Bundle, Diagnostics, Setting};
 use crate::structure::Structure;
 use thiserror::Error;
@@ -22,11 +23,47 @@ pub struct CompileOptions {
     pub undamped: bool,
     /// How beams meet.
     pub junctions: Junctions,
+    /// How beams are cut.
+    pub scheme: Scheme,
+    /// Segments of every beam, whatever band and tolerance say; none: by them.
+    pub segments: Option<usize>,
+    /// Shear flexibility of beams (Timoshenko). Off by default, as in SUGAR.
+    pub shear: bool,
+    /// Rotary inertia of the sections of beams. Off by default, as in SUGAR.
+    pub rotary_inertia: bool,
 }
 
 impl Default for CompileOptions {
     fn default() -> Self {
-        Self { set: Vec::new(), band: None, tol: 1e-3, linear: false, undamped: false, junctions: Junctions::default() }
+        Self {
+            set: Vec::new(),
+            band: None,
+            tol: 1e-3,
+            linear: false,
+            undamped: false,
+            junctions: Junctions::default(),
+            scheme: Scheme::E4,
+            segments: None,
+            shear: false,
+            rotary_inertia: false,
+        }
+    }
+}
+
+impl CompileOptions {
+    /// What the discretization needs of them.
+    pub fn discretize(&self) -> DiscretizeOptions {
+        DiscretizeOptions {
+            band: self.band,
+            tol: self.tol,
+            linear: self.linear,
+            undamped: self.undamped,
+            junctions: self.junctions,
+            scheme: self.scheme,
+            segments: self.segments,
+            shear: self.shear,
+            rotary_inertia: self.rotary_inertia,
+        }
     }
 }
 
@@ -43,6 +80,8 @@ pub struct Compiled {
     pub options: CompileOptions,
     /// Bodies, joints, gaps and electrics, and where the drawing's parts went.
     pub parts: Discretized,
+    /// Segments of each beam, and the error estimated for them where a band was given.
+    pub order: ModelOrder,
 }
 
 /// Why no model came out.
@@ -63,19 +102,21 @@ pub enum CompileError {
 /// See [`CompileError`].
 pub fn compile(bundle: &Bundle, options: &CompileOptions) -> Result<Compiled, CompileError> {
     let loaded = crate::netlist::load(bundle, &options.set).map_err(CompileError::Netlist)?;
-    let choices = DiscretizeOptions {
-        band: options.band,
-        tol: options.tol,
-        linear: options.linear,
-        undamped: options.undamped,
-        junctions: options.junctions,
+    let choices = options.discretize();
+    let order = match (options.band, options.segments) {
+        (Some(band), None) => model_order::choose(&loaded.structure, &choices, band)?,
+        _ => {
+            let segments = order::a_priori(&loaded.structure, &choices)?;
+            ModelOrder { segments, estimated_error: None, modes_in_band: 0, passes: 0 }
+        }
     };
-    let parts = discretize(&loaded.structure, &choices)?;
+    let parts = discretize_with(&loaded.structure, &choices, &order.segments)?;
     Ok(Compiled {
         structure: loaded.structure,
         parameters: loaded.parameters,
         warnings: loaded.warnings,
         options: options.clone(),
         parts,
+        order,
     })
 }

@@ -60,6 +60,13 @@ impl Formulation {
                 "joint coordinates are not small displacements; leave out --linear or take compliant".into(),
             );
         }
+        if !model.couplings.is_empty() {
+            return refuse(
+                "joint coordinates know no coupling between joints, which --scheme c1 has; take another scheme, or \
+                 compliant"
+                    .into(),
+            );
+        }
         for (k, body) in model.bodies.iter().enumerate() {
             let touches = |(a, b)| a == BodyId::Free(k) || b == BodyId::Free(k);
             let mut joints = model.joints.iter().filter(|j| touches(j.bodies()));

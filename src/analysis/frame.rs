@@ -29,7 +29,8 @@ const MOST_STEPS: usize = 1 << 14;
 pub fn frame(compiled: &Compiled) -> Result<Frame, AnalysisError> {
     let options = &compiled.options;
     let elements = options.band.map_or(Elements::Each(1), |band| Elements::Band(band, options.tol));
-    frame_with(compiled, &FrameOptions { elements, shear: false, undamped: options.undamped })
+    let elements = options.segments.map_or(elements, Elements::Each);
+    frame_with(compiled, &FrameOptions { elements, shear: options.shear, undamped: options.undamped })
 }
 
 /// The frame with a given choice of elements.
@@ -86,6 +87,7 @@ pub fn frame_modes(
     let result = ModesResult {
         frequencies_hz: found.lambda.iter().map(|&l| l.max(0.0).sqrt() / std::f64::consts::TAU).collect(),
         shapes,
+        errors: vec![None; found.residuals.len()],
         residuals: found.residuals,
         unknowns: frame.system.unknowns(),
     };

@@ -1,10 +1,12 @@
 //! Natural frequencies and shapes about the operating point.
+use super::order_error::{of_modes, own_stiffness};
 use super::signal::{Signal, View};
 use super::statics::{NodeMotion, operating_point};
 use super::{AnalysisError, BeamMotions, NodeMotions, PortVoltages};
 use crate::compile::Compiled;
 use crate::gaps::Point;
 use crate::multibody::BlockMatrix;
+use crate::multibody::forces::add_inertia;
 use crate::multibody::planar::Pose;
 use crate::solve::eigen::lowest_modes;
 use serde::Serialize;
@@ -18,6 +20,10 @@ pub struct ModesResult {
     pub shapes: Vec<Vec<(String, NodeMotion)>>,
     /// For each mode, the residual ‖x − λK⁻¹Mx‖ in the mass norm, about the relative error of its shape [1].
     pub residuals: Vec<f64>,
+    /// For each mode, the estimated relative error of its frequency by the number of segments [1], signed; none where no
+    /// estimate can be made: for the baselines, and about a loaded equilibrium with rigid beams or schemes other than
+    /// E4 and B.
+    pub errors: Vec<Option<f64>>,
     /// Mechanical unknowns.
     pub unknowns: usize,
 }
@@ -76,14 +82,45 @@ pub fn modes_with_curves(
             detail: format!("there are more than {count} modes below the highest one found; ask for more modes"),
         });
     }
+    let errors = estimated(compiled, &tangent, loaded, &found.lambda, &found.shapes);
     let (shapes, curves) = found.shapes.iter().map(|x| shape(compiled, &q, x)).unzip();
     let result = ModesResult {
         frequencies_hz: found.lambda.iter().map(|&l| l.max(0.0).sqrt() / std::f64::consts::TAU).collect(),
         shapes,
         residuals: found.residuals,
+        errors,
         unknowns: system.model.unknowns(),
     };
     Ok((result, curves))
+}
+
+/// Estimated errors of modes about an equilibrium with this tangent.
+fn estimated(
+    compiled: &Compiled,
+    tangent: &BlockMatrix<f64, 3>,
+    loaded: bool,
+    lambda: &[f64],
+    shapes: &[Vec<Pose>],
+) -> Vec<Option<f64>> {
+    let options = compiled.options.discretize();
+    let model = &compiled.parts.system.model;
+    let none = vec![None; lambda.len()];
+    let own = own_stiffness(&options, &compiled.parts);
+    let (Some(highest), true) = (lambda.last(), own || !loaded) else { return none };
+    let mut shift = 0.0;
+    let mut factor = tangent.clone();
+    model.project_matrix(&mut factor);
+    if factor.factor(&model.pattern).is_err() {
+        shift = -1e-3 * highest.abs();
+        factor.clone_from(tangent);
+        add_inertia(model, -shift, 0.0, &mut factor);
+        model.project_matrix(&mut factor);
+        if factor.factor(&model.pattern).is_err() {
+            return none;
+        }
+    }
+    of_modes(&compiled.structure, &options, &compiled.parts, (&factor, shift), lambda, shapes)
+        .map_or(none, |errors| errors.relative.into_iter().map(Some).collect())
 }
 
 /// Displacements of the nodes and along the beams in a mode, the largest translation of a node scaled to 1.

@@ -1,7 +1,7 @@
 //! `bimorph check`: is the netlist right, and what is in it?
 
 use super::failure::Failure;
-use super::model::{Context, ModelArgs};
+use super::model::{Context, ModelArgs, Named};
 use super::output;
 use bimorph::netlist::Setting;
 use bimorph::structure::Structure;
@@ -11,7 +11,8 @@ use std::fmt::Write;
 
 /// Parse and elaborate a netlist, and report every error and warning.
 ///
-/// Exit status 1 on any error. Nothing is computed.
+/// Exit status 1 on any error. Tells the model's unknowns, and with --band their estimated error; JSON has "segments" by
+/// beam (0: rigid).
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  bimorph check bank.net\n  bimorph check bank.net --set w=2.1u --json")]
 pub(crate) struct Check {
@@ -35,12 +36,19 @@ struct Found<'a> {
     combs: usize,
     gaps: usize,
     ports: Vec<&'a str>,
+    unknowns: usize,
+    segments: Named<'a, usize>,
+    modes_in_band: usize,
 }
 
 impl Check {
     pub(crate) fn run(&self) -> Result<(), Failure> {
         let compiled = self.model.compile()?;
         let s = &compiled.structure;
+        let order = &compiled.order;
+        let unknowns = compiled.parts.system.model.unknowns();
+        let segments: Vec<(String, usize)> =
+            s.beams.iter().zip(&order.segments).map(|(beam, n)| (beam.name.clone(), *n)).collect();
         if self.json {
             let found = Found {
                 context: self.model.context(&compiled),
@@ -52,6 +60,9 @@ impl Check {
                 combs: s.combs.len(),
                 gaps: s.plate_gaps.len() + s.beam_gaps.len(),
                 ports: s.ports.iter().map(|p| p.name.as_str()).collect(),
+                unknowns,
+                segments: Named(&segments),
+                modes_in_band: order.modes_in_band,
             };
             let text = serde_json::to_string(&found).map_err(|e| Failure::Stdout(e.into()))?;
             return output::print(&(text + "\n"));
@@ -65,6 +76,16 @@ impl Check {
             let list: Vec<&str> = s.ports.iter().map(|p| p.name.as_str()).collect();
             let _ = writeln!(text, "ports: {}", list.join(", "));
         }
+        let most = order.segments.iter().max().unwrap_or(&0);
+        let rigid = order.segments.iter().filter(|n| **n == 0).count();
+        let _ = write!(text, "model: {unknowns} unknowns, at most {most} segments a beam");
+        if rigid > 0 {
+            let _ = write!(text, ", {rigid} rigid");
+        }
+        if let Some(error) = order.estimated_error {
+            let _ = write!(text, "; {} modes in the band, estimated error {error:.1e}", order.modes_in_band);
+        }
+        text.push('\n');
         let warnings = compiled.warnings.items.len();
         let _ = writeln!(text, "no errors, {warnings} warning{}", if warnings == 1 { "" } else { "s" });
         output::print(&text)

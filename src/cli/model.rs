@@ -3,6 +3,7 @@
 use super::failure::Failure;
 use super::{interrupt, value};
 use bimorph::compile::{CompileOptions, Compiled, Junctions, compile};
+use bimorph::discretize::Scheme;
 use bimorph::netlist::{Bundle, Setting};
 use clap::Args;
 use serde::ser::SerializeMap;
@@ -28,7 +29,8 @@ pub(crate) struct ModelArgs {
     #[arg(long, value_parser = value::number, allow_negative_numbers = true)]
     tol: Option<f64>,
 
-    /// Highest frequency the model must resolve [Hz]; higher means more unknowns [default: by slenderness]
+    /// Highest frequency the model must resolve [Hz]: as many segments as the estimated error of every mode below it needs
+    /// to stay within --tol [default: by slenderness]
     #[arg(long, value_name = "HZ", value_parser = value::number, allow_negative_numbers = true)]
     band: Option<f64>,
 
@@ -44,7 +46,26 @@ pub(crate) struct ModelArgs {
     /// Leave out gas damping
     #[arg(long)]
     undamped: bool,
+
+    /// How beams are cut into bodies and joints: a0, a2, c1, d1, b, e4 or es (docs/theory.md has their errors)
+    #[arg(long, default_value = "e4", value_name = "NAME")]
+    scheme: String,
+
+    /// Segments of every beam [default: by --band and --tol]
+    #[arg(long, value_name = "N")]
+    segments: Option<usize>,
+
+    /// Shear flexibility of beams (Timoshenko, shear coefficient 5/6); SUGAR leaves it out
+    #[arg(long)]
+    shear: bool,
+
+    /// Rotary inertia of the sections of beams; SUGAR leaves it out
+    #[arg(long)]
+    rotary_inertia: bool,
 }
+
+/// Most segments of a beam that may be asked for.
+const MOST_SEGMENTS: usize = 100_000;
 
 impl ModelArgs {
     /// The netlist with everything it uses.
@@ -64,6 +85,12 @@ impl ModelArgs {
             return Err(Failure::bad("--band", "a frequency above 0 Hz", band.to_string()));
         }
         let junctions = self.junctions.as_deref().map_or(Ok(defaults.junctions), junctions)?;
+        let scheme = Scheme::named(&self.scheme).ok_or_else(|| {
+            Failure::bad("--scheme", format!("one of {}", Scheme::NAMES.join(", ")), format!("\"{}\"", self.scheme))
+        })?;
+        if let Some(n) = self.segments.filter(|n| !(1..=MOST_SEGMENTS).contains(n)) {
+            return Err(Failure::bad("--segments", "1 to 100000", n.to_string()));
+        }
         Ok(CompileOptions {
             set: self.set.clone(),
             band: self.band,
@@ -71,6 +98,10 @@ impl ModelArgs {
             linear: self.linear,
             undamped: self.undamped,
             junctions,
+            scheme,
+            segments: self.segments,
+            shear: self.shear,
+            rotary_inertia: self.rotary_inertia,
         })
     }
 
@@ -107,6 +138,10 @@ impl ModelArgs {
             junctions: options.junctions,
             linear: options.linear,
             undamped: options.undamped,
+            scheme: options.scheme,
+            shear: options.shear,
+            rotary_inertia: options.rotary_inertia,
+            estimated_error: compiled.order.estimated_error,
             warnings: compiled.warnings.items.iter().map(|d| d.message.as_str()).collect(),
         }
     }
@@ -148,6 +183,14 @@ pub(crate) struct Context<'a> {
     linear: bool,
     /// Without gas damping.
     undamped: bool,
+    /// How beams are cut.
+    scheme: Scheme,
+    /// With shear flexibility.
+    shear: bool,
+    /// With rotary inertia of the sections.
+    rotary_inertia: bool,
+    /// Largest estimated relative error of a frequency within the band; null without one.
+    estimated_error: Option<f64>,
     /// Warnings of the netlist.
     warnings: Vec<&'a str>,
 }

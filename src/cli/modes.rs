@@ -25,7 +25,8 @@ const MOST_SHAPES: usize = 12;
 /// Natural frequencies and mode shapes about the operating point, without damping.
 ///
 /// JSON: "frequencies_hz" ascending [Hz]; "shapes": for each mode the displacement of every node, the largest
-/// translation being 1; "residuals": |Kx - λMx| / |Kx|.
+/// translation being 1; "residuals": |Kx - λMx| / |Kx|; "estimated_errors": relative, by the number of segments, signed,
+/// null where there is none.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  bimorph modes bank.net --count 10 --band 1.3M\n  \
                         bimorph modes bank.net --port sense=40 --json      about the equilibrium at 40 V\n  \
@@ -55,6 +56,7 @@ struct Document<'a> {
     frequencies_hz: &'a [f64],
     shapes: Vec<Named<'a, NodeMotion>>,
     residuals: &'a [f64],
+    estimated_errors: &'a [Option<f64>],
     unknowns: usize,
     solver: ModelChoice,
     port_voltages_v: Named<'a, f64>,
@@ -85,6 +87,7 @@ impl Modes {
             frequencies_hz: &result.frequencies_hz,
             shapes: result.shapes.iter().map(|shape| Named(shape)).collect(),
             residuals: &result.residuals,
+            estimated_errors: &result.errors,
             unknowns: result.unknowns,
             solver: self.solver,
             port_voltages_v: Named(&self.ports),
@@ -96,9 +99,12 @@ impl Modes {
             .iter()
             .zip(&result.residuals)
             .enumerate()
-            .map(|(i, (f, r))| vec![(i + 1).to_string(), quantity(*f, "Hz"), format!("{r:.1e}")])
+            .map(|(i, (f, r))| {
+                let error = result.errors[i].map_or("–".into(), |e| format!("{e:.1e}"));
+                vec![(i + 1).to_string(), quantity(*f, "Hz"), error, format!("{r:.1e}")]
+            })
             .collect();
-        let text = report::columns(&["mode", "frequency", "residual"], &rows)
+        let text = report::columns(&["mode", "frequency", "error", "residual"], &rows)
             + "\n"
             + &report::footing(&compiled, result.unknowns);
         if self.output.format() == Some(Format::Html) {

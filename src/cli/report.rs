@@ -1,6 +1,7 @@
 //! Reports for people: aligned columns in engineering units.
 
 use bimorph::compile::Compiled;
+use bimorph::discretize::Scheme;
 use bimorph::results::plot::axis::quantity;
 use std::fmt::Write;
 
@@ -47,10 +48,22 @@ pub(crate) fn options(compiled: &Compiled) -> String {
         let _ = write!(text, ", band {}", quantity(band, "Hz"));
     }
     let _ = write!(text, ", junctions {}", options.junctions.name());
-    for (on, word) in [(options.linear, ", linear"), (options.undamped, ", undamped")] {
+    if options.scheme != Scheme::default() {
+        let _ = write!(text, ", scheme {}", options.scheme.name());
+    }
+    let words = [
+        (options.linear, ", linear"),
+        (options.undamped, ", undamped"),
+        (options.shear, ", shear"),
+        (options.rotary_inertia, ", rotary inertia"),
+    ];
+    for (on, word) in words {
         if on {
             text.push_str(word);
         }
+    }
+    if let Some(error) = compiled.order.estimated_error {
+        let _ = write!(text, ", estimated error {error:.1e}");
     }
     text.push('\n');
     text

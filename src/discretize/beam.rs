@@ -1,101 +1,154 @@
-//! The E4 segment: a beam as rigid bodies at N + 1 nodes and N joints at the middle of the segments.
+//! A beam of the drawing as bodies and joints of a model, cut by a [`Scheme`](super::scheme::Scheme).
 //!
-//! Joint of a segment of length h (axial u, shear g, rotation p): stiffness EA/h, 12EI/h³, EI/h, and the second-order axial
-//! strain e_u = u − h·p²/12 + 0.6·g²/h. Static deflections under end loads are those of the Euler–Bernoulli beam, for any N.
-//!
-//! Masses, in units of ρA·h: inner bodies 1; the end bodies 25/48 with a first moment of 5/48·h towards the inside and a
-//! second moment of 1/48·h² about the node; their neighbours 47/48 (46/48 when N = 2); for N = 1 two halves at the Gauss
-//! points. Mass, first and second moment of the beam are exact, and the frequency error is (kh)⁴/1440.
-//!
-//! At junctions the ends are [`End`]s: the beam proper runs from one offset to the other, the rods in between belong to the
-//! bodies of the nodes, and the springs' compliance is added to that of the first and the last joint.
+//! At junctions the ends are [`End`]s: the beam proper, which is cut, runs from one offset to the other, the rods in between
+//! belong to the bodies of the nodes, and the springs' compliance is added to that of the first and the last joint.
 
+use super::DiscretizeOptions;
 use super::junction::Junctions;
 use super::junction_springs::End;
 use super::rigid::{Assembly, Lump};
+use super::scheme::{Bar, Cut, Scheme};
 use crate::gaps::Point;
-use crate::multibody::{BodyId, BodyName, Joint};
+use crate::multibody::{BodyName, Coupling, Joint};
 use crate::structure::Beam;
-use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
+use nalgebra::{Matrix3, Vector2};
 use std::sync::Arc;
 
-/// Lays a beam: adds its inner bodies, masses and joints. Returns the points along it, ends included.
+/// Shear coefficient of a rectangular section: G·As = κ·G·A.
+pub const SHEAR_COEFFICIENT: f64 = 5.0 / 6.0;
+
+/// What the options leave of a beam: an Euler–Bernoulli beam unless shear or rotary inertia are asked for.
+pub fn bar(beam: &Beam, shear: bool, rotary: bool) -> Bar {
+    let m = &beam.material;
+    let area = beam.width * beam.thickness;
+    let inertia = beam.thickness * beam.width.powi(3) / 12.0;
+    Bar {
+        length: beam.length,
+        ea: m.youngs_modulus * area,
+        ei: m.youngs_modulus * inertia,
+        shear: if shear { shear_flexibility(beam) } else { 0.0 },
+        line_mass: m.density * beam.width * beam.thickness,
+        rotary: if rotary { beam.width * beam.width / 12.0 } else { 0.0 },
+    }
+}
+
+/// Shear flexibility 1/(G·As) of a beam's section [1/N].
+fn shear_flexibility(beam: &Beam) -> f64 {
+    let m = &beam.material;
+    let shear_modulus = m.youngs_modulus / (2.0 * (1.0 + m.poisson));
+    1.0 / (SHEAR_COEFFICIENT * shear_modulus * beam.width * beam.thickness)
+}
+
+/// Joints of the model in the making.
+#[derive(Debug, Clone, Default)]
+pub struct Joints {
+    /// Joints, `Free(k)` being body k of the assembly.
+    pub joints: Vec<Joint>,
+    /// Pairs of joints whose rotations are coupled.
+    pub couplings: Vec<Coupling>,
+}
+
+/// Lays a beam: adds its inner bodies, masses and joints. Returns the equally spaced points along it, the drawn ends
+/// included.
 pub fn lay(
     beam: &Beam,
     segments: usize,
     heater: Option<usize>,
-    undamped: bool,
-    (junctions, ends): (Junctions, &[End; 2]),
+    options: &DiscretizeOptions,
+    ends: &[End; 2],
     rigid: &mut Assembly,
-    joints: &mut Vec<Joint>,
+    out: &mut Joints,
 ) -> Vec<Point> {
     let along = Vector2::new(beam.angle.cos(), beam.angle.sin());
     let drawn = [rigid.point(beam.a.0), rigid.point(beam.b.0)];
     let shift = [along * ends[0].offset, along * -ends[1].offset];
     let (start, end) = (rigid.position(beam.a.0) + shift[0], rigid.position(beam.b.0) + shift[1]);
-    let n = segments as f64;
-    let mut points = vec![drawn[0].beyond(shift[0])];
+    let mut bar = bar(beam, options.shear, options.rotary_inertia);
+    bar.length -= ends[0].offset + ends[1].offset;
+    // a rigid beam is the rods of a single segment, which its one body holds together
+    let scheme = if segments == 0 { Scheme::B } else { options.scheme };
+    let segments = segments.max(1);
+    let cut = scheme.cut(&bar, segments, rigid.grounded(beam.b.0));
     let name = Arc::from(beam.name.as_str());
-    for k in 1..segments {
-        let position = start + (end - start) * (k as f64 / n);
-        points.push(rigid.add_segment(BodyName::segment(&name, k), position));
+    let last = cut.parts.len() - 1;
+    let place = |at: f64| start + (end - start) * (at / bar.length);
+    let bodies: Vec<Point> = (0..=last)
+        .map(|k| match k {
+            0 => drawn[0].beyond(shift[0]),
+            k if k == last => drawn[1].beyond(shift[1]),
+            k => rigid.add_segment(BodyName::segment(&name, k), place(cut.parts[k].at)),
+        })
+        .collect();
+    let drag_per_mass = drag_per_mass(beam, options.undamped);
+    for (part, &point) in cut.parts.iter().zip(&bodies) {
+        if part.mass > 0.0 {
+            let lump = Lump { amount: part.mass, first: along * part.first, second: part.second };
+            rigid.add_mass(point, &lump, drag_per_mass);
+        }
     }
-    points.push(drawn[1].beyond(shift[1]));
-    let length = beam.length - ends[0].offset - ends[1].offset;
-    add_masses(beam, length, segments, undamped, &points, rigid);
     for (point, end, inwards) in [(drawn[0], &ends[0], 1.0), (drawn[1], &ends[1], -1.0)] {
-        add_rod(beam, end.offset, along * inwards, undamped, point, rigid);
+        add_rod(beam, end.offset, along * inwards, drag_per_mass, point, rigid);
     }
-    let h = length / n;
-    let area = beam.width * beam.thickness;
-    let inertia = beam.thickness * beam.width.powi(3) / 12.0;
-    let (ea, ei) = (beam.material.youngs_modulus * area, beam.material.youngs_modulus * inertia);
-    let straight = Matrix3::from_diagonal(&Vector3::new(ea / h, 12.0 * ei / (h * h * h), ei / h));
-    let calibrated = junctions == Junctions::Calibrated;
-    let second = Matrix2::new(0.6 / h, 0.0, 0.0, -h / 12.0);
     let m = &beam.material;
     let strain = beam.temperature.map_or(0.0, |t| m.thermal_expansion * (t - m.ambient_temperature))
         - m.stress / m.youngs_modulus;
-    for k in 0..segments {
-        let (a, b) = (points[k], points[k + 1]);
+    let calibrated = options.junctions == Junctions::Calibrated;
+    // what is drawn expands, junctions included
+    let whole = beam.length / bar.length;
+    for (k, (pin, between)) in cut.pins.iter().zip(bodies.windows(2)).enumerate() {
+        let (a, b) = (between[0], between[1]);
         if a.body == b.body {
             continue; // both ends on one rigid body: nothing can strain
         }
-        let middle = start + (end - start) * ((k as f64 + 0.5) / n);
-        joints.push(Joint {
+        out.joints.push(Joint {
             a: a.body,
             b: b.body,
-            frame: rigid.frame_at(a, b, middle, beam.angle),
-            stiffness: if calibrated { with_springs(beam, &straight, h, (k, segments), ends) } else { straight },
-            second,
-            // what is drawn expands, junctions included
-            expansion: heater.map(|group| (group, beam.length / n)),
-            rest: beam.length / n * strain,
-            locked: [false; 3],
+            frame: rigid.frame_at(a, b, place(pin.at), beam.angle),
+            stiffness: if calibrated { with_springs(beam, &bar, &cut, k, ends) } else { pin.stiffness },
+            second: pin.second,
+            expansion: heater.map(|group| (group, whole * pin.length)),
+            rest: whole * pin.length * strain,
+            locked: pin.locked,
         });
     }
-    if calibrated {
-        add_rotary_inertia(beam, h, ends, drawn, rigid);
+    if calibrated && !options.rotary_inertia {
+        add_rotary_inertia(beam, bar.length / segments as f64, ends, drawn, rigid);
     }
-    points[0] = drawn[0];
-    points[segments] = drawn[1];
+    let pair = |k: usize| (bodies[k].body, bodies[k + 1].body);
+    for &(i, j, stiffness) in &cut.couplings {
+        out.couplings.push(Coupling { first: pair(i), second: pair(j), stiffness });
+    }
+    let mut points: Vec<Point> = (cut.nodes.iter().enumerate())
+        .map(|(k, &part)| {
+            let at = k as f64 * bar.length / segments as f64;
+            bodies[part].beyond(place(at) - place(cut.parts[part].at))
+        })
+        .collect();
+    (points[0], points[segments]) = (drawn[0], drawn[1]);
     points
 }
 
-/// Stiffness of joint `k` of `n` with the shear compliance of its segment and the springs of the ends next to it.
+/// Stiffness of joint `k` of a cut beam with the shear compliance of its segment and the springs of the ends next to it.
 ///
 /// Springs may be negative where a junction is stiffer than what its offset leaves out; on very short segments they are
-/// halved until a tenth of the segment's own compliance is left.
-fn with_springs(beam: &Beam, straight: &Matrix3<f64>, h: f64, (k, n): (usize, usize), ends: &[End; 2]) -> Matrix3<f64> {
-    let mut own = Matrix3::from_diagonal(&straight.diagonal().map(|k| 1.0 / k));
-    let shear_modulus = beam.material.youngs_modulus / (2.0 * (1.0 + beam.material.poisson));
-    own[(1, 1)] += h / (SHEAR_AREA * shear_modulus * beam.width * beam.thickness);
+/// halved until a tenth of the segment's own compliance is left. A joint with rigid directions takes the bending part alone.
+fn with_springs(beam: &Beam, bar: &Bar, cut: &Cut, k: usize, ends: &[End; 2]) -> Matrix3<f64> {
+    let pin = &cut.pins[k];
     let mut springs = Matrix3::zeros();
     if k == 0 {
-        springs += ends[0].at_joint(0.5 * h, true);
+        springs += ends[0].at_joint(pin.at, true);
     }
-    if k == n - 1 {
-        springs += ends[1].at_joint(0.5 * h, false);
+    if k == cut.pins.len() - 1 {
+        springs += ends[1].at_joint(bar.length - pin.at, false);
+    }
+    if pin.locked != [false; 3] {
+        let bent = springs[(2, 2)];
+        springs = Matrix3::zeros();
+        springs[(2, 2)] = bent;
+    }
+    let Some(mut own) = pin.stiffness.try_inverse() else { return pin.stiffness };
+    if bar.shear == 0.0 && !pin.locked[1] {
+        own[(1, 1)] += pin.length * shear_flexibility(beam);
     }
     for _ in 0..8 {
         if let (Some(_), Some(whole)) = ((own * 0.9 + springs).cholesky(), (own + springs).cholesky()) {
@@ -103,11 +156,8 @@ fn with_springs(beam: &Beam, straight: &Matrix3<f64>, h: f64, (k, n): (usize, us
         }
         springs *= 0.5;
     }
-    Matrix3::from_diagonal(&own.diagonal().map(|c| 1.0 / c))
+    pin.stiffness
 }
-
-/// Shear area of a rectangle over its area.
-const SHEAR_AREA: f64 = 5.0 / 6.0;
 
 /// Drag per mass of a beam over a gas film [1/s].
 pub fn drag_per_mass(beam: &Beam, undamped: bool) -> f64 {
@@ -116,12 +166,12 @@ pub fn drag_per_mass(beam: &Beam, undamped: bool) -> f64 {
 }
 
 /// The rod of that length that a junction makes part of its node's body.
-fn add_rod(beam: &Beam, length: f64, along: Vector2<f64>, undamped: bool, node: Point, rigid: &mut Assembly) {
+fn add_rod(beam: &Beam, length: f64, along: Vector2<f64>, drag_per_mass: f64, node: Point, rigid: &mut Assembly) {
     if length > 0.0 {
         let mass = beam.material.density * beam.width * beam.thickness * length;
         let second = mass * (length * length / 3.0 + beam.width * beam.width / 12.0);
         let lump = Lump { amount: mass, first: along * (0.5 * length * mass), second };
-        rigid.add_mass(node, &lump, drag_per_mass(beam, undamped));
+        rigid.add_mass(node, &lump, drag_per_mass);
     }
 }
 
@@ -135,57 +185,5 @@ fn add_rotary_inertia(beam: &Beam, h: f64, ends: &[End; 2], points: [Point; 2], 
     let second = 0.5 * h * beam.material.density * beam.thickness * beam.width.powi(3) / 12.0;
     for (point, _) in points.into_iter().zip(ends).filter(|(_, end)| !end.free) {
         rigid.add_mass(point, &Lump { second, ..Lump::default() }, 0.0);
-    }
-}
-
-fn add_masses(beam: &Beam, length: f64, segments: usize, undamped: bool, points: &[Point], rigid: &mut Assembly) {
-    let h = length / segments as f64;
-    let unit = beam.material.density * beam.width * beam.thickness * h;
-    let drag_per_mass = drag_per_mass(beam, undamped);
-    let along = Vector2::new(beam.angle.cos(), beam.angle.sin());
-    for (k, &point) in points.iter().enumerate() {
-        if point.body == BodyId::Ground {
-            continue;
-        }
-        let (amount, first, second) = shares(segments, k);
-        let lump = Lump { amount: amount * unit, first: along * (first * h * unit), second: second * h * h * unit };
-        rigid.add_mass(point, &lump, drag_per_mass);
-    }
-}
-
-/// Mass, first and second moment about node `k` of `n` segments, in units of ρA·h, ρA·h², ρA·h³.
-fn shares(n: usize, k: usize) -> (f64, f64, f64) {
-    let inwards = if k == 0 { 1.0 } else { -1.0 };
-    let gauss = 0.5 - 0.5 / 3f64.sqrt();
-    match (n, k) {
-        (1, _) => (0.5, inwards * 0.5 * gauss, 0.5 * gauss * gauss),
-        (_, k) if k == 0 || k == n => (25.0 / 48.0, inwards * 5.0 / 48.0, 1.0 / 48.0),
-        (2, _) => (46.0 / 48.0, 0.0, 0.0),
-        (_, k) if k == 1 || k == n - 1 => (47.0 / 48.0, 0.0, 0.0),
-        _ => (1.0, 0.0, 0.0),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Mass, first and second moment of the whole beam are exact for every number of segments.
-    #[test]
-    fn moments_are_exact() {
-        for n in 1..12 {
-            let (mut mass, mut first, mut second) = (0.0, 0.0, 0.0);
-            for k in 0..=n {
-                let (m, f, s) = shares(n, k);
-                let x = k as f64;
-                mass += m;
-                first += m * x + f;
-                second += m * x * x + 2.0 * f * x + s;
-            }
-            let l = n as f64;
-            assert!((mass - l).abs() < 1e-12);
-            assert!((first - l * l / 2.0).abs() < 1e-12 * l * l);
-            assert!((second - l * l * l / 3.0).abs() < 1e-12 * l * l * l, "{n}: {second}");
-        }
     }
 }

@@ -4,8 +4,8 @@
 //! drag in proportion to it; small displacements about the drawn geometry. One element is exact for static loads at its
 //! ends; its first clamped-clamped mode it cannot see at all, so that a frame with one element for each beam misses modes.
 //!
-//! With `shear` the element is Timoshenko's: shear flexibility with Φ = 12EI/(κGA·h²), κ = 5/6, and the rotary inertia of the
-//! section, which wide beams show. SUGAR has neither.
+//! With `shear` the element is Timoshenko's: shear flexibility with Φ = 12EI/(κGA·h²), κ = 5/6, in stiffness and mass, and the
+//! rotary inertia of the section, which wide beams show. SUGAR has neither.
 //!
 //! Rigid links, plates, supports, springs and loads are those of the drawing. A node that lies at r from the reference point
 //! of its rigid group moves as u = q + θ × r. Combs and gaps are left out.
@@ -13,8 +13,9 @@
 //! Reference: J. S. Przemieniecki, "Theory of Matrix Structural Analysis" (1968), §5.6 and §11.3, for the element; J. V.
 //! Clark et al., "Addressing the needs of complex MEMS design", MEMS 2002, for SUGAR.
 
+use super::beam::bar;
 use super::rigid::Assembly;
-use super::{DiscretizeError, lay_spring, order};
+use super::{DiscretizeError, cubic, lay_spring, order};
 use crate::gaps::Point;
 use crate::multibody::linear_system::{LinearSystem, add_pair};
 use crate::multibody::planar::{JointFrame, Pose};
@@ -24,17 +25,19 @@ use nalgebra::{Matrix3, Matrix6, Vector2, Vector3, Vector6};
 use std::sync::Arc;
 
 /// How many elements a beam gets.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Elements {
     /// The same number for every beam; 1 is what SUGAR does.
     Each(usize),
     /// By the highest frequency to be resolved [Hz] and the relative error: the rule of [`order`], since a cubic element
     /// has the frequency error of a segment, (kh)⁴/1440.
     Band(f64, f64),
+    /// As many as given for each beam.
+    Beams(Vec<usize>),
 }
 
 /// How a drawing is made into a frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct FrameOptions {
     /// How many elements a beam gets.
     pub elements: Elements,
@@ -65,14 +68,16 @@ pub struct Frame {
 /// See [`DiscretizeError`].
 pub fn assemble(structure: &Structure, options: &FrameOptions) -> Result<Frame, DiscretizeError> {
     let undamped = options.undamped;
-    let mut rigid = Assembly::new(structure);
+    let mut rigid = Assembly::new(structure, &[]);
     let mut pieces: Vec<Piece<'_>> = Vec::new();
     let mut beams: Vec<Vec<Point>> = Vec::with_capacity(structure.beams.len());
-    for beam in &structure.beams {
-        let count = match options.elements {
-            Elements::Each(n) => order::segments(beam, None, 1.0).map(|_| n.max(1)),
-            Elements::Band(band, tol) => order::segments(beam, Some(band), tol),
-        }?;
+    for (index, beam) in structure.beams.iter().enumerate() {
+        order::check(beam)?;
+        let count = match &options.elements {
+            Elements::Each(n) => (*n).max(1),
+            Elements::Band(band, tol) => order::segments(beam, Some(*band), *tol),
+            Elements::Beams(counts) => counts[index],
+        };
         let (start, end) = (rigid.position(beam.a.0), rigid.position(beam.b.0));
         let mut from = rigid.point(beam.a.0);
         let mut points = vec![from];
@@ -190,45 +195,8 @@ impl Piece<'_> {
     /// Stiffness, mass, and force per free strain, on the coordinates of the two bodies.
     fn matrices(&self, shear: bool) -> (Matrix6<f64>, Matrix6<f64>, Vector6<f64>) {
         let h = self.length;
-        let area = self.beam.width * self.beam.thickness;
-        let modulus = self.beam.material.youngs_modulus;
-        let ei = modulus * self.beam.thickness * self.beam.width.powi(3) / 12.0;
-        // Φ: 0 for a slender beam
-        let kappa_g = 5.0 / 6.0 * modulus / (2.0 * (1.0 + self.beam.material.poisson));
-        let phi = if shear { 12.0 * ei / (kappa_g * area * h * h) } else { 0.0 };
-        let (a, b) = (modulus * area / h, ei / (h * h * h) / (1.0 + phi));
-        let (near, far) = ((4.0 + phi) * b * h * h, (2.0 - phi) * b * h * h);
-        #[rustfmt::skip]
-        let k = Matrix6::new(
-             a,   0.0,         0.0,         -a,   0.0,         0.0,
-             0.0, 12.0 * b,    6.0 * b * h,  0.0, -12.0 * b,   6.0 * b * h,
-             0.0, 6.0 * b * h, near,         0.0, -6.0 * b * h, far,
-            -a,   0.0,         0.0,          a,   0.0,         0.0,
-             0.0, -12.0 * b,  -6.0 * b * h,  0.0, 12.0 * b,   -6.0 * b * h,
-             0.0, 6.0 * b * h, far,          0.0, -6.0 * b * h, near,
-        );
-        let density = self.beam.material.density;
-        #[rustfmt::skip]
-        let mut m = Matrix6::new(
-            140.0, 0.0,       0.0,         70.0,  0.0,        0.0,
-            0.0,   156.0,     22.0 * h,    0.0,   54.0,      -13.0 * h,
-            0.0,   22.0 * h,  4.0 * h*h,   0.0,   13.0 * h,  -3.0 * h*h,
-            70.0,  0.0,       0.0,         140.0, 0.0,        0.0,
-            0.0,   54.0,      13.0 * h,    0.0,   156.0,     -22.0 * h,
-            0.0,  -13.0 * h, -3.0 * h*h,   0.0,  -22.0 * h,   4.0 * h*h,
-        ) * (density * area * h / 420.0);
-        if shear {
-            #[rustfmt::skip]
-            let rotary = Matrix6::new(
-                0.0, 0.0,      0.0,       0.0, 0.0,      0.0,
-                0.0, 36.0,     3.0 * h,   0.0, -36.0,    3.0 * h,
-                0.0, 3.0 * h,  4.0 * h*h, 0.0, -3.0 * h, -h * h,
-                0.0, 0.0,      0.0,       0.0, 0.0,      0.0,
-                0.0, -36.0,   -3.0 * h,   0.0, 36.0,    -3.0 * h,
-                0.0, 3.0 * h, -h * h,     0.0, -3.0 * h, 4.0 * h*h,
-            );
-            m += rotary * (density * ei / modulus / (30.0 * h));
-        }
+        let bar = bar(self.beam, shear, shear);
+        let (k, m, a) = (cubic::stiffness(&bar, h), cubic::mass(&bar, h), bar.ea / h);
         let (s, c) = self.beam.angle.sin_cos();
         let turn = Matrix3::new(c, s, 0.0, -s, c, 0.0, 0.0, 0.0, 1.0);
         let mut t = Matrix6::zeros();

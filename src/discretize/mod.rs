@@ -4,22 +4,26 @@
 //! and one joint with three directions at the middle of each segment. Anchored nodes become ground.
 //!
 //! The paper's four joint types are this one joint: rotary between equal sections (type 1), between different sections
-//! (type 2), rotary T (type 3: several joints on one body), prismatic (type 4: the axial direction).
+//! (type 2), rotary T (type 3: several joints on one body), prismatic (type 4: the axial direction). A [`Scheme`] says where
+//! along a beam they sit and how the mass is shared out.
 //!
 //! | file | what it holds |
 //! |---|---|
 //! | [`order`] | model order: how many segments a beam gets |
 //! | [`rigid`] | nodes → rigid groups, supports → ground and held directions |
-//! | [`beam`] | the E4 segment: joints, second-order axial strain, masses |
 //! | [`junction`] | which beams meet where, and what that does to their ends |
 //! | [`junction_springs`] | offset and spring at the end of a beam |
 //! | [`junction_table`] | the springs' numbers, from plane stress |
 //! | [`overlap`] | mass that is drawn twice where beams meet |
+//! | [`scheme`] | ways to cut a beam: places, stiffness and second-order strain of joints, masses |
+//! | [`beam`] | a cut beam in the drawing: bodies, masses, joints, points |
+//! | [`cubic`] | the cubic beam element, and the next term of its dynamic stiffness |
 //! | [`frame`] | the same drawing as a linear frame of cubic beam elements: a baseline |
 //! | [`gap`] | combs, plates and facing beams → gap functions |
 //! | [`ports`] | resistors, heaters, sources and ports → network and quadratic forms of temperature |
 
 pub mod beam;
+pub mod cubic;
 pub mod frame;
 pub mod gap;
 pub mod junction;
@@ -29,9 +33,12 @@ pub mod order;
 pub mod overlap;
 pub mod ports;
 pub mod rigid;
+pub mod scheme;
+
+pub use scheme::Scheme;
 
 use crate::gaps::{Load, Point, System};
-use crate::multibody::{Damper, Joint, Model};
+use crate::multibody::{BodyId, Coupling, Damper, Joint, Model};
 use crate::structure::Structure;
 use nalgebra::{Matrix2, Matrix3, Vector2};
 use thiserror::Error;
@@ -51,11 +58,29 @@ pub struct DiscretizeOptions {
     pub undamped: bool,
     /// How beams meet.
     pub junctions: Junctions,
+    /// How beams are cut.
+    pub scheme: Scheme,
+    /// Segments of every beam; none: by band or slenderness.
+    pub segments: Option<usize>,
+    /// Shear flexibility of beams (Timoshenko). SUGAR leaves it out.
+    pub shear: bool,
+    /// Rotary inertia of the sections of beams. SUGAR leaves it out.
+    pub rotary_inertia: bool,
 }
 
 impl Default for DiscretizeOptions {
     fn default() -> Self {
-        Self { band: None, tol: 1e-3, linear: false, undamped: false, junctions: Junctions::default() }
+        Self {
+            band: None,
+            tol: 1e-3,
+            linear: false,
+            undamped: false,
+            junctions: Junctions::default(),
+            scheme: Scheme::E4,
+            segments: None,
+            shear: false,
+            rotary_inertia: false,
+        }
     }
 }
 
@@ -66,8 +91,10 @@ pub struct Discretized {
     pub system: System,
     /// For each node of the structure, its material point; none for purely electrical nodes.
     pub nodes: Vec<Option<Point>>,
-    /// For each beam, the points along its centreline, ends included.
+    /// For each beam, the equally spaced points along its centreline, ends included: one more than its segments.
     pub beams: Vec<Vec<Point>>,
+    /// For each beam, what the junctions at its start and its end take of its length [m].
+    pub offsets: Vec<[f64; 2]>,
     /// For each heater of the electrics, its beam in the structure.
     pub heaters: Vec<usize>,
     /// Name of each gap of the system.
@@ -110,31 +137,44 @@ pub enum DiscretizeError {
 /// # Errors
 /// See [`DiscretizeError`].
 pub fn discretize(structure: &Structure, options: &DiscretizeOptions) -> Result<Discretized, DiscretizeError> {
-    let mut rigid = rigid::Assembly::new(structure);
-    let mut joints: Vec<Joint> = Vec::new();
+    discretize_with(structure, options, &order::a_priori(structure, options)?)
+}
+
+/// The same with the number of segments of each beam; 0: a rigid beam, which makes one body of its two nodes.
+///
+/// # Errors
+/// See [`DiscretizeError`].
+pub fn discretize_with(
+    structure: &Structure,
+    options: &DiscretizeOptions,
+    segments: &[usize],
+) -> Result<Discretized, DiscretizeError> {
+    let stiff: Vec<bool> = segments.iter().map(|n| *n == 0).collect();
+    let mut rigid = rigid::Assembly::new(structure, &stiff);
+    let mut laid = beam::Joints::default();
     let mut dampers: Vec<Damper> = Vec::new();
     let mut beams = Vec::with_capacity(structure.beams.len());
     let mut heaters = Vec::new();
     let ends = junction::find(structure, &rigid, options.junctions);
     for (index, drawn) in structure.beams.iter().enumerate() {
-        let segments = order::segments(drawn, options.band, options.tol)?;
         let heater = drawn.heater.is_some().then(|| {
             heaters.push(index);
             heaters.len() - 1
         });
-        let meeting = (options.junctions, &ends.beams[index]);
-        beams.push(beam::lay(drawn, segments, heater, options.undamped, meeting, &mut rigid, &mut joints));
+        beams.push(beam::lay(drawn, segments[index], heater, options, &ends.beams[index], &mut rigid, &mut laid));
     }
     ends.correct_mass(structure, options.undamped, &mut rigid);
+    let beam::Joints { mut joints, couplings: mut coupled } = laid;
     for mass in &structure.masses {
         rigid.add_plate(mass, options.undamped);
     }
-    let stiffest = joints.iter().map(|j| j.stiffness[(0, 0)]).fold(0.0, f64::max);
+    let elastic = joints.iter().map(|j| if j.locked[0] { 0.0 } else { j.stiffness[(0, 0)] });
+    let stiffest = elastic.fold(0.0, f64::max);
     for spring in &structure.springs {
         lay_spring(spring, options.undamped, &rigid, &mut joints, &mut dampers);
     }
     rigid.hold_hinges(structure, stiffest, &mut joints);
-    let (gaps, gap_names, couplings) = gap::lay(structure, &rigid);
+    let (gaps, gap_names, mut couplings) = gap::lay(structure, &rigid);
     let loads: Vec<(usize, Load)> = structure
         .loads
         .iter()
@@ -157,7 +197,13 @@ pub fn discretize(structure: &Structure, options: &DiscretizeOptions) -> Result<
     for damper in &mut dampers {
         rigid.center(damper.a, damper.b, &mut damper.frame);
     }
+    couplings.extend(coupled.iter().flat_map(Coupling::pairs));
     let (model, place) = Model::new(bodies, joints, dampers, &couplings, options.linear);
+    let placed = |id: BodyId| if let BodyId::Free(k) = id { BodyId::Free(place[k]) } else { id };
+    for Coupling { first, second, .. } in &mut coupled {
+        (*first, *second) = ((placed(first.0), placed(first.1)), (placed(second.0), placed(second.1)));
+    }
+    let model = model.couple(coupled);
     let moved = |p: Point| rigid.centered(p, &place);
     let system = System {
         model,
@@ -169,7 +215,8 @@ pub fn discretize(structure: &Structure, options: &DiscretizeOptions) -> Result<
     let nodes =
         (0..structure.nodes.len()).map(|n| structure.nodes[n].mechanical.then(|| moved(rigid.point(n)))).collect();
     let beams = beams.into_iter().map(|points| points.into_iter().map(moved).collect()).collect();
-    Ok(Discretized { system, nodes, beams, heaters, gap_names })
+    let offsets = ends.beams.iter().map(|[a, b]| [a.offset, b.offset]).collect();
+    Ok(Discretized { system, nodes, beams, offsets, heaters, gap_names })
 }
 
 /// A lumped spring and damper: a joint half way between its two nodes.

@@ -1,4 +1,4 @@
-//! Model order: how many segments a beam gets.
+//! Model order before anything is computed: how many segments a beam gets.
 //!
 //! A chain of E4 segments of length h follows a wave of number k with the relative frequency error (kh)⁴/1440. With the
 //! bending wave number at the edge of the band, k = (ρA·ω²/EI)^¼, the error stays below `tol` for
@@ -6,20 +6,22 @@
 //! first clamped mode has a body to move.
 //!
 //! Without a band only the shape decides: a slender beam gets enough segments for large static deflections.
+//!
+//! With a band this is where [`model_order`](crate::analysis::model_order) starts from.
 
-use super::DiscretizeError;
-use crate::structure::Beam;
+use super::{DiscretizeError, DiscretizeOptions};
+use crate::structure::{Beam, Structure};
 
 /// Length over width above which a beam counts as slender.
 const SLENDER: f64 = 8.0;
 /// Segments of a slender beam when no band is given.
 const STATIC_SEGMENTS: usize = 2;
 
-/// Number of segments of a beam.
+/// Checks that a beam has length, section and stiffness.
 ///
 /// # Errors
-/// [`DiscretizeError::NotPositive`] for a beam without length, section or stiffness.
-pub fn segments(beam: &Beam, band: Option<f64>, tol: f64) -> Result<usize, DiscretizeError> {
+/// [`DiscretizeError::NotPositive`]
+pub fn check(beam: &Beam) -> Result<(), DiscretizeError> {
     for (quantity, value) in [
         ("length", beam.length),
         ("width", beam.width),
@@ -30,13 +32,36 @@ pub fn segments(beam: &Beam, band: Option<f64>, tol: f64) -> Result<usize, Discr
             return Err(DiscretizeError::NotPositive { element: beam.name.clone(), quantity, value });
         }
     }
-    let Some(band) = band else {
-        return Ok(if beam.length / beam.width > SLENDER { STATIC_SEGMENTS } else { 1 });
+    Ok(())
+}
+
+/// Number of segments of every beam by the options.
+///
+/// # Errors
+/// See [`check`].
+pub fn a_priori(structure: &Structure, options: &DiscretizeOptions) -> Result<Vec<usize>, DiscretizeError> {
+    let count = |beam: &Beam| {
+        check(beam)?;
+        let count = options.segments.unwrap_or_else(|| segments(beam, options.band, options.tol));
+        Ok(options.scheme.segments(count))
     };
+    structure.beams.iter().map(count).collect()
+}
+
+/// kL at the edge of a band [Hz].
+pub fn waves(beam: &Beam, band: f64) -> f64 {
     let omega = 2.0 * std::f64::consts::PI * band;
     // ρA/EI = 12ρ/(E·w²)
     let inverse = 12.0 * beam.material.density / (beam.material.youngs_modulus * beam.width * beam.width);
-    let kl = (inverse * omega * omega).powf(0.25) * beam.length;
+    (inverse * omega * omega).powf(0.25) * beam.length
+}
+
+/// Number of E4 segments of a beam that [`check`] has passed.
+pub fn segments(beam: &Beam, band: Option<f64>, tol: f64) -> usize {
+    let Some(band) = band else {
+        return if beam.length / beam.width > SLENDER { STATIC_SEGMENTS } else { 1 };
+    };
+    let kl = waves(beam, band);
     let count = (kl / (1440.0 * tol).powf(0.25)).ceil().max(1.0) as usize;
-    Ok(if kl > 3.0 { count.max(2) } else { count })
+    if kl > 3.0 { count.max(2) } else { count }
 }

@@ -1,4 +1,5 @@
-//! Nodes → rigid bodies. Links join nodes to one body; anchors make it ground; other supports hold directions.
+//! Nodes → rigid bodies. Links and rigid beams join nodes to one body; anchors make it ground; other supports hold
+//! directions.
 //!
 //! Until [`Assembly::finish_bodies`] every point is given from its group's reference point (the position of the group's
 //! first node); after it, from the centre of mass, in which the mass matrix is diagonal and constant.
@@ -54,12 +55,13 @@ pub struct Assembly {
 }
 
 impl Assembly {
-    /// Groups the nodes of a drawing.
-    pub fn new(structure: &Structure) -> Self {
+    /// Groups the nodes of a drawing, of which the beams marked in `rigid` are links too.
+    pub fn new(structure: &Structure, rigid: &[bool]) -> Self {
         let count = structure.nodes.len();
         let mut leader: Vec<usize> = (0..count).collect();
-        for link in &structure.links {
-            let (a, b) = (root(&mut leader, link.a.0), root(&mut leader, link.b.0));
+        let stiff = structure.beams.iter().zip(rigid).filter(|(_, rigid)| **rigid).map(|(beam, _)| (beam.a, beam.b));
+        for (a, b) in structure.links.iter().map(|link| (link.a, link.b)).chain(stiff) {
+            let (a, b) = (root(&mut leader, a.0), root(&mut leader, b.0));
             leader[a.max(b)] = a.min(b);
         }
         let mut anchored = vec![false; count];

@@ -1,6 +1,6 @@
 //! Elastic forces, strain energy, tangent and damping of a model. One pass over the joints each, no allocation.
 
-use super::model::Model;
+use super::model::{Coupling, Model};
 use super::planar::{HalfTurn, JointKinematics, PairTangent, Pose};
 use super::section::{LaidJoint, NONE, Place, Section};
 use super::{BlockMatrix, BodyId};
@@ -102,6 +102,41 @@ pub fn add_elastic(model: &Model, q: &[Pose], rest: &RestStrain<'_>, r: &mut [Po
         let k = turns.kinematics(model.linear, joint, section, q);
         scatter(joint.place, k.forces(&joint.stress(section, &k, rest)), r);
     }
+    add_couplings(model, q, r);
+}
+
+/// `r +=` the moments of coupled joints.
+fn add_couplings(model: &Model, q: &[Pose], r: &mut [Pose]) {
+    for coupling in &model.couplings {
+        let (first, second) = (turn_between(q, coupling.first), turn_between(q, coupling.second));
+        for ((a, b), moment) in [(coupling.first, second), (coupling.second, first)] {
+            for (id, side) in [(a, -coupling.stiffness), (b, coupling.stiffness)] {
+                if let BodyId::Free(k) = id {
+                    r[k].z += side * moment;
+                }
+            }
+        }
+    }
+}
+
+fn turn_between(q: &[Pose], (a, b): (BodyId, BodyId)) -> f64 {
+    Model::pose(q, b).z - Model::pose(q, a).z
+}
+
+/// The constant tangent of coupled joints.
+fn add_coupling_tangent(model: &Model, tangent: &mut BlockMatrix<f64, 3>) {
+    for Coupling { first, second, stiffness } in &model.couplings {
+        for (i, row) in [(first.0, -stiffness), (first.1, *stiffness)] {
+            for (j, side) in [(second.0, -1.0), (second.1, 1.0)] {
+                let (BodyId::Free(i), BodyId::Free(j)) = (i, j) else { continue };
+                if i == j {
+                    tangent.diagonal[i][(2, 2)] += 2.0 * row * side;
+                } else if let Some(block) = model.pattern.block(i.max(j), i.min(j)) {
+                    tangent.below[block][(2, 2)] += row * side;
+                }
+            }
+        }
+    }
 }
 
 /// `tangent += ∂²U/∂q²` and `r += ∂U/∂q`.
@@ -125,6 +160,8 @@ pub fn add_tangent(
         };
         joint.place.add_pair(tangent, &h);
     }
+    add_couplings(model, q, r);
+    add_coupling_tangent(model, tangent);
 }
 
 /// Strain energy U(q) [J].
@@ -136,7 +173,8 @@ pub fn strain_energy(model: &Model, q: &[Pose], rest: &RestStrain<'_>) -> f64 {
         let strain = k.strain - Vector3::new(joint.offset(section, rest), 0.0, 0.0);
         0.5 * strain.dot(&(section.stiffness * strain))
     };
-    model.joints.iter().map(energy).sum()
+    let coupled = |c: &Coupling| c.stiffness * turn_between(q, c.first) * turn_between(q, c.second);
+    model.joints.iter().map(energy).sum::<f64>() + model.couplings.iter().map(coupled).sum::<f64>()
 }
 
 /// Kinetic energy ½·vᵀMv [J].

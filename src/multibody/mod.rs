@@ -32,5 +32,5 @@ pub mod sine;
 
 pub use body::{Body, BodyName, Drag};
 pub use factor::{BlockMatrix, Scalar};
-pub use model::{BodyId, Damper, Joint, Model, State};
+pub use model::{BodyId, Coupling, Damper, Joint, Model, State};
 pub use pattern::Pattern;

@@ -61,6 +61,26 @@ impl Damper {
     }
 }
 
+/// Two joints whose moments depend on both rotations: the paper's general joint spring. Its energy is `stiffness`·p₁·p₂,
+/// with p = θ_b − θ_a of each joint.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Coupling {
+    /// Bodies a and b of the first joint.
+    pub first: (BodyId, BodyId),
+    /// Bodies a and b of the second joint.
+    pub second: (BodyId, BodyId),
+    /// Moment of one joint per rotation of the other [N·m/rad].
+    pub stiffness: f64,
+}
+
+impl Coupling {
+    /// The pairs of bodies that it couples.
+    pub fn pairs(&self) -> [(BodyId, BodyId); 4] {
+        let ((a, b), (c, d)) = (self.first, self.second);
+        [(a, c), (a, d), (b, c), (b, d)]
+    }
+}
+
 /// Bodies, joints and their elimination order. Never changed after [`Model::new`]; share it in an `Arc`.
 #[derive(Debug, Clone)]
 pub struct Model {
@@ -70,6 +90,8 @@ pub struct Model {
     pub joints: Vec<LaidJoint>,
     /// What joints share.
     pub sections: Vec<Section>,
+    /// Couplings of joints, see [`Model::couple`].
+    pub couplings: Vec<Coupling>,
     /// Dampers.
     pub dampers: Vec<Damper>,
     /// Pattern of the tangent.
@@ -149,9 +171,28 @@ impl Model {
         let damper_matrix = dampers.iter().map(Damper::matrix).collect();
         let sections = sections.all;
         let held = (0..).zip(&bodies).filter(|(_, b)| b.free.is_some()).map(|(k, _)| k).collect();
-        let model =
-            Self { bodies, joints: laid, sections, dampers, pattern, linear, held, damper_place, damper_matrix };
+        let couplings = Vec::new();
+        let model = Self {
+            bodies,
+            joints: laid,
+            sections,
+            couplings,
+            dampers,
+            pattern,
+            linear,
+            held,
+            damper_place,
+            damper_matrix,
+        };
         (model, place)
+    }
+
+    /// Couples joints, bodies numbered in elimination order. Their [`Coupling::pairs`] must have been among the couplings
+    /// given to [`Model::new`].
+    #[must_use]
+    pub fn couple(mut self, couplings: Vec<Coupling>) -> Self {
+        self.couplings = couplings;
+        self
     }
 
     /// Mechanical unknowns: three per body, less the directions that supports hold.

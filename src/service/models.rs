@@ -116,6 +116,7 @@ fn describe(id: String, compiled: &Arc<Compiled>, make: MakeDevice) -> Result<pr
         ports: opened.ports.into_iter().map(|port| port.name).collect(),
         nodes: nodes.map(|node| node.name.clone()).collect(),
         unknowns: opened.unknowns as u64,
+        estimated_error: compiled.order.estimated_error,
         parameters: compiled.parameters.iter().map(|(name, value)| setting_to_wire(name, value)).collect(),
         warnings: diagnostics_to_wire(&compiled.warnings),
         rendered_warnings: compiled.warnings.render(false),

@@ -54,6 +54,7 @@ pub mod path;
 pub mod radau5;
 pub mod rk45;
 pub mod rodas4;
+pub mod subspace;
 pub mod tr_bdf2;
 
 use crate::multibody::factor::ZeroPivot;
@@ -118,7 +119,7 @@ pub enum SolveError {
     /// An explicit integrator needs inertia in every direction that is free.
     #[error(
         "an explicit integrator needs inertia in every free direction: body \"{body}\" has none {direction} \
-         (\"rotary_inertia\" among the compile options gives beam segments that of their section)"
+         (--rotary-inertia, the compile option rotary_inertia, gives beam segments that of their section)"
     )]
     Massless {
         /// Name of the body.

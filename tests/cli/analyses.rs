@@ -49,6 +49,13 @@ fn modes() {
     assert_eq!(found["frequencies_hz"].as_array().map(Vec::len), Some(2));
     assert_eq!(found["shapes"].as_array().map(Vec::len), Some(2));
     assert!(number(&found["residuals"][0]) < 1e-6);
+    assert!(number(&found["estimated_errors"][0]).abs() < 1e-4 && number(&found["estimated_error"]) < 1e-4);
+
+    let checked = bench.json("check c.net --tol 1e-4 --band 2M");
+    assert!(checked["unknowns"].as_u64() > Some(3) && checked["modes_in_band"].as_u64() > Some(0));
+    let forced = bench.json("modes c.net --count 1 --scheme d1 --segments 8 --shear --rotary-inertia");
+    assert_eq!((&forced["scheme"], &forced["shear"]), (&"d1".into(), &true.into()));
+    assert_relative_eq!(number(&forced["frequencies_hz"][0]), f1, max_relative = 5e-3);
 }
 
 /// A plate on a spring pulls in at √(8·k·g³/(27·ε·A)) (Nathanson et al., 1967).

@@ -12,6 +12,7 @@ mod junctions;
 mod motion;
 mod paths;
 mod scenes;
+mod schemes;
 
 use bimorph::analysis::statics::{NodeMotion, StaticResult, static_equilibrium};
 use bimorph::compile::{CompileOptions, Compiled, Junctions, compile};

@@ -56,18 +56,22 @@ pub fn modes_to_wire(result: &ModesResult) -> proto::ModesResponse {
         nodes,
         shapes: result.shapes.iter().map(shape).collect(),
         unknowns: result.unknowns as u64,
+        errors: result.errors.iter().map(|e| e.unwrap_or(f64::NAN)).collect(),
     }
 }
 
 /// Modes back.
 pub fn modes_from_wire(wire: proto::ModesResponse) -> ModesResult {
-    let proto::ModesResponse { frequencies_hz, residuals, nodes, shapes, unknowns } = wire;
+    let proto::ModesResponse { frequencies_hz, residuals, nodes, shapes, unknowns, errors } = wire;
     let shape = |s: proto::Shape| {
         let motions = s.x.iter().zip(&s.y).zip(&s.rz).map(|((&x, &y), &rz)| NodeMotion { x, y, rz });
         nodes.iter().cloned().zip(motions).collect()
     };
     let shapes = shapes.into_iter().map(shape).collect();
-    ModesResult { frequencies_hz, shapes, residuals, unknowns: size(unknowns) }
+    // a server that sends no estimates, or none for a mode
+    let mut errors: Vec<_> = errors.into_iter().map(|e| e.is_finite().then_some(e)).collect();
+    errors.resize(frequencies_hz.len(), None);
+    ModesResult { frequencies_hz, shapes, residuals, errors, unknowns: size(unknowns) }
 }
 
 /// Pull-in as it travels.

@@ -2,6 +2,7 @@
 
 use super::{Violation, number, required};
 use crate::compile::{CompileOptions, Junctions};
+use crate::discretize::Scheme;
 use crate::netlist::{Bundle, Diagnostic, Diagnostics, Setting, Severity};
 use crate::service::proto;
 use serde::Deserialize;
@@ -60,6 +61,10 @@ pub fn options_to_wire(options: &CompileOptions) -> proto::CompileOptions {
         linear: options.linear,
         undamped: options.undamped,
         junctions: options.junctions.name().to_owned(),
+        scheme: options.scheme.name().to_owned(),
+        segments: options.segments.map(|n| u32::try_from(n).unwrap_or(u32::MAX)),
+        shear: options.shear,
+        rotary_inertia: options.rotary_inertia,
     }
 }
 
@@ -89,6 +94,18 @@ pub fn options_from_wire(options: Option<proto::CompileOptions>) -> Result<Compi
         linear: options.linear,
         undamped: options.undamped,
         junctions,
+        scheme: match options.scheme.as_str() {
+            "" => Scheme::default(),
+            name => Scheme::named(name).ok_or_else(|| {
+                Violation::new("options.scheme", format!("\"{name}\" is none of {}", Scheme::NAMES.join(", ")))
+            })?,
+        },
+        segments: match options.segments {
+            Some(0) => return Err(Violation::new("options.segments", "0, expected at least one")),
+            n => n.map(|n| n as usize),
+        },
+        shear: options.shear,
+        rotary_inertia: options.rotary_inertia,
     })
 }
 
@@ -140,6 +157,10 @@ mod tests {
             linear: true,
             undamped: true,
             junctions: Junctions::Centreline,
+            scheme: Scheme::D1,
+            segments: Some(6),
+            shear: true,
+            rotary_inertia: true,
         };
         assert_eq!(options_from_wire(Some(options_to_wire(&options))), Ok(options));
         assert_eq!(options_from_wire(None), Ok(CompileOptions::default()));
@@ -155,6 +176,10 @@ mod tests {
         assert_eq!(field(bad_band), Err("options.band_hz".into()));
         let bad_name = proto::CompileOptions { junctions: "welded".into(), ..Default::default() };
         assert_eq!(field(bad_name), Err("options.junctions".into()));
+        let bad_scheme = proto::CompileOptions { scheme: "e5".into(), ..Default::default() };
+        assert_eq!(field(bad_scheme), Err("options.scheme".into()));
+        let no_segments = proto::CompileOptions { segments: Some(0), ..Default::default() };
+        assert_eq!(field(no_segments), Err("options.segments".into()));
         let no_root = proto::Bundle { root: "a.net".into(), files: Default::default() };
         assert_eq!(bundle_from_wire(Some(no_root)).map_err(|v| v.field), Err("bundle.root".into()));
     }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import TracebackType
@@ -48,6 +49,10 @@ class Client:
         linear: bool = False,
         undamped: bool = False,
         junctions: str = "",
+        scheme: str = "",
+        segments: int | None = None,
+        shear: bool = False,
+        rotary_inertia: bool = False,
         include: Iterable[str | os.PathLike[str]] = (),
     ) -> Model:
         """Compiles a netlist (a path, or a :class:`Netlist`).
@@ -55,11 +60,15 @@ class Client:
         ``set`` overrides netlist parameters [SI]. ``band`` is the highest frequency to resolve [Hz], ``tol`` the relative
         error aimed at [1], ``linear`` small displacements about the drawn geometry, ``undamped`` leaves out gas damping,
         ``junctions`` how beams meet: "centreline", "offset" or "calibrated" (the default).
+        ``scheme`` names how beams are cut ("a0" … "es"), ``segments`` fixes the number of segments of every beam, ``shear``
+        and ``rotary_inertia`` make beams thick.
 
         Raises :class:`NetlistError` with all diagnostics.
         """
         bundle = _bundle(netlist, include)
-        options = _options(set or {}, band, tol, linear, undamped, junctions)
+        options = _options(
+            set or {}, band, tol, linear, undamped, junctions, scheme, segments, shear, rotary_inertia
+        )
         request = model_pb2.CompileRequest(bundle=bundle, options=options)
         try:
             answer = self._channel.call("Compile", request)
@@ -84,6 +93,10 @@ class Client:
         linear: bool = False,
         undamped: bool = False,
         junctions: str = "",
+        scheme: str = "",
+        segments: int | None = None,
+        shear: bool = False,
+        rotary_inertia: bool = False,
         include: Iterable[str | os.PathLike[str]] = (),
         shard: tuple[int, int] = (0, 1),
         progress: Callable[[int, int], object] | None = None,
@@ -94,7 +107,9 @@ class Client:
         """
         request = sweep_pb2.SubmitSweepRequest(
             bundle=_bundle(netlist, include),
-            options=_options(set or {}, band, tol, linear, undamped, junctions),
+            options=_options(
+                set or {}, band, tol, linear, undamped, junctions, scheme, segments, shear, rotary_inertia
+            ),
             spec=sweeps.to_wire(parameters, analysis, shard),
         )
         return sweeps.run(self._channel, request, progress)
@@ -161,7 +176,13 @@ class Model:
             {name: NodeMotion(x, y, rz) for name, x, y, rz in zip(answer.nodes, s.x, s.y, s.rz)}
             for s in answer.shapes
         ]
-        return ModesResult(list(answer.frequencies_hz), list(answer.residuals), shapes, answer.unknowns)
+        return ModesResult(
+            list(answer.frequencies_hz),
+            list(answer.residuals),
+            shapes,
+            answer.unknowns,
+            [None if math.isnan(e) else e for e in answer.errors],
+        )
 
     def pull_in(self, max_v: float, port: str = "") -> PullInResult:
         """Pull-in and release voltage [V] of ``port`` (default: the first), looking up to ``max_v`` [V]."""
@@ -235,6 +256,10 @@ def _options(
     linear: bool,
     undamped: bool,
     junctions: str,
+    scheme: str,
+    segments: int | None,
+    shear: bool,
+    rotary_inertia: bool,
 ) -> Any:
     return model_pb2.CompileOptions(
         set=[sweeps.setting(name, value) for name, value in settings.items()],
@@ -243,6 +268,10 @@ def _options(
         linear=linear,
         undamped=undamped,
         junctions=junctions,
+        scheme=scheme,
+        segments=segments,
+        shear=shear,
+        rotary_inertia=rotary_inertia,
     )
 
 

@@ -49,6 +49,8 @@ class ModesResult:
     """For each mode, every node; largest translation 1."""
     unknowns: int
     """Mechanical unknowns."""
+    errors: list[float | None]
+    """Estimated relative error of each frequency by the number of segments [1], signed; None where there is none."""
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,331 @@
+//! How far the frequencies of a model are from those of the beams that it was cut from.
+//!
+//! The joints of E4 and B are exact for loads at the nodes, so that their stiffness over the nodes' (x, y, θ) is that of the
+//! cubic frame on the same mesh, also about a loaded equilibrium. What differs is the mass: lumps here, and for the beam
+//! itself M_r = M_c + λ·M₂, the consistent mass with the next term of the exact dynamic stiffness ([`cubic`]), which is off
+//! by O((kh)⁸) alone. With y, λ a mode of the model, one inverse iteration
+//! ```text
+//! K·x = λ·M_r·y
+//! ```
+//! and Rayleigh–Ritz with K and M_r over the block of all x give the reference λ_r; the estimate is √(λ/λ_r) − 1, signed.
+//! K is the model's own tangent, whose factor the modes have used. The identity
+//! ```text
+//! (λ − λ_r)/λ = xᵀ(M_r − M)y / xᵀM_r·y
+//! ```
+//! splits it into what each beam contributes.
+//!
+//! The other schemes have another stiffness as well: there K and M_c are those of a cubic frame that is assembled for the
+//! purpose, about the drawn geometry, and a beam's contribution is taken as its kinetic energy times (kh)^order.
+//!
+//! Why M₂: the cubic element's own error is +(kh)⁴/1440 where that of E4 is −(kh)⁴/1440, so that the distance of the two is
+//! twice the error inside a long beam, and anything between once and many times it where the ends weigh in.
+//!
+//! Valid for modes that the nodes can show: kh < 4.73, which [`model_order`](super::model_order) sees to.
+
+use crate::discretize::beam::bar;
+use crate::discretize::frame::{Elements, Frame, FrameOptions, assemble};
+use crate::discretize::scheme::{Bar, Part};
+use crate::discretize::{DiscretizeOptions, Discretized, Scheme, cubic, order};
+use crate::gaps::Point;
+use crate::multibody::linear_system::LinearSystem;
+use crate::multibody::planar::Pose;
+use crate::multibody::{BlockMatrix, BodyId, Model, Pattern};
+use crate::solve::subspace::{columns, ritz};
+use crate::structure::Structure;
+use nalgebra::{Matrix6, Vector2, Vector3, Vector6};
+
+/// Estimated errors of modes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OrderError {
+    /// For each mode, (f − f_beam)/f_beam [1]; 0 for a rigid motion.
+    pub relative: Vec<f64>,
+    /// For each mode, λ = ω² of the beams [rad²/s²].
+    pub reference: Vec<f64>,
+    /// For each mode, what each beam contributes to it [1].
+    pub shares: Vec<Vec<f64>>,
+}
+
+/// For each mode, the share of each beam in its strain energy [1]: a beam held rigid raises the frequency by about half of
+/// it, relatively.
+pub fn strain_shares(
+    structure: &Structure,
+    options: &DiscretizeOptions,
+    parts: &Discretized,
+    lambda: &[f64],
+    shapes: &[Vec<Pose>],
+) -> Vec<Vec<f64>> {
+    let spans = spans(structure, options, (&parts.beams, &parts.offsets), false);
+    let share = |(shape, lambda): (&Vec<Pose>, &f64)| {
+        let one = |(span, beam): (&Span, &crate::structure::Beam)| {
+            let n = span.points.len() - 1;
+            let bar = bar(beam, options.shear, options.rotary_inertia);
+            let stiffness = cubic::stiffness(&bar, span.length / n as f64);
+            let x = span.local(shape);
+            span.segments(&x, &stiffness).iter().zip(&x).map(|(f, x)| f.dot(x)).sum::<f64>() / lambda
+        };
+        spans.iter().zip(&structure.beams).map(one).collect()
+    };
+    shapes.iter().zip(lambda).map(share).collect()
+}
+
+/// A beam over the points of what is cut of it: between the edges of junctions, where there are any.
+struct Span {
+    points: Vec<Point>,
+    length: f64,
+    along: Vector2<f64>,
+    /// Consistent mass of a segment, or zero where another matrix has it.
+    mass: Matrix6<f64>,
+    /// M₂ of a segment.
+    second: Matrix6<f64>,
+    /// Lumps of the model at the points.
+    lumps: Vec<Part>,
+}
+
+impl Span {
+    /// Motion of the points along and across the beam.
+    fn local(&self, x: &[Pose]) -> Vec<Vector3<f64>> {
+        let at = |p: &Point| match p.body {
+            BodyId::Ground => Vector3::zeros(),
+            BodyId::Free(k) => {
+                let (dx, dy) = (x[k].x - x[k].z * p.arm.y, x[k].y + x[k].z * p.arm.x);
+                Vector3::new(dx * self.along.x + dy * self.along.y, dy * self.along.x - dx * self.along.y, x[k].z)
+            }
+        };
+        self.points.iter().map(at).collect()
+    }
+
+    /// (M_r − M)·x of this beam, over its points.
+    fn defect(&self, x: &[Vector3<f64>], lambda: f64) -> Vec<Vector3<f64>> {
+        let mut f = self.segments(x, &(self.mass + self.second * lambda));
+        for ((f, x), lump) in f.iter_mut().zip(x).zip(&self.lumps) {
+            f.x -= lump.mass * x.x;
+            f.y -= lump.mass * x.y + lump.first * x.z;
+            f.z -= lump.first * x.y + lump.second * x.z;
+        }
+        f
+    }
+
+    /// The same matrix for every segment, times x.
+    fn segments(&self, x: &[Vector3<f64>], segment: &Matrix6<f64>) -> Vec<Vector3<f64>> {
+        let mut f = vec![Vector3::zeros(); x.len()];
+        for k in 0..x.len() - 1 {
+            let (a, b) = (x[k], x[k + 1]);
+            let both = segment * Vector6::new(a.x, a.y, a.z, b.x, b.y, b.z);
+            f[k] += both.fixed_rows::<3>(0);
+            f[k + 1] += both.fixed_rows::<3>(3);
+        }
+        f
+    }
+
+    /// Adds forces at the points to those on the bodies.
+    fn scatter(&self, f: &[Vector3<f64>], out: &mut [Pose]) {
+        for (p, f) in self.points.iter().zip(f) {
+            if let BodyId::Free(k) = p.body {
+                let (fx, fy) = (f.x * self.along.x - f.y * self.along.y, f.x * self.along.y + f.y * self.along.x);
+                out[k] += Pose::new(fx, fy, f.z + p.arm.x * fy - p.arm.y * fx);
+            }
+        }
+    }
+}
+
+/// K − σM of a mesh, factored, and its mass matrix.
+struct Pencil<'a> {
+    factor: &'a BlockMatrix<f64, 3>,
+    pattern: &'a Pattern,
+    shift: f64,
+    mass: &'a dyn Fn(&[Pose]) -> Vec<Pose>,
+    project: &'a dyn Fn(&mut [Pose]),
+}
+
+/// True where the model's tangent is that of the cubic frame: schemes E4 and B without rigid beams. Only then is the
+/// estimate that of a loaded equilibrium too.
+pub fn own_stiffness(options: &DiscretizeOptions, parts: &Discretized) -> bool {
+    let exact = matches!(options.scheme, Scheme::E4 | Scheme::B);
+    exact && parts.beams.iter().all(|points| points.len() > 2 || points[0].body != points[1].body)
+}
+
+/// Errors of modes of a model. `factor` is that of K − `shift`·M at the operating point.
+pub fn of_modes(
+    structure: &Structure,
+    options: &DiscretizeOptions,
+    parts: &Discretized,
+    (factor, shift): (&BlockMatrix<f64, 3>, f64),
+    lambda: &[f64],
+    shapes: &[Vec<Pose>],
+) -> Option<OrderError> {
+    let model = &parts.system.model;
+    if !own_stiffness(options, parts) {
+        // a frame of centrelines says nothing about other junctions
+        if parts.offsets.iter().flatten().any(|o| *o != 0.0) {
+            return None;
+        }
+        return by_frame(structure, options, parts, lambda, shapes);
+    }
+    let spans = spans(structure, options, (&parts.beams, &parts.offsets), true);
+    let mass = |x: &[Pose]| x.iter().enumerate().map(|(k, x)| model.mass(k).component_mul(x)).collect();
+    let project = |x: &mut [Pose]| model.project(x);
+    let pencil = Pencil { factor, pattern: &model.pattern, shift, mass: &mass, project: &project };
+    let (reference, x, norms) = compare(&pencil, &spans, lambda, shapes)?;
+    let shares = (shapes.iter().zip(&x).zip(lambda.iter().zip(&norms)))
+        .map(|((y, x), (&lambda, norm))| {
+            let share = |span: &Span| {
+                let f = span.defect(&span.local(y), lambda);
+                0.5 * f.iter().zip(span.local(x)).map(|(f, x)| f.dot(&x)).sum::<f64>() / norm
+            };
+            spans.iter().map(share).collect()
+        })
+        .collect();
+    Some(OrderError { relative: relative(lambda, &reference), reference, shares })
+}
+
+/// Relative errors of frequencies; 0 for rigid motions.
+pub fn relative(lambda: &[f64], reference: &[f64]) -> Vec<f64> {
+    let rigid = 1e-9 * lambda.last().map_or(0.0, |l| l.abs());
+    let error = |(l, r): (&f64, &f64)| if *l <= rigid || *r <= rigid { 0.0 } else { (l / r).sqrt() - 1.0 };
+    lambda.iter().zip(reference).map(error).collect()
+}
+
+/// Every beam over its `points`, less the offsets at both ends.
+fn spans(
+    structure: &Structure,
+    options: &DiscretizeOptions,
+    (beams, offsets): (&[Vec<Point>], &[[f64; 2]]),
+    lumped: bool,
+) -> Vec<Span> {
+    let span = |((beam, points), [first, last]): ((&crate::structure::Beam, &Vec<Point>), &[f64; 2])| {
+        let n = points.len() - 1;
+        let bar = Bar { length: beam.length - first - last, ..bar(beam, options.shear, options.rotary_inertia) };
+        let h = bar.length / n as f64;
+        let along = Vector2::new(beam.angle.cos(), beam.angle.sin());
+        let mut points = points.clone();
+        points[0] = points[0].beyond(along * *first);
+        points[n] = points[n].beyond(along * -*last);
+        Span {
+            points,
+            length: bar.length,
+            along,
+            mass: if lumped { cubic::mass(&bar, h) } else { Matrix6::zeros() },
+            second: cubic::second_mass(&bar, h),
+            lumps: if lumped { options.scheme.cut(&bar, n, false).parts } else { Vec::new() },
+        }
+    };
+    structure.beams.iter().zip(beams).zip(offsets).map(span).collect()
+}
+
+type Compared = (Vec<f64>, Vec<Vec<Pose>>, Vec<f64>);
+
+/// λ_r; the inverse iterates x; and xᵀM_r·y.
+fn compare(pencil: &Pencil<'_>, spans: &[Span], lambda: &[f64], shapes: &[Vec<Pose>]) -> Option<Compared> {
+    let count = lambda.len();
+    let weigh = |x: &[Pose], lambda: f64| {
+        let mut z = (pencil.mass)(x);
+        let base = z.clone();
+        for span in spans {
+            span.scatter(&span.defect(&span.local(x), lambda), &mut z);
+        }
+        (z, base)
+    };
+    let (mut x, mut kx, mut norms) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut mx, mut second) = (Vec::new(), Vec::new());
+    for (y, &lambda) in shapes.iter().zip(lambda) {
+        let (full, base) = weigh(y, lambda);
+        let mut z: Vec<Pose> = full.iter().zip(&base).map(|(f, b)| f * lambda - b * pencil.shift).collect();
+        (pencil.project)(&mut z);
+        let mut solved = z.clone();
+        pencil.factor.solve(pencil.pattern, &mut solved);
+        (pencil.project)(&mut solved);
+        norms.push(dot(&solved, &full));
+        let (full, base) = weigh(&solved, 0.0);
+        kx.push(z.iter().zip(&base).map(|(z, b)| z + b * pencil.shift).collect::<Vec<Pose>>());
+        mx.push(full);
+        let mut bent = vec![Pose::zeros(); solved.len()];
+        for span in spans {
+            span.scatter(&span.segments(&span.local(&solved), &span.second), &mut bent);
+        }
+        second.push(bent);
+        x.push(solved);
+    }
+    let transposed = columns(&x).transpose();
+    let a = &transposed * columns(&kx);
+    // λ·M₂ between two modes at the geometric mean of theirs, which keeps the sum definite
+    let mean = |i: usize, j: usize| (lambda[i].max(0.0) * lambda[j].max(0.0)).sqrt();
+    let mut b = &transposed * columns(&mx);
+    let bent = &transposed * columns(&second);
+    for i in 0..count {
+        for j in 0..count {
+            b[(i, j)] += mean(i, j) * bent[(i, j)];
+        }
+    }
+    let (reference, _) = ritz(&a, &b)?;
+    Some((reference, x, norms))
+}
+
+fn dot(a: &[Pose], b: &[Pose]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a.dot(b)).sum()
+}
+
+/// Errors against a cubic frame on the same mesh, about the drawn geometry.
+fn by_frame(
+    structure: &Structure,
+    options: &DiscretizeOptions,
+    parts: &Discretized,
+    lambda: &[f64],
+    shapes: &[Vec<Pose>],
+) -> Option<OrderError> {
+    let elements = Elements::Beams(parts.beams.iter().map(|b| b.len() - 1).collect());
+    let frame = assemble(structure, &FrameOptions { elements, shear: options.shear, undamped: true }).ok()?;
+    let system = &frame.system;
+    let mut shift = 0.0;
+    let mut factor = system.combine(1.0, 0.0, 0.0);
+    if factor.factor(&system.pattern).is_err() {
+        shift = -1e-6 * lambda.last()?.abs();
+        factor = system.combine(1.0, -shift, 0.0);
+        factor.factor(&system.pattern).ok()?;
+    }
+    let shapes: Vec<Vec<Pose>> = shapes.iter().map(|x| to_frame(&parts.system.model, parts, &frame, x)).collect();
+    let spans = spans(structure, options, (&frame.beams, &parts.offsets), false);
+    let mass = |x: &[Pose]| multiply(system, x);
+    let project = |x: &mut [Pose]| system.project(x);
+    let pencil = Pencil { factor: &factor, pattern: &system.pattern, shift, mass: &mass, project: &project };
+    let (reference, ..) = compare(&pencil, &spans, lambda, &shapes)?;
+    let relative = relative(lambda, &reference);
+    let shares = (shapes.iter().zip(lambda).zip(&relative))
+        .map(|((y, &lambda), error)| {
+            let band = lambda.max(0.0).sqrt() / std::f64::consts::TAU;
+            let weights: Vec<f64> = (structure.beams.iter().zip(&spans))
+                .map(|(beam, span)| {
+                    let kh = order::waves(beam, band) / (span.points.len() - 1) as f64;
+                    let moved = span.local(y).iter().map(|p| p.x * p.x + p.y * p.y).sum::<f64>();
+                    moved * beam.width * beam.thickness * beam.length * kh.powi(options.scheme.order())
+                })
+                .collect();
+            let sum: f64 = weights.iter().sum();
+            weights.iter().map(|w| if sum > 0.0 { error * w / sum } else { 0.0 }).collect()
+        })
+        .collect();
+    Some(OrderError { relative, reference, shares })
+}
+
+fn multiply(system: &LinearSystem, x: &[Pose]) -> Vec<Pose> {
+    let mut y = vec![Pose::zeros(); x.len()];
+    system.mass.multiply_add(&system.pattern, x, &mut y);
+    y
+}
+
+/// A shape of the model over the bodies of the frame.
+fn to_frame(model: &Model, parts: &Discretized, frame: &Frame, x: &[Pose]) -> Vec<Pose> {
+    let mut y = vec![Pose::zeros(); frame.system.bodies()];
+    let pairs = (frame.nodes.iter().zip(&parts.nodes))
+        .filter_map(|(to, from)| Some((*to.as_ref()?, *from.as_ref()?)))
+        .chain(frame.beams.iter().flatten().copied().zip(parts.beams.iter().flatten().copied()));
+    for (to, from) in pairs {
+        if let BodyId::Free(k) = to.body {
+            let pose = Model::pose(x, from.body);
+            // from the centre of mass to the point, and on to the reference point of the frame's body
+            let arm = from.arm - to.arm;
+            y[k] = Pose::new(pose.x - pose.z * arm.y, pose.y + pose.z * arm.x, pose.z);
+        }
+    }
+    debug_assert_eq!(x.len(), model.bodies.len());
+    y
+}
