@@ -122,6 +122,7 @@ impl ModelCard {
                     Some(name) => Junctions::named(name).ok_or_else(|| CardError::Junctions { name: name.clone() })?,
                     None => defaults.junctions,
                 },
+                ..defaults
             },
             deadline: Duration::from_secs_f64(positive("deadline", raw.deadline)?.unwrap_or(DEADLINE).min(1e6)),
         })
