@@ -8,7 +8,8 @@
 //!
 //! **Rigid beams.** Then beams whose strain does not matter become rigid: those whose share of the strain energy of every mode
 //! in the band predicts less than is left of the tolerance (half of it, as a relative rise of the frequency). This too is
-//! computed: the frequencies with rigid beams are compared with what the elastic model said those of the beams are. Beams
+//! computed: the frequencies with rigid beams are compared with what the elastic model said those of the beams are, and the
+//! compliance wherever a load, an electrode or heat acts with that of the elastic model, both within the tolerance. Beams
 //! that touch ground, that are heated or under stress, and electrodes of facing beams stay elastic, as they may matter where
 //! nothing rings.
 //!
@@ -153,6 +154,11 @@ fn stiffen(
         sums = next;
         chosen.push(group);
     }
+    let acted = acted_on(structure);
+    let touched = |g: &Vec<usize>| {
+        g.iter().any(|&b| [structure.beams[b].a, structure.beams[b].b].iter().any(|n| acted.contains(n)))
+    };
+    let Some(yields) = compliances(structure, &acted, &elastic.parts) else { return Ok(()) };
     while !chosen.is_empty() {
         let mut segments = order.segments.clone();
         for group in &chosen {
@@ -164,13 +170,76 @@ fn stiffen(
         order.passes += 1;
         let apart = relative(&now.lambda, &error.reference);
         let worst = apart.iter().take(modes).fold(0.0, |m: f64, e| m.max(e.abs()));
-        if now.lambda.len() >= modes && worst <= options.tol {
+        let still = compliances(structure, &acted, &now.parts).unwrap_or_default();
+        let firm = still.len() == yields.len()
+            && still.iter().zip(&yields).all(|(rigid, elastic)| (rigid - elastic).abs() <= options.tol * elastic);
+        if firm && now.lambda.len() >= modes && worst <= options.tol {
             (order.segments, order.estimated_error) = (segments, Some(worst));
             break;
         }
-        chosen.truncate(chosen.len() / 2);
+        let count = chosen.len();
+        chosen.retain(|g| firm || !touched(g));
+        if chosen.len() == count {
+            chosen.truncate(count / 2);
+        }
     }
     Ok(())
+}
+
+/// Nodes at which loads and electrodes act.
+fn acted_on(structure: &Structure) -> Vec<NodeId> {
+    let mut nodes: Vec<NodeId> = structure.loads.iter().map(|load| load.node).collect();
+    nodes.extend(structure.combs.iter().flat_map(|c| [c.a, c.b]));
+    nodes.extend(structure.plate_gaps.iter().flat_map(|g| [g.a, g.b]));
+    nodes.extend(structure.beam_gaps.iter().flat_map(|g| g.nodes));
+    nodes.sort_unstable();
+    nodes.dedup();
+    nodes
+}
+
+/// How far the drawn structure gives way where it is acted on: fᵀK⁻¹f for a unit force or moment in each direction at each
+/// of these nodes, and for a unit tension in each beam that heat or stress lengthens. Empty where nothing acts; none where
+/// something does on a structure that floats.
+fn compliances(structure: &Structure, acted: &[NodeId], parts: &Discretized) -> Option<Vec<f64>> {
+    let (system, model) = (&parts.system, &parts.system.model);
+    let n = system.bodies();
+    let mut forces: Vec<Vec<Pose>> = Vec::new();
+    let push = |f: &mut [Pose], p: &Point, x: f64, y: f64, moment: f64| {
+        if let BodyId::Free(k) = p.body {
+            f[k] += Pose::new(x, y, moment + p.arm.x * y - p.arm.y * x);
+        }
+    };
+    for point in acted.iter().filter_map(|node| parts.nodes[node.0]) {
+        for (x, y, moment) in [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)] {
+            let mut f = vec![Pose::zeros(); n];
+            push(&mut f, &point, x, y, moment);
+            forces.push(f);
+        }
+    }
+    for (beam, points) in structure.beams.iter().zip(&parts.beams) {
+        if beam.heater.is_some() || beam.temperature.is_some() || beam.material.stress != 0.0 {
+            let (y, x) = beam.angle.sin_cos();
+            let mut f = vec![Pose::zeros(); n];
+            push(&mut f, &points[0], -x, -y, 0.0);
+            push(&mut f, &points[points.len() - 1], x, y, 0.0);
+            forces.push(f);
+        }
+    }
+    if forces.is_empty() {
+        return Some(Vec::new());
+    }
+    let mut k = BlockMatrix::new(&model.pattern);
+    let (rest, mut residual) = (vec![Pose::zeros(); n], vec![Pose::zeros(); n]);
+    system.tangent(&rest, &system.electrics.drive(), &mut k, &mut residual);
+    model.project_matrix(&mut k);
+    k.factor(&model.pattern).ok()?;
+    let compliance = |mut f: Vec<Pose>| {
+        model.project(&mut f);
+        let mut u = f.clone();
+        k.solve(&model.pattern, &mut u);
+        f.iter().zip(&u).map(|(f, u)| f.dot(u)).sum::<f64>()
+    };
+    Some(forces.into_iter().map(compliance).collect())
 }
 
 /// A model that was computed.

@@ -20,6 +20,9 @@
 //! Why M₂: the cubic element's own error is +(kh)⁴/1440 where that of E4 is −(kh)⁴/1440, so that the distance of the two is
 //! twice the error inside a long beam, and anything between once and many times it where the ends weigh in.
 //!
+//! Directions along and across a beam are those of the drawing, also about an equilibrium: right as long as beams turn by
+//! small angles. What axial force does to the stiffness within a segment is not part of the estimate.
+//!
 //! Valid for modes that the nodes can show: kh < 4.73, which [`model_order`](super::model_order) sees to.
 
 use crate::discretize::beam::bar;

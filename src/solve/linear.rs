@@ -217,7 +217,7 @@ mod tests {
     #[test]
     fn all_solvers_agree_on_step_matrices() {
         let bundle = Bundle::read(std::path::Path::new("examples/bank/bank.net"), &[]).unwrap();
-        let options = CompileOptions { band: Some(1.3e6), ..CompileOptions::default() };
+        let options = CompileOptions { segments: Some(4), ..CompileOptions::default() };
         let system = compile(&bundle, &options).unwrap().parts.system;
         let pattern = &system.model.pattern;
         let n = system.bodies();
