@@ -126,6 +126,7 @@ def main():
 //! c_uu, c_ug, c_up, c_gg, c_gp, c_pp in the unit 1/(E·t), for strains (u, g, p·w) under (N, V, M/w), w the branch's width.
 
 #![cfg_attr(rustfmt, rustfmt_skip)]
+#![allow(clippy::approx_constant)]
 
 /// Distance of the edge and six compliances.
 pub type Row = [f64; 7];

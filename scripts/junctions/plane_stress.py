@@ -19,18 +19,8 @@ def mesh(outline, size, fine, corners):
     for k in range(count):
         a, b = np.asarray(outline[k]), np.asarray(outline[(k + 1) % count])
         length = np.linalg.norm(b - a)
-        # walk along the edge with steps that grow with the distance from the nearest corner
-        marks, at = [0.0], 0.0
-        while True:
-            here = a + (b - a) * (at / length)
-            distance = min((np.linalg.norm(here - c) for c in corners), default=1e9)
-            at += min(size, fine + 0.25 * distance)
-            if at >= length:
-                break
-            marks.append(at)
-        if len(marks) > 1 and length - marks[-1] < 0.5 * (marks[-1] - marks[-2]):
-            marks.pop()
-        # the same steps seen from the other end, so that both ends of an edge may be fine
+        # steps grow with the distance from the nearest corner, from both ends, so that both may be fine
+        marks = [0.0, *marks_from(a, b, length, size, fine, corners)]
         back = [length - m for m in marks_from(b, a, length, size, fine, corners)]
         middle = 0.5 * length
         marks = [m for m in marks if m <= middle] + sorted(m for m in back if middle + 0.3 * fine < m < length - 1e-12)
