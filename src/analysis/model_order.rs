@@ -166,16 +166,19 @@ fn stiffen(
                 segments[beam] = 0;
             }
         }
-        let now = look(bare, options, band, &segments, Some(elastic))?;
-        order.passes += 1;
-        let apart = relative(&now.lambda, &error.reference);
-        let worst = apart.iter().take(modes).fold(0.0, |m: f64, e| m.max(e.abs()));
-        let still = compliances(structure, &acted, &now.parts).unwrap_or_default();
+        let stiff = discretize_with(bare, options, &segments)?;
+        let still = compliances(structure, &acted, &stiff).unwrap_or_default();
         let firm = still.len() == yields.len()
             && still.iter().zip(&yields).all(|(rigid, elastic)| (rigid - elastic).abs() <= options.tol * elastic);
-        if firm && now.lambda.len() >= modes && worst <= options.tol {
-            (order.segments, order.estimated_error) = (segments, Some(worst));
-            break;
+        if firm {
+            let now = look(bare, options, band, &segments, Some(elastic))?;
+            order.passes += 1;
+            let apart = relative(&now.lambda, &error.reference);
+            let worst = apart.iter().take(modes).fold(0.0, |m: f64, e| m.max(e.abs()));
+            if now.lambda.len() >= modes && worst <= options.tol {
+                (order.segments, order.estimated_error) = (segments, Some(worst));
+                break;
+            }
         }
         let count = chosen.len();
         chosen.retain(|g| firm || !touched(g));
