@@ -36,6 +36,29 @@ fn elastica() {
     }
 }
 
+/// Eight segments follow the elastica to 1e-3 of the length under dead end loads α = PL²/EI of 1 and 2 (independent shooting
+/// to 12 digits), and four segments the roll-up to a half circle.
+#[test]
+fn few_segments_turn_far() {
+    let text = |end: String| format!("anchor p1 [a] [l=5u w=5u]\nbeam2d p1 [a b] [l=1m w=2u]\nf2d * [b] [{end}]");
+    let tip = |end: String, segments: usize| {
+        let options = CompileOptions { segments: Some(segments), ..CompileOptions::default() };
+        node(&balance(&model(&text(end), &options), &[]), "b")
+    };
+    let exact = [
+        (1.0, 0.056_433_236_283_376_88, 0.301_720_773_799_813_5, 0.461_351_949_711_879),
+        (2.0, 0.160_641_720_825_167_2, 0.493_457_480_396_711_8, 0.781_749_831_556_543),
+    ];
+    for (alpha, back, aside, turn) in exact {
+        let end = tip(format!("F={:e} oz=pi/2", alpha * EI / 1e-6), 8);
+        for (got, want) in [(-end.x / 1e-3, back), (end.y / 1e-3, aside), (end.rz, turn)] {
+            assert!((got - want).abs() < 1e-3, "{alpha}: {got} {want}");
+        }
+    }
+    let end = tip(format!("M={:e} F=0", std::f64::consts::PI * EI / 1e-3), 4);
+    assert!((end.x / 1e-3 + 1.0).abs() < 1e-3 && (end.y / 1e-3 - 2.0 / std::f64::consts::PI).abs() < 1e-3, "{end:?}");
+}
+
 /// An end moment of πEI/L rolls a beam of eight segments up to a half circle: the tip comes to (0, 2L/π).
 #[test]
 fn roll_up() {
