@@ -3,52 +3,16 @@
 //!
 //! Reference: E. Hairer, C. Lubich, G. Wanner, "Geometric Numerical Integration" (2006), §II.1.2.
 
-use super::centred::Centred;
-use super::linear::{LinearSolver, Recursion};
-use super::method::{Method, Motion, StepFailure, Work};
-use crate::gaps::{Ramp, System};
+use super::centred::{Centred, Rule};
+use super::linear::Recursion;
 
-/// Weight and place of the force on the chord.
-const POINTS: [(f64, f64); 1] = [(1.0, 0.5)];
+/// The middle of the chord.
+#[derive(Debug, Clone)]
+pub struct MiddlePoint;
+
+impl Rule for MiddlePoint {
+    const POINTS: &'static [(f64, f64)] = &[(1.0, 0.5)];
+}
 
 /// The method with its storage.
-#[derive(Debug, Clone)]
-pub struct Midpoint<S = Recursion>(Centred<S>);
-
-impl Midpoint {
-    /// Storage for a system.
-    pub fn new(system: &System) -> Self {
-        Self::with_solver(Recursion, system)
-    }
-}
-
-impl<S: LinearSolver> Midpoint<S> {
-    /// [`Midpoint::new`] with another solver of its linear systems.
-    pub fn with_solver(solver: S, system: &System) -> Self {
-        Self(Centred::new(solver, system))
-    }
-}
-
-impl<S: LinearSolver> Method for Midpoint<S> {
-    fn error_order(&self) -> f64 {
-        3.0
-    }
-
-    /// `error` receives zero: the method has no estimate of its own.
-    fn step(
-        &mut self,
-        system: &System,
-        ramp: &Ramp<'_>,
-        s: f64,
-        h: f64,
-        motion: &mut Motion,
-        error: &mut Motion,
-    ) -> Result<(), StepFailure> {
-        error.clear();
-        self.0.step(system, ramp, (s, h), POINTS, motion)
-    }
-
-    fn work(&self) -> Work {
-        self.0.work()
-    }
-}
+pub type Midpoint<S = Recursion> = Centred<MiddlePoint, S>;

@@ -30,7 +30,7 @@
 
 pub mod adaptive;
 pub mod avf;
-mod centred;
+pub mod centred;
 pub mod consistent;
 pub mod continuation;
 pub mod dense;

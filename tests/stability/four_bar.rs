@@ -99,7 +99,7 @@ fn run<P: SecondOrder>(of: &FourBar, rtol: f64, problem: &mut P) -> Passage {
     let ended = method.integrate(problem, (0.0, 10.0), &mut q, &mut v, &mut h, &bounds, 20_000, &mut |dense| {
         dense.at(dense.t + dense.h, &mut at, &mut rate);
         placed.place(&of.linkage, &at, &rate);
-        gap.push([dense.t + dense.h, placed.largest(&of.linkage, Task::Positions)]);
+        gap.push([dense.t + dense.h, placed.largest(Task::Positions)]);
         true
     });
     placed.place(&of.linkage, &q, &v);

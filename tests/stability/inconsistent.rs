@@ -29,11 +29,11 @@ pub(crate) fn projected(size: f64) -> [f64; 3] {
     let mut v: Vec<f64> = (0..n).map(|_| size * s.next()).collect();
     let mut r = Reduction::<f64>::new(&[&linkage]);
     r.place(&linkage, &q, &v);
-    let before = r.largest(&linkage, Task::Positions);
+    let before = r.largest(Task::Positions);
     let mut change = vec![0.0; n];
     let after = r.project_positions(&linkage, &mut q, &v, &mut change);
     r.project_rates(&linkage, &q, &mut v, &mut change);
-    [before, after, r.largest(&linkage, Task::Rates)]
+    [before, after, r.largest(Task::Rates)]
 }
 
 struct Adrift<P>(P);
@@ -82,7 +82,7 @@ pub(crate) fn kept(end: f64) -> [f64; 2] {
         }
         let mut r = Reduction::<f64>::new(&[&linkage]);
         r.place(&linkage, &q, &v);
-        *gap = r.largest(&linkage, Task::Positions);
+        *gap = r.largest(Task::Positions);
     }
     gaps
 }

@@ -120,7 +120,7 @@ fn run<P: SecondOrder<Error = NotFinite>>(of: &Squeezer, end: f64, problem: &mut
             let t = dense.t + dense.h;
             dense.at(t, &mut at, &mut rate);
             placed.place(&of.linkage, &at, &rate);
-            drift.gap.push([t, placed.largest(&of.linkage, Task::Positions)]);
+            drift.gap.push([t, placed.largest(Task::Positions)]);
             drift.energy.push([t, (of.energy(&placed) - first).abs()]);
             drift.work = TORQUE * placed.pose(of.motor)[2];
             true

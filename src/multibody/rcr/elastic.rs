@@ -13,9 +13,9 @@ use nalgebra::Vector3;
 impl Reduction<f64> {
     /// Sets the offsets of locked directions, which a heated or stressed joint prescribes. Before placing.
     pub fn prescribe(&mut self, linkage: &Linkage, rest: &RestStrain<'_>) {
-        for (link, data) in linkage.links.iter().zip(&mut self.links) {
+        for (link, data) in linkage.links.iter().filter(|link| !link.pin).zip(&mut self.joints) {
             if !link.moving[0] {
-                data.rest[0] = offset(link.rest, link.expansion, rest);
+                data.rest = offset(link.rest, link.expansion, rest);
             }
         }
         for (closure, data) in linkage.closures.iter().zip(&mut self.closures) {

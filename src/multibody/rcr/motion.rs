@@ -22,29 +22,46 @@ pub(super) type Pair<T> = [T; 2];
 pub(super) struct LinkData<T> {
     pub(super) arm_parent: Pair<T>,
     pub(super) arm: Pair<T>,
-    axis: Pair<T>,
-    second: [T; 3],
-    pub(super) rest: [T; 3],
     pub(super) mass: T,
     pub(super) inertia: T,
     pub(super) sign: T,
 }
 
+/// What a joint has beyond a pin.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct JointData<T> {
+    axis: Pair<T>,
+    second: [T; 3],
+    /// Axial offset of a locked direction [m].
+    pub(super) rest: T,
+}
+
+/// A number of each variant, side by side.
+fn lane<T: Real>(of: &[&Link], f: &dyn Fn(&Link) -> f64) -> T {
+    let mut out = T::ZERO;
+    for k in 0..T::LANES {
+        out.set_lane(k, f(of[k % of.len()]));
+    }
+    out
+}
+
+impl<T: Real> JointData<T> {
+    pub(super) fn new(of: &[&Link]) -> Self {
+        let lane = |f: &dyn Fn(&Link) -> f64| lane(of, f);
+        Self {
+            axis: [lane(&|l| l.frame.axis.x), lane(&|l| l.frame.axis.y)],
+            second: [lane(&|l| l.second[(0, 0)]), lane(&|l| l.second[(0, 1)]), lane(&|l| l.second[(1, 1)])],
+            rest: lane(&|l| if l.moving[0] { 0.0 } else { l.rest }),
+        }
+    }
+}
+
 impl<T: Real> LinkData<T> {
     pub(super) fn new(of: &[&Link]) -> Self {
-        let lane = |f: &dyn Fn(&Link) -> f64| {
-            let mut out = T::ZERO;
-            for k in 0..T::LANES {
-                out.set_lane(k, f(of[k % of.len()]));
-            }
-            out
-        };
+        let lane = |f: &dyn Fn(&Link) -> f64| lane(of, f);
         Self {
             arm_parent: [lane(&|l| l.frame.arm_a.x), lane(&|l| l.frame.arm_a.y)],
             arm: [lane(&|l| l.frame.arm_b.x), lane(&|l| l.frame.arm_b.y)],
-            axis: [lane(&|l| l.frame.axis.x), lane(&|l| l.frame.axis.y)],
-            second: [lane(&|l| l.second[(0, 0)]), lane(&|l| l.second[(0, 1)]), lane(&|l| l.second[(1, 1)])],
-            rest: [lane(&|l| if l.moving[0] { 0.0 } else { l.rest }), T::ZERO, T::ZERO],
             mass: lane(&|l| l.mass),
             inertia: lane(&|l| l.inertia),
             sign: lane(&|l| l.sign),
@@ -154,14 +171,14 @@ fn place_pin<T: Real>(data: &LinkData<T>, parent: &Placed<T>, out: &mut Placed<T
 
 fn place_joint<T: Real>(
     link: &Link,
-    data: &LinkData<T>,
+    (data, joint): (&LinkData<T>, &JointData<T>),
     parent: &Placed<T>,
     out: &mut Placed<T>,
     q: &[T],
     v: &[T],
     axes: &mut [[T; 3]],
 ) {
-    let (mut e, mut de) = (data.rest, [T::ZERO; 3]);
+    let (mut e, mut de) = ([joint.rest, T::ZERO, T::ZERO], [T::ZERO; 3]);
     let mut next = 0;
     for i in 0..3 {
         if link.moving[i] {
@@ -170,7 +187,7 @@ fn place_joint<T: Real>(
         }
     }
     let two = T::splat(2.0);
-    let [q0, q1, q2] = data.second;
+    let [q0, q1, q2] = joint.second;
     let bent = [q0 * e[1] + q1 * e[2], q1 * e[1] + q2 * e[2]];
     let bent_rate = [q0 * de[1] + q1 * de[2], q1 * de[1] + q2 * de[2]];
     // axial opening, its rate, and what is left of its acceleration at constant rates
@@ -181,7 +198,7 @@ fn place_joint<T: Real>(
     let (swung, swung_parent) = (out.swing(data.arm), parent.swing(data.arm_parent));
     let lever = plus(data.arm, swung);
     out.lever_parent = plus(data.arm_parent, swung_parent);
-    let e1 = out.mean(parent, data.axis);
+    let e1 = out.mean(parent, joint.axis);
     let e2 = turn(e1);
     let along = |w: Pair<T>| plus(times(w[0], e1), times(w[1], e2));
     let (rw, rdw, rddw) = (along(w), along(dw), along(ddw));
@@ -224,7 +241,7 @@ const BLOCK: usize = 16;
 pub(super) fn place_all<T: Real>(
     linkage: &Linkage,
     steps: &[Step],
-    data: &[LinkData<T>],
+    (data, joints): (&[LinkData<T>], &[JointData<T>]),
     q: &[T],
     v: &[T],
     placed: &mut [Placed<T>],
@@ -270,7 +287,7 @@ pub(super) fn place_all<T: Real>(
             if link.parent == Parent::Free {
                 place_free(out, q, v, axes);
             } else {
-                place_joint(link, &data[body], parent, out, q, v, axes);
+                place_joint(link, (&data[body], &joints[step.joint as usize]), parent, out, q, v, axes);
             }
         }
         end = start;

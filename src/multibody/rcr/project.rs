@@ -32,7 +32,7 @@ impl Reduction<f64> {
     /// bodies placed there at rates `v`. Returns the largest gap left [m].
     pub fn project_positions(&mut self, linkage: &Linkage, q: &mut [f64], v: &[f64], change: &mut [f64]) -> f64 {
         self.place(linkage, q, v);
-        let mut gap = self.largest(linkage, Task::Positions);
+        let mut gap = self.largest(Task::Positions);
         for _ in 0..MOST {
             if gap == 0.0 || linkage.constraints == 0 {
                 break;
@@ -42,7 +42,7 @@ impl Reduction<f64> {
                 *q += d;
             }
             self.place(linkage, q, v);
-            let now = self.largest(linkage, Task::Positions);
+            let now = self.largest(Task::Positions);
             // rounding is reached when a step no longer helps
             if now >= 0.25 * gap {
                 if now > gap {
@@ -75,7 +75,7 @@ impl Reduction<f64> {
     }
 
     /// Largest residual of the loops [m, or m/s].
-    pub fn largest(&mut self, linkage: &Linkage, task: Task) -> f64 {
-        self.write_rows(linkage, task).lane(0)
+    pub fn largest(&mut self, task: Task) -> f64 {
+        self.write_rows(task).lane(0)
     }
 }

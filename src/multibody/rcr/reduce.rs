@@ -12,7 +12,7 @@
 
 use super::closure::ClosureData;
 use super::linkage::Linkage;
-use super::motion::{LinkData, Placed, place_all};
+use super::motion::{JointData, LinkData, Placed, place_all};
 use super::real::Real;
 use super::schedule::{Kind, NONE, Schedule, Turn};
 
@@ -49,6 +49,7 @@ impl<T: Real> Node<T> {
 pub struct Reduction<T> {
     pub(super) schedule: Schedule,
     pub(super) links: Vec<LinkData<T>>,
+    pub(super) joints: Vec<JointData<T>>,
     pub(super) closures: Vec<ClosureData<T>>,
     pub(super) units: Vec<T>,
     pub(super) placed: Vec<Placed<T>>,
@@ -87,6 +88,10 @@ impl<T: Real> Reduction<T> {
         let count = linkage.links.len();
         let links: Vec<LinkData<T>> =
             (0..count).map(|b| LinkData::new(&variants.iter().map(|v| &v.links[b]).collect::<Vec<_>>())).collect();
+        let joints = (0..count)
+            .filter(|&b| !linkage.links[b].pin)
+            .map(|b| JointData::new(&variants.iter().map(|v| &v.links[b]).collect::<Vec<_>>()))
+            .collect();
         let closures = (0..linkage.closures.len())
             .map(|c| {
                 let of: Vec<_> =
@@ -118,6 +123,7 @@ impl<T: Real> Reduction<T> {
         };
         Self {
             links,
+            joints,
             closures,
             units,
             placed: vec![Placed::REST; count],
@@ -145,7 +151,7 @@ impl<T: Real> Reduction<T> {
     /// Places all bodies for coordinates `q` and rates `v`.
     #[inline(always)]
     pub fn place(&mut self, linkage: &Linkage, q: &[T], v: &[T]) {
-        place_all(linkage, &self.schedule.steps, &self.links, q, v, &mut self.placed, &mut self.axes);
+        place_all(linkage, &self.schedule.steps, (&self.links, &self.joints), q, v, &mut self.placed, &mut self.axes);
     }
 
     /// Displacement and rotation of a body from its drawn place [m, m, rad].
@@ -160,28 +166,18 @@ impl<T: Real> Reduction<T> {
 
     /// Writes the constraint rows of every closure for `task`. Returns the largest residual of a row.
     #[inline(always)]
-    pub(super) fn write_rows(&mut self, linkage: &Linkage, task: Task) -> T {
+    pub(super) fn write_rows(&mut self, task: Task) -> T {
         let mut largest = T::ZERO;
         if self.closures.is_empty() {
             return largest;
         }
         let rest = Placed::REST;
-        for (c, closure) in linkage.closures.iter().enumerate() {
-            let entry = self.schedule.entries[c];
+        for (closure, entry) in self.closures.iter().zip(&self.schedule.entries) {
             let turn = &self.schedule.turns[entry.body];
             let width = 3 + 3 * turn.front + 1;
-            let (a, b, first_is_a) = match closure {
-                super::Closure::Held { body, .. } => (&self.placed[*body], &rest, true),
-                super::Closure::Joint(joint) => {
-                    let at = |id| match id {
-                        crate::multibody::BodyId::Free(k) => &self.placed[k],
-                        crate::multibody::BodyId::Ground => &rest,
-                    };
-                    (at(joint.a), at(joint.b), joint.a == crate::multibody::BodyId::Free(entry.body))
-                }
-            };
-            let constraints = self.closures[c].constraints(a, b);
-            for (k, strain) in constraints.iter().enumerate().take(closure.constraints()) {
+            let [a, b] = entry.ends.map(|end| end.map_or(&rest, |body| &self.placed[body as usize]));
+            let first_is_a = entry.ends[0] == Some(entry.body as u32);
+            for (k, strain) in closure.constraints(a, b).iter().enumerate().take(entry.count) {
                 let start = turn.row_start + (entry.row + k) * width;
                 let row = &mut self.rows[start..start + width];
                 row.fill(T::ZERO);
@@ -207,7 +203,7 @@ impl<T: Real> Reduction<T> {
     /// The result is right to rounding times the square of [`Reduction::nearness`].
     #[inline(always)]
     pub fn reduce(&mut self, linkage: &Linkage, task: Task, out: &mut [T]) {
-        self.write_rows(linkage, task);
+        self.write_rows(task);
         self.inward(linkage, task);
         self.outward(linkage, task, out);
     }

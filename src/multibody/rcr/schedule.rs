@@ -5,7 +5,8 @@
 //! joint coordinate takes one row with it (a dependent coordinate, in the words of the reduction), and the rest goes on to
 //! the next body that it touches. A row that reaches no body any more is redundant by count.
 
-use super::linkage::{Linkage, Parent};
+use super::linkage::{Closure, Linkage, Parent};
+use crate::multibody::BodyId;
 
 /// No place.
 pub(super) const NONE: usize = usize::MAX;
@@ -39,6 +40,8 @@ pub(super) struct Step {
     pub(super) first: u32,
     /// The coordinate that turns it; `u32::MAX`: none.
     turning: u32,
+    /// Its place among the joints that are no pins.
+    pub(super) joint: u32,
 }
 
 impl Step {
@@ -95,6 +98,10 @@ pub(super) struct Entry {
     pub(super) row: usize,
     /// Place of the other body in the front; none: ground.
     pub(super) other: usize,
+    /// Number of rows.
+    pub(super) count: usize,
+    /// Bodies a and b of the joint; none: ground.
+    pub(super) ends: [Option<u32>; 2],
 }
 
 /// The whole schedule.
@@ -133,7 +140,12 @@ impl Schedule {
         for closure in &linkage.closures {
             let (body, other) = closure.bodies();
             let slot = other.map_or(NONE, |o| slot_of(pattern, body, o));
-            entries.push(Entry { body, row: incoming[body], other: slot });
+            let free = |id| if let BodyId::Free(k) = id { Some(k as u32) } else { None };
+            let ends = match closure {
+                Closure::Joint(joint) => [free(joint.a), free(joint.b)],
+                Closure::Held { body, .. } => [Some(*body as u32), None],
+            };
+            entries.push(Entry { body, row: incoming[body], other: slot, count: closure.constraints(), ends });
             incoming[body] += closure.constraints();
             if closure.constraints() > 0 {
                 support[body].extend(other);
@@ -151,6 +163,7 @@ impl Schedule {
             redundant: 0,
             multiplications: 0,
         };
+        let mut joint = 0;
         for body in 0..count {
             let link = &linkage.links[body];
             let freedom = link.freedom();
@@ -227,7 +240,9 @@ impl Schedule {
                 parent,
                 first: link.first as u32,
                 turning,
+                joint,
             };
+            joint += u32::from(!link.pin);
             schedule.steps.push(step);
             schedule.turns.push(turn);
         }
