@@ -1,4 +1,4 @@
-//! A beam of the drawing as bodies and joints of a model, cut by a [`Scheme`](super::scheme::Scheme).
+//! A beam of the drawing as bodies and joints of a model, cut by a [`Scheme`].
 //!
 //! At junctions the ends are [`End`]s: the beam proper, which is cut, runs from one offset to the other, the rods in between
 //! belong to the bodies of the nodes, and the springs' compliance is added to that of the first and the last joint.
