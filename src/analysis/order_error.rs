@@ -8,7 +8,7 @@
 //! K·x = λ·M_r·y
 //! ```
 //! and Rayleigh–Ritz with K and M_r over the block of all x give the reference λ_r; the estimate is √(λ/λ_r) − 1, signed.
-//! K is the model's own tangent, whose factor the modes have used. The identity
+//! K is the model's own tangent. The identity
 //! ```text
 //! (λ − λ_r)/λ = xᵀ(M_r − M)y / xᵀM_r·y
 //! ```
