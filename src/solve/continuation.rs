@@ -14,6 +14,8 @@
 //! References: E. Riks, Int. J. Solids Structures 15 (1979) 529; H. B. Keller, "Numerical solution of bifurcation and
 //! nonlinear eigenvalue problems" (1977); W. Wagner, P. Wriggers, Eng. Comput. 5 (1988) 103, for switching along φ.
 
+mod branching;
+
 use super::SolveError;
 use super::family::Blend;
 use crate::gaps::System;
@@ -368,127 +370,6 @@ impl Continuation {
             return None;
         }
         self.branch_off(family, &at)
-    }
-
-    /// Illinois on s′ over the step.
-    fn find_fold(&mut self, family: &mut Blend, here: &Place, next: &Place, step: f64) -> Place {
-        let (mut a, mut fa, mut b, mut fb) = (0.0, here.ds, step, next.ds);
-        let mut best = next.clone();
-        for _ in 0..40 {
-            let middle = (a * fb - b * fa) / (fb - fa);
-            let Some((place, _)) = self.probe(family, here, middle) else { break };
-            let f = place.ds;
-            best = place;
-            if f.abs() < 1e-9 || (b - a).abs() < 1e-12 * step {
-                break;
-            }
-            if f * fb < 0.0 {
-                (a, fa) = (b, fb);
-            } else {
-                fa *= 0.5;
-            }
-            (b, fb) = (middle, f);
-        }
-        best
-    }
-
-    /// Bisection on the number of negative pivots; the place on the near side.
-    fn find_bifurcation(&mut self, family: &mut Blend, here: &Place, after: usize, step: f64) -> Place {
-        let (mut low, mut high) = (0.0, step);
-        let mut best = here.clone();
-        for _ in 0..40 {
-            let middle = f64::midpoint(low, high);
-            match self.probe(family, here, middle) {
-                Some((place, _)) if place.negative == after => high = middle,
-                Some((place, _)) => (low, best) = (middle, place),
-                None => break,
-            }
-            if high - low < 1e-8 * step {
-                break;
-            }
-        }
-        best
-    }
-
-    /// First point on the branch that leaves along the null vector.
-    fn branch_off(&mut self, family: &mut Blend, at: &Place) -> Option<Place> {
-        let mut way = at.clone();
-        way.dq = self.null_vector(family, at)?;
-        way.ds = 0.0;
-        if self.options.branch == Branch::Minus {
-            way.dq.iter_mut().for_each(|x| *x = -*x);
-        }
-        for k in 0..12 {
-            let distance = 0.05 * 0.5f64.powi(k);
-            let mut guess = way.clone();
-            for (q, dq) in guess.q.iter_mut().zip(&way.dq) {
-                *q += dq * distance;
-            }
-            let plane = Plane { from: &way, dq: &way.dq, ds: 0.0, distance };
-            if let Ok((mut place, _)) = self.correct(family, &plane, guess) {
-                self.turn(family, &mut place, &way);
-                return Some(place);
-            }
-        }
-        None
-    }
-
-    /// First point back on the path that a branch has come to: a little ahead or back, where it is more stable. The way
-    /// is the tangent without its share of the null vector, along which the branch came.
-    fn rejoin(&mut self, family: &mut Blend, at: &Place) -> Option<Place> {
-        let null = self.null_vector(family, at)?;
-        self.linearize(family, at).ok()?;
-        let system = family.system();
-        self.tangent.solve(&system.model.pattern, &mut self.slope);
-        let share = inner(system, &null, &self.slope);
-        let mut way = at.clone();
-        for (dq, (slope, null)) in way.dq.iter_mut().zip(self.slope.iter().zip(&null)) {
-            *dq = null * share - slope;
-        }
-        way.ds = 1.0 / (1.0 + inner(system, &way.dq, &way.dq)).sqrt();
-        way.dq.iter_mut().for_each(|dq| *dq *= way.ds);
-        let mut found: Option<Place> = None;
-        for sign in [1.0, -1.0] {
-            let distance = sign * 0.25 * self.options.longest / way.ds;
-            let mut guess = way.clone();
-            for (q, dq) in guess.q.iter_mut().zip(&way.dq) {
-                *q += dq * distance;
-            }
-            guess.s += distance * way.ds;
-            let plane = Plane { from: &way, dq: &way.dq, ds: way.ds, distance };
-            let Ok((mut place, _)) = self.correct(family, &plane, guess) else { continue };
-            let sense = Place { dq: way.dq.iter().map(|dq| dq * sign).collect(), ds: sign * way.ds, ..way.clone() };
-            self.turn(family, &mut place, &sense);
-            let moved: Vec<Pose> = place.q.iter().zip(&at.q).map(|(a, b)| a - b).collect();
-            let aside = inner(family.system(), &null, &moved).abs() > 0.3 * distance.abs();
-            if !aside && found.as_ref().is_none_or(|best| place.negative < best.negative) {
-                found = Some(place);
-            }
-        }
-        found
-    }
-
-    /// Null vector of the nearly singular tangent by inverse iteration, of length 1, its largest translation positive.
-    fn null_vector(&mut self, family: &mut Blend, at: &Place) -> Option<Vec<Pose>> {
-        self.linearize(family, at).ok()?;
-        let system = family.system();
-        // a fixed vector without symmetry
-        let mut x: Vec<Pose> =
-            (0..at.q.len()).map(|j| Pose::new(1.0, 1.0 + 0.37 * ((j * 7) % 5) as f64, 0.1)).collect();
-        for _ in 0..4 {
-            system.model.project(&mut x);
-            self.tangent.solve(&system.model.pattern, &mut x);
-            let length = inner(system, &x, &x).sqrt();
-            if !length.is_finite() || length == 0.0 {
-                return None;
-            }
-            x.iter_mut().for_each(|x| *x /= length);
-        }
-        let largest = x.iter().flat_map(|p| [p.x, p.y]).max_by(|a, b| a.abs().total_cmp(&b.abs()))?;
-        if largest < 0.0 {
-            x.iter_mut().for_each(|x| *x = -*x);
-        }
-        Some(x)
     }
 
     /// The point at s = 1 exactly, from the two points around it.
