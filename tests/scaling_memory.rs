@@ -1,10 +1,15 @@
-//! What a mechanism of any size costs in memory.
+//! What a mechanism of any size costs in memory, and what its steps allocate.
 
 #[path = "topologies/mod.rs"]
 mod topologies;
 
 use bimorph::gaps::System;
 use bimorph::gaps::drive::Electrics;
+use bimorph::multibody::forces::RestStrain;
+use bimorph::multibody::rcr::{AddedInertia, Linkage, Reduction};
+use bimorph::solve::dormand_prince::Pair;
+use bimorph::solve::joint_dirk::{JointMethod, Rule};
+use bimorph::solve::joint_stage::{ImplicitMotion, Loads};
 use bimorph::solve::method::Motion;
 use bimorph::solve::rodas4::Rodas4;
 
@@ -46,5 +51,40 @@ fn a_million_bodies_take_less_than_a_gigabyte() {
         let (n, held, peak) = bytes(name, 3_000_000);
         println!("{name}: {n} bodies, {held} bytes a body, {peak} at the highest");
         assert!(peak * n <= 1_000_000_000, "{name}");
+    }
+}
+
+/// Springs of the joints alone.
+struct Springs<'a>(&'a Linkage);
+
+impl Loads for Springs<'_> {
+    fn add(&mut self, _: f64, q: &[f64], _: &[f64], reduction: &mut Reduction<f64>) {
+        reduction.add_elastic(self.0, q, &RestStrain { expansion: &[], built_in: 0.0 });
+    }
+
+    fn stiffen(&mut self, reduction: &Reduction<f64>, (beta, _): (f64, f64), added: &mut AddedInertia) {
+        reduction.add_stiffness(self.0, beta, added);
+    }
+}
+
+/// An implicit step in joint coordinates, with its projection onto the loops, allocates nothing: stages, factors and the
+/// history of the iteration are laid out once.
+#[test]
+fn an_implicit_step_in_joint_coordinates_allocates_nothing() {
+    for name in ["chain", "ladder", "arms", "bank"] {
+        let linkage = Linkage::new(&topologies::sized(name, 300).pinned());
+        let n = linkage.coordinates;
+        let mut motion = ImplicitMotion::new(&linkage, Springs(&linkage), &vec![1.0; n]);
+        let mut method = JointMethod::new(Rule::TrBdf2, n);
+        let mut now = Pair { q: vec![0.0; n], v: (0..n).map(|k| 1e3 * (k as f64).sin()).collect() };
+        motion.project(&mut now.q, &mut now.v);
+        let (mut end, mut error) = (Pair::zeros(n), Pair::zeros(n));
+        let profiler = dhat::Profiler::builder().testing().build();
+        method.step(&mut motion, (0.0, 1e-7), 1e-12, &now, &mut end, &mut error).unwrap();
+        motion.project(&mut end.q, &mut end.v);
+        let blocks = dhat::HeapStats::get().total_blocks;
+        drop(profiler);
+        assert_eq!((motion.singular, blocks), (0, 0), "{name}");
+        assert!(motion.work.iterations > 2, "{name}");
     }
 }

@@ -67,11 +67,15 @@ impl Formulation {
         }
     }
 
-    /// The methods that it can be integrated by, of those asked for: joint coordinates have their own, a frame has none.
+    /// The methods that it can be integrated by, of those asked for; joint coordinates always have their explicit one, a
+    /// frame has none.
     fn methods(self, asked: &[Integrator]) -> Vec<Integrator> {
         match self {
             Self::Compliant => asked.to_vec(),
-            Self::Rcr | Self::RcrElastic => vec![Integrator::Rk45],
+            Self::Rcr | Self::RcrElastic => {
+                let own = |m: &&Integrator| **m != Integrator::Rk45 && Integrator::IN_JOINTS.contains(&m.name());
+                [Integrator::Rk45].into_iter().chain(asked.iter().filter(own).copied()).collect()
+            }
             Self::Frame => Vec::new(),
         }
     }

@@ -84,7 +84,7 @@ impl Formulation {
 }
 
 /// Size of each coordinate: `length` [m] for a displacement, an angle that moves a body's end by as much for a rotation.
-pub(crate) fn coordinate_scales(linkage: &Linkage, length: f64) -> Vec<f64> {
+pub fn coordinate_scales(linkage: &Linkage, length: f64) -> Vec<f64> {
     let mut scale = vec![length; linkage.coordinates];
     for link in &linkage.links {
         let moving = (0..3).filter(|&i| link.parent == Parent::Free || link.moving[i]);

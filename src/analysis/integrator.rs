@@ -12,6 +12,7 @@ use crate::solve::midpoint::Midpoint;
 use crate::solve::radau5::Radau5;
 use crate::solve::rk45::Rk45;
 use crate::solve::rodas4::Rodas4;
+use crate::solve::sdirk4::Sdirk4;
 use crate::solve::tr_bdf2::TrBdf2;
 
 /// What integrates a motion in time.
@@ -38,6 +39,8 @@ pub enum Integrator {
     Radau5,
     /// Dormand–Prince, order 5, explicit.
     Rk45,
+    /// Diagonally implicit Runge–Kutta, order 4, L-stable.
+    Sdirk4,
 }
 
 impl Integrator {
@@ -45,8 +48,12 @@ impl Integrator {
     pub const RHO: f64 = 0.8;
 
     /// Names in the order of the variants.
-    pub const NAMES: [&str; 8] =
-        ["rodas4", "avf", "midpoint", "tr-bdf2", "generalized-alpha", "newmark", "radau5", "rk45"];
+    pub const NAMES: [&str; 9] =
+        ["rodas4", "avf", "midpoint", "tr-bdf2", "generalized-alpha", "newmark", "radau5", "rk45", "sdirk4"];
+
+    /// Names of those that joint coordinates have. Rodas4 and Radau5 need the exact Jacobian, which a tree of joints does
+    /// not offer as cheaply, and average vector field coordinates with constant inertia.
+    pub const IN_JOINTS: [&str; 6] = ["rk45", "tr-bdf2", "sdirk4", "midpoint", "newmark", "generalized-alpha"];
 
     /// The integrator of a name, generalized-α with [`Integrator::RHO`].
     pub fn named(name: &str) -> Option<Self> {
@@ -59,6 +66,7 @@ impl Integrator {
             Self::Newmark,
             Self::Radau5,
             Self::Rk45,
+            Self::Sdirk4,
         ];
         Self::NAMES.iter().position(|n| *n == name).map(|k| all[k])
     }
@@ -74,6 +82,7 @@ impl Integrator {
             Self::Newmark => 5,
             Self::Radau5 => 6,
             Self::Rk45 => 7,
+            Self::Sdirk4 => 8,
         }]
     }
 
@@ -103,6 +112,7 @@ impl Integrator {
             Self::TrBdf2 => run.with(TrBdf2::with_solver(solver, system)),
             Self::GeneralizedAlpha { rho } => run.doubled(GeneralizedAlpha::with_solver(solver, system, rho)),
             Self::Newmark => run.doubled(GeneralizedAlpha::newmark_with_solver(solver, system)),
+            Self::Sdirk4 => run.with(Sdirk4::with_solver(solver, system)),
             Self::Radau5 => run.with(Radau5::new(system)),
             Self::Rk45 => match Rk45::new(system) {
                 Ok(method) => run.with(method),

@@ -1,9 +1,10 @@
-//! Motion in time in joint coordinates: the recursion of the paper, an explicit integrator, loops closed after each step.
+//! Motion in time in joint coordinates: the recursion of the paper, loops closed after each step.
 //!
-//! Accelerations come from [`crate::multibody::rcr`] in O(n + m); Dormand and Prince's pair advances them. An explicit
-//! step is about 1/ω long, ω the highest natural frequency of the model, whatever the tolerance: joints that only turn have
-//! a moderate one, elastic axial directions a very high one. The number of steps is foretold, and refused when it is
-//! beyond [`MOST_STEPS`]: the compliant formulation steps implicitly.
+//! Accelerations come from [`crate::multibody::rcr`] in O(n + m). Dormand and Prince's pair advances them explicitly, or an
+//! implicit method does, whose stages the same recursion solves ([`crate::solve::joint_stage`]). An explicit step is about
+//! 1/ω long, ω the highest natural frequency of the model, whatever the tolerance: joints that only turn have a moderate
+//! one, elastic axial directions a very high one. The number of explicit steps is foretold, and refused when it is beyond
+//! [`MOST_STEPS`]: implicit steps follow the motion that is asked for.
 //!
 //! A release starts from the equilibrium of the same mechanism: the compliant model with its locked directions [`RIGID`]
 //! times as stiff, mapped to joint coordinates and projected onto the loops.
@@ -15,11 +16,14 @@ use super::{AnalysisError, Watch};
 use crate::compile::Compiled;
 use crate::gaps::{Ramp, System};
 use crate::multibody::rcr::{Linkage, Reduction};
-use crate::solve::adaptive::{Advance, Observer};
-use crate::solve::dormand_prince::{Dense, DormandPrince, IntegrationError, SecondOrder, Tolerances};
+use crate::solve::adaptive::{Advance, Control, Observer};
+use crate::solve::dormand_prince::{Dense, DormandPrince, IntegrationError, Pair, SecondOrder, Tolerances};
 use crate::solve::fastest::{Fastest, fastest};
+use crate::solve::joint_adaptive::{JointAdaptive, JointStepError};
+use crate::solve::joint_dirk::{JointMethod, Rule};
 use crate::solve::joint_loads::{JointLoads, poses};
 use crate::solve::joint_motion::{JointMotion, NotFinite};
+use crate::solve::joint_stage::ImplicitMotion;
 use crate::solve::method::{Motion, Work};
 use serde::Serialize;
 use std::f64::consts::TAU;
@@ -52,11 +56,11 @@ pub struct JointReport {
     pub highest_frequency_hz: Option<f64>,
 }
 
-/// Integrates the motion in joint coordinates, with [`Integrator::Rk45`] whatever `options` say. As
-/// [`super::transient::transient`] otherwise, with a report on the formulation.
+/// Integrates the motion in joint coordinates, with one of [`Integrator::IN_JOINTS`]. As [`super::transient::transient`]
+/// otherwise, with a report on the formulation.
 ///
 /// # Errors
-/// See [`AnalysisError`]; [`AnalysisError::BadRequest`] where joint coordinates or explicit steps will not do.
+/// See [`AnalysisError`]; [`AnalysisError::BadRequest`] where joint coordinates, the method or explicit steps will not do.
 pub fn joint_transient(
     compiled: &Compiled,
     formulation: Formulation,
@@ -64,18 +68,13 @@ pub fn joint_transient(
     sample: &mut dyn FnMut(f64, &[f64]),
     watch: Watch<'_>,
 ) -> Result<(TransientResult, JointReport), AnalysisError> {
-    if options.step.is_some() {
-        return Err(AnalysisError::BadRequest {
-            what: "step".into(),
-            detail: format!("steps of {} follow the tolerance; leave it out", formulation.name()),
-        });
-    }
+    let rule = rule(formulation, options)?;
     let system = &compiled.parts.system;
     let linkage = formulation.linkage(system)?;
     let counts = formulation.lock(&system.model).counts();
     let scale = coordinate_scales(&linkage, system.length_scale);
     let top = fastest(&linkage, &scale, system.electrics.heating.heaters.len());
-    if let Some(top) = &top {
+    if let (Some(top), None) = (&top, rule) {
         affordable(formulation, &linkage, top, options.stop)?;
     }
     let start = options.release.map(|start| {
@@ -88,6 +87,8 @@ pub fn joint_transient(
         system,
         q: vec![0.0; linkage.coordinates],
         v: vec![0.0; linkage.coordinates],
+        rule,
+        control: options.step.map_or(Control::Tolerance(STEP_SHARE * options.tol), Control::Fixed),
         rtol: STEP_SHARE * options.tol,
         rate: top.as_ref().map_or(1.0 / options.stop, |t| t.omega),
         report: JointReport {
@@ -103,7 +104,7 @@ pub fn joint_transient(
         linkage,
         scale,
     };
-    let options = TransientOptions { release: start.as_ref(), method: Integrator::Rk45, ..options.clone() };
+    let options = TransientOptions { release: start.as_ref(), ..options.clone() };
     let mut result = record(compiled, &options, &mut carrier, sample, watch)?;
     result.unknowns = carrier.linkage.coordinates.saturating_sub(carrier.linkage.constraints);
     Ok((result, carrier.report))
@@ -115,6 +116,9 @@ struct InJoints<'a> {
     system: &'a System,
     linkage: Linkage,
     scale: Vec<f64>,
+    /// None: explicit.
+    rule: Option<Rule>,
+    control: Control,
     rtol: f64,
     rate: f64,
     q: Vec<f64>,
@@ -135,6 +139,57 @@ impl Carrier for InJoints<'_> {
     }
 
     fn advance(
+        &mut self,
+        ramp: &Ramp<'_>,
+        motion: &mut Motion,
+        observe: Observer<'_>,
+    ) -> Result<(Advance, Work), AnalysisError> {
+        match self.rule {
+            Some(rule) => self.implicitly(rule, ramp, motion, observe),
+            None => self.explicitly(ramp, motion, observe),
+        }
+    }
+}
+
+impl InJoints<'_> {
+    fn implicitly(
+        &mut self,
+        rule: Rule,
+        ramp: &Ramp<'_>,
+        motion: &mut Motion,
+        observe: Observer<'_>,
+    ) -> Result<(Advance, Work), AnalysisError> {
+        let linkage = &self.linkage;
+        let n = linkage.coordinates;
+        let loads = JointLoads::new(self.system, linkage, ramp);
+        let mut shown = loads.clone();
+        let mut after = Reduction::<f64>::new(&[linkage]);
+        let mut before = motion.clone();
+        let mut joints = ImplicitMotion::new(linkage, loads, &self.scale);
+        let mut now = Pair { q: std::mem::take(&mut self.q), v: std::mem::take(&mut self.v) };
+        let mut see = |t: f64, h: f64, now: &Pair| {
+            shown.place(t + h, &now.q, &now.v, &mut after);
+            poses(&after, &mut motion.q, &mut motion.v);
+            let on = observe(t, h, &before, motion);
+            before.clone_from(motion);
+            on
+        };
+        let mut method = JointAdaptive::new(JointMethod::new(rule, n), n);
+        let end = method.advance(&mut joints, (0.0, ramp.dt), &mut now, self.control, &mut see);
+        (self.q, self.v) = (now.q, now.v);
+        self.report.accelerations = joints.work.forces;
+        self.report.singular_evaluations = joints.singular;
+        self.report.largest_gap_m = self.report.largest_gap_m.max(joints.gap);
+        let end = end.map_err(|e| {
+            let (t, dt) = match &e {
+                JointStepError::Stage { t, h, .. } | JointStepError::TooSmall { t, h, .. } => (*t, *h),
+            };
+            AnalysisError::StepFailed { t, dt, detail: e.to_string() }
+        })?;
+        Ok((if end.is_some_and(|t| t < ramp.dt) { Advance::Stopped } else { Advance::Done }, joints.work))
+    }
+
+    fn explicitly(
         &mut self,
         ramp: &Ramp<'_>,
         motion: &mut Motion,
@@ -180,6 +235,36 @@ impl Carrier for InJoints<'_> {
     }
 }
 
+/// The implicit method asked for; none: explicit steps.
+fn rule(formulation: Formulation, options: &TransientOptions<'_>) -> Result<Option<Rule>, AnalysisError> {
+    let rule = match options.method {
+        Integrator::Rk45 => None,
+        Integrator::Midpoint => Some(Rule::Midpoint),
+        Integrator::Newmark => Some(Rule::Newmark),
+        Integrator::TrBdf2 => Some(Rule::TrBdf2),
+        Integrator::Sdirk4 => Some(Rule::Sdirk4),
+        Integrator::GeneralizedAlpha { rho } => Some(Rule::GeneralizedAlpha { rho }),
+        other => {
+            return Err(AnalysisError::BadRequest {
+                what: format!("method {}", other.name()),
+                detail: format!(
+                    "formulation {} has {}; take one of them, or compliant for {}",
+                    formulation.name(),
+                    Integrator::IN_JOINTS.join(", "),
+                    other.name()
+                ),
+            });
+        }
+    };
+    if rule.is_none() && options.step.is_some() {
+        return Err(AnalysisError::BadRequest {
+            what: "step".into(),
+            detail: "explicit steps follow the tolerance; leave it out, or take an implicit method".into(),
+        });
+    }
+    Ok(rule)
+}
+
 fn affordable(formulation: Formulation, linkage: &Linkage, top: &Fastest, stop: f64) -> Result<(), AnalysisError> {
     let steps = stop * top.omega;
     if steps <= MOST_STEPS {
@@ -189,7 +274,7 @@ fn affordable(formulation: Formulation, linkage: &Linkage, top: &Fastest, stop: 
         what: format!("formulation {}", formulation.name()),
         detail: format!(
             "its explicit steps of about {:.2e} s ({:.3e} Hz at body \"{}\") would take {steps:.1e} steps to {stop:e} s; \
-             take compliant, which steps implicitly",
+             take an implicit method such as tr-bdf2, or compliant",
             1.0 / top.omega,
             top.omega / TAU,
             linkage.names[top.body]
@@ -209,6 +294,6 @@ fn failed(formulation: Formulation, linkage: &Linkage, error: &IntegrationError<
     AnalysisError::StepFailed {
         t,
         dt,
-        detail: format!("{error}{at}; {} steps explicitly, compliant implicitly", formulation.name()),
+        detail: format!("{error}{at}; rk45 steps explicitly in formulation {}, tr-bdf2 implicitly", formulation.name()),
     }
 }

@@ -36,7 +36,10 @@ use std::path::PathBuf;
     avf (2)                keeps the energy of an undamped motion, whatever the step\n  \
     midpoint (2)           keeps the energy on average\n  \
     newmark (2)            average acceleration; may gain energy when steps are long\n  \
-    rk45 (5)               explicit: tiny steps, and needs inertia in every direction\n\n\
+    sdirk4 (4)             five implicit stages; fast motions die out\n  \
+    rk45 (5)               explicit: tiny steps, and needs inertia in every direction\n\
+Joint coordinates (--formulation rcr, rcr-elastic) have rk45, their default, and tr-bdf2, sdirk4, midpoint, newmark and\n\
+generalized-alpha: take one of these where stiff directions make explicit steps tiny.\n\n\
 Examples:\n  \
     bimorph tran bank.net --stop 300u --port heat=2.2 --signals yoke.y,b1.hot.T --out heat.svg\n  \
     bimorph tran stage.net --set F=100u --release F --stop 30u --undamped --signals c.x --json\n      \
@@ -45,7 +48,9 @@ Examples:\n  \
     keeps the energy over many swings and tells each passage through the middle\n  \
     bimorph tran stage.net --set F=100u --release F --stop 30u --draw motion.html\n  \
     bimorph tran stage.net --set F=100u --release F --stop 30u --undamped --formulation rcr --signals c.x --json\n      \
-    the model of the paper: joints that only turn, in joint coordinates; \"joint_coordinates\" tells n, m and the gaps")]
+    the model of the paper: joints that only turn, in joint coordinates; \"joint_coordinates\" tells n, m and the gaps\n  \
+    bimorph tran stage.net --stop 30u --formulation rcr-elastic --rotary-inertia --method tr-bdf2 --signals c.x\n      \
+    every elastic direction a coordinate, in implicit steps by the same recursion")]
 pub(crate) struct Tran {
     #[command(flatten)]
     model: ModelArgs,
@@ -219,9 +224,12 @@ impl Tran {
         let name = self.method.as_deref().unwrap_or(if implicit { "rodas4" } else { "rk45" });
         let unknown = || Failure::bad("--method", "the name of an integrator", name.to_owned());
         let method = Integrator::named(name).ok_or_else(unknown)?;
-        if !implicit && (method != Integrator::Rk45 || self.step.is_some()) {
-            let got = if self.step.is_some() { "--step".to_owned() } else { format!("--method {name}") };
-            return Err(Failure::bad("--formulation", "rk45 with steps by --tol in joint coordinates", got));
+        if !implicit && !Integrator::IN_JOINTS.contains(&method.name()) {
+            let expected = format!("one of {} in joint coordinates", Integrator::IN_JOINTS.join(", "));
+            return Err(Failure::bad("--method", &expected, name.to_owned()));
+        }
+        if !implicit && method == Integrator::Rk45 && self.step.is_some() {
+            return Err(Failure::bad("--step", "an implicit --method in joint coordinates beside it", name.to_owned()));
         }
         if !implicit && self.solver != SolverChoice::Recursion {
             return Err(Failure::bad(

@@ -87,6 +87,14 @@ impl System {
         self.add_loads(q, -drive.load, r);
     }
 
+    /// `tangent +=` the share of gaps, contacts and dead loads in ∂r/∂q.
+    pub fn add_body_tangent(&self, q: &[Pose], drive: &Drive, tangent: &mut BlockMatrix<f64, 3>) {
+        for (gap, &volts) in self.gaps.iter().zip(&drive.volts) {
+            self.add_gap_tangent(gap, q, -0.5 * volts * volts, tangent);
+        }
+        self.add_load_tangent(q, -drive.load, tangent);
+    }
+
     /// The tangent ∂r/∂q and the residual r. The tangent's held directions are left to the caller, who may add inertia.
     pub fn tangent(&self, q: &[Pose], drive: &Drive, tangent: &mut BlockMatrix<f64, 3>, r: &mut [Pose]) {
         r.fill(Pose::zeros());

@@ -8,7 +8,8 @@
 use crate::gaps::{Drive, Ramp, System};
 use crate::multibody::forces;
 use crate::multibody::planar::Pose;
-use crate::multibody::rcr::{Closure, Linkage, Reduction};
+use crate::multibody::rcr::{AddedInertia, Closure, Linkage, Reduction};
+use crate::solve::joint_stage::Loads;
 
 /// Loads of a system while its sources go along a ramp, with storage for them.
 #[derive(Debug, Clone)]
@@ -70,6 +71,20 @@ impl<'a> JointLoads<'a> {
             }
         }
         reduction.add_elastic(self.linkage, q, &self.drive.rest());
+    }
+}
+
+impl Loads for JointLoads<'_> {
+    fn add(&mut self, t: f64, q: &[f64], v: &[f64], reduction: &mut Reduction<f64>) {
+        JointLoads::add(self, t, q, v, reduction);
+    }
+
+    fn stiffen(&mut self, reduction: &Reduction<f64>, (beta, gamma): (f64, f64), added: &mut AddedInertia) {
+        let bodies = &mut added.bodies;
+        self.system.add_body_tangent(&self.q, &self.drive, bodies);
+        bodies.diagonal.iter_mut().chain(&mut bodies.below).for_each(|block| *block *= beta);
+        forces::add_inertia(&self.system.model, 0.0, gamma, bodies);
+        reduction.add_stiffness(self.linkage, beta, added);
     }
 }
 

@@ -11,6 +11,7 @@
 //! | [`avf`] | average vector field: keeps the energy |
 //! | [`midpoint`] | implicit midpoint rule |
 //! | [`tr_bdf2`] | TR-BDF2: order 2, L-stable |
+//! | [`sdirk4`] | a diagonally implicit Runge–Kutta method of order 4, L-stable |
 //! | [`generalized_alpha`] | generalized-α with a chosen damping of fast motions, and Newmark's rule |
 //! | [`radau5`] | Radau IIA of order 5: one real and one complex block factorization a step |
 //! | [`rk45`] | Dormand–Prince on bodies: explicit |
@@ -26,9 +27,14 @@
 //! | [`fastest`] | the highest natural frequency in joint coordinates |
 //! | [`joint_loads`] | what acts on a system, for a motion in joint coordinates |
 //! | [`joint_motion`] | motion in joint coordinates, loops closed after each step |
+//! | `anderson` | acceleration of an iteration that contracts slowly |
+//! | [`joint_stage`] | the stages of implicit methods in joint coordinates |
+//! | [`joint_dirk`] | implicit methods in joint coordinates |
+//! | [`joint_adaptive`] | drives them: error control, or equal steps |
 //! | [`harmonic`] | small-signal response at one frequency: the same factorization over complex numbers |
 
 pub mod adaptive;
+mod anderson;
 pub mod avf;
 pub mod centred;
 pub mod consistent;
@@ -44,8 +50,11 @@ pub mod fastest;
 pub mod generalized_alpha;
 pub mod harmonic;
 mod implicit;
+pub mod joint_adaptive;
+pub mod joint_dirk;
 pub mod joint_loads;
 pub mod joint_motion;
+pub mod joint_stage;
 pub mod linear;
 pub mod method;
 pub mod midpoint;
@@ -54,6 +63,7 @@ pub mod path;
 pub mod radau5;
 pub mod rk45;
 pub mod rodas4;
+pub mod sdirk4;
 pub mod subspace;
 pub mod tr_bdf2;
 

@@ -46,6 +46,21 @@ fn joint_coordinates_converge() {
     assert!(number(&chart["reference_error"]) < errors[2]);
 }
 
+/// Beside their explicit method joint coordinates are charted with those of the methods asked for that they have: TR-BDF2
+/// converges in them, and Rodas4 is left out.
+#[test]
+fn implicit_methods_in_joint_coordinates() {
+    let bench = Bench::new(&[("c.net", CANTILEVER)]);
+    let chart = CHART.replace("rodas4,radau5", "rodas4,tr-bdf2");
+    let chart = bench.json(&format!("{chart} --parts precision --formulations rcr"));
+    let points = part(&chart, "precision");
+    let methods: Vec<&str> = points.iter().filter_map(|p| p["method"].as_str()).collect();
+    assert_eq!(methods, ["rk45", "rk45", "rk45", "tr-bdf2", "tr-bdf2", "tr-bdf2"]);
+    let errors: Vec<f64> = points[3..].iter().map(|p| number(&p["measured"]["error"])).collect();
+    assert!(errors[2] < 0.2 * errors[0], "{errors:?}");
+    assert!(points[3..].iter().all(|p| number(&p["measured"]["factorizations"]) > 0.0));
+}
+
 /// All solvers are measured on the same sizes, and the multiplications of the recursion grow linearly with the unknowns, those
 /// of dense elimination with their cube.
 #[test]

@@ -3,6 +3,7 @@
 use crate::model;
 use bimorph::analysis::AnalysisError;
 use bimorph::analysis::formulation::Formulation;
+use bimorph::analysis::integrator::Integrator;
 use bimorph::analysis::joint_transient::{JointReport, joint_transient};
 use bimorph::analysis::transient::{TransientOptions, TransientResult, transient};
 use bimorph::compile::{CompileOptions, Compiled};
@@ -69,6 +70,7 @@ fn spring(compiled: &Compiled, options: &TransientOptions<'_>) -> TransientResul
 }
 
 fn joints(compiled: &Compiled, kind: Formulation, options: &TransientOptions<'_>) -> (TransientResult, JointReport) {
+    let options = &TransientOptions { method: Integrator::Rk45, ..options.clone() };
     joint_transient(compiled, kind, options, &mut |_, _| {}, &mut |_| true).unwrap_or_else(|e| panic!("{e}"))
 }
 
@@ -177,7 +179,8 @@ fn refusals_name_the_way_out() {
         (&compiled, Formulation::Rcr, 10.0, "explicit steps"),
         (&linear, Formulation::Rcr, 1e-6, "--linear"),
     ] {
-        match joint_transient(compiled, kind, &asked(stop, "tip.y", 1e-3), &mut |_, _| {}, &mut |_| true) {
+        let options = TransientOptions { method: Integrator::Rk45, ..asked(stop, "tip.y", 1e-3) };
+        match joint_transient(compiled, kind, &options, &mut |_, _| {}, &mut |_| true) {
             Err(AnalysisError::BadRequest { detail, .. }) => {
                 assert!(detail.contains(word) && detail.contains("compliant"), "{detail}");
             }

@@ -45,7 +45,7 @@ const BANK: &str = "
     beam2d p1 [y2 y3] [l=49.5u w=11u oz=pi/2]
     f2d * [y1] [F=F oz=pi/2]";
 
-const ALL: [Integrator; 9] = [
+const ALL: [Integrator; 10] = [
     Integrator::Rodas4,
     Integrator::AverageField,
     Integrator::Midpoint,
@@ -55,6 +55,7 @@ const ALL: [Integrator; 9] = [
     Integrator::Newmark,
     Integrator::Radau5,
     Integrator::Rk45,
+    Integrator::Sdirk4,
 ];
 
 fn run(
@@ -111,7 +112,7 @@ fn orders() {
     let exact = end(Integrator::Radau5, 6400);
     for method in ALL {
         let (order, counts) = match method {
-            Integrator::Rodas4 => (4.0, [50, 100, 200]),
+            Integrator::Rodas4 | Integrator::Sdirk4 => (4.0, [50, 100, 200]),
             Integrator::Radau5 => (5.0, [20, 40, 80]),
             Integrator::Rk45 => (5.0, [50, 100, 200]),
             _ => (2.0, [100, 200, 400]),
@@ -186,6 +187,7 @@ fn one_motion() {
         (1345, 1, 8076, 8076, 8077, 8076),
         (773, 71, 1688, 4220, 5908, 1688),
         (8183, 64, 0, 0, 49483, 0),
+        (1138, 0, 11380, 12518, 11380, 11380),
     ];
     assert_eq!(pinned, known);
 }

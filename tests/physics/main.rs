@@ -8,6 +8,7 @@ mod examples;
 mod formulations;
 mod gaps;
 mod integrators;
+mod joint_integrators;
 mod junctions;
 mod motion;
 mod paths;

@@ -62,3 +62,22 @@ fn straight_arms() {
         assert!(met.heavy <= 6, "{met:?}");
     }
 }
+
+/// Numbers that are not finite go through the path for singular configurations and come out as such. (An explicit step that
+/// had become unstable once ended the program there.)
+#[test]
+fn what_is_not_finite_stays_so() {
+    for kinks in [[0.0; 3], [0.1; 3]] {
+        let (model, place) = star(&kinks, 0.6435).model();
+        let linkage = Linkage::new(&model);
+        let mut out = vec![0.0; linkage.coordinates];
+        let mut r = Reduction::<f64>::new(&[&linkage]);
+        for wrong in [f64::NAN, f64::INFINITY] {
+            let q = vec![if wrong.is_nan() { wrong } else { 0.0 }; linkage.coordinates];
+            r.place(&linkage, &q, &q);
+            r.force[place[0]] = [wrong, 1.0, 0.0];
+            r.reduce_singular(&linkage, Task::Accelerations, &mut out);
+            assert!(!out.iter().all(|x| x.is_finite()));
+        }
+    }
+}

@@ -3,12 +3,13 @@
 //! The coordinates of the tree are the strains of its joints, so their forces are −K·(e − e₀) as they stand. An elastic
 //! direction of a closure acts on its two bodies through its rows.
 
+use super::implicit::AddedInertia;
 use super::linkage::{Closure, Linkage};
 use super::motion::Placed;
 use super::reduce::Reduction;
 use crate::multibody::BodyId;
 use crate::multibody::forces::RestStrain;
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 impl Reduction<f64> {
     /// Sets the offsets of locked directions, which a heated or stressed joint prescribes. Before placing.
@@ -77,6 +78,43 @@ impl Reduction<f64> {
                         }
                     }
                 }
+            }
+        }
+    }
+
+    /// Adds `factor` times the stiffness of the springs at the placed configuration, that of the tree's joints and of
+    /// closures, to the inertia of an implicit step. How their axes turn is left out.
+    pub fn add_stiffness(&self, linkage: &Linkage, factor: f64, added: &mut AddedInertia) {
+        added.add_joints(linkage, factor);
+        for (c, closure) in linkage.closures.iter().enumerate() {
+            let Closure::Joint(joint) = closure else { continue };
+            if !(0..3).any(|i| !joint.locked[i] && joint.stiffness[(i, i)] != 0.0) {
+                continue;
+            }
+            let at = |id| match id {
+                BodyId::Free(k) => self.placed[k],
+                BodyId::Ground => Placed::REST,
+            };
+            let strains = self.closures[c].strains(&at(joint.a), &at(joint.b));
+            let [ra, rb] = [0, 1].map(|side| {
+                Matrix3::from_fn(|i, d| match (joint.locked[i], side) {
+                    (true, _) => 0.0,
+                    (false, 0) => strains[i].a[d],
+                    (false, _) => strains[i].b[d],
+                })
+            });
+            let k = joint.stiffness * factor;
+            if let BodyId::Free(a) = joint.a {
+                added.bodies.diagonal[a] += ra.transpose() * k * ra;
+            }
+            if let BodyId::Free(b) = joint.b {
+                added.bodies.diagonal[b] += rb.transpose() * k * rb;
+            }
+            if let (BodyId::Free(a), BodyId::Free(b)) = (joint.a, joint.b)
+                && let Some(block) = linkage.pattern.block(a.max(b), a.min(b))
+            {
+                let (row, column) = if a > b { (ra, rb) } else { (rb, ra) };
+                added.bodies.below[block] += row.transpose() * k * column;
             }
         }
     }

@@ -39,6 +39,7 @@ impl<T: Real> Reduction<T> {
             }
         }
         self.assemble(linkage, task, body, turn, &s, &torque, m, g);
+        self.add_joint_inertia(body, turn, nd > 1, m);
         let [dx, dy] = self.placed[body].shift;
         let bias = if task == Task::Accelerations { self.placed[body].bias } else { [T::ZERO; 2] };
         let source = 3 + 3 * w + 1;
@@ -178,6 +179,24 @@ impl<T: Real> Reduction<T> {
             g[p] += force[0];
             g[p + 1] += force[1];
             g[p + 2] += force[2] + (force[1] * dx - force[0] * dy);
+        }
+    }
+
+    /// Adds what an implicit step adds to the inertia of a body's joint; `scaled`: to coordinates in units of length.
+    #[inline(always)]
+    pub(super) fn add_joint_inertia(&self, body: usize, turn: Turn, scaled: bool, m: &mut [T]) {
+        let Some(added) = self.joint_inertia.get(body) else { return };
+        let (nd, k) = (turn.freedom, turn.freedom + 3 * turn.front);
+        let mut at = 0;
+        for i in 0..nd {
+            for j in 0..=i {
+                let mut x = added[at];
+                if scaled {
+                    x = x / (self.units[turn.first + i] * self.units[turn.first + j]);
+                }
+                m[i * k + j] += x;
+                at += 1;
+            }
         }
     }
 

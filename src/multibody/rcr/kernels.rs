@@ -16,7 +16,10 @@ impl<T: Real> Reduction<T> {
         let [i0, i1, i2, i3, i4, i5] = inertia;
         let u =
             [i0 * s[0] + i1 * s[1] + i3 * s[2], i1 * s[0] + i2 * s[1] + i4 * s[2], i3 * s[0] + i4 * s[1] + i5 * s[2]];
-        let mass = s[0] * u[0] + s[1] * u[1] + s[2] * u[2];
+        let mut mass = s[0] * u[0] + s[1] * u[1] + s[2] * u[2];
+        if let Some(added) = self.joint_inertia.get(body) {
+            mass += added[0];
+        }
         let placed = &self.placed[body];
         let [dx, dy] = placed.shift;
         let mut bias = [T::ZERO; 2];

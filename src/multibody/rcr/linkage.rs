@@ -210,6 +210,12 @@ impl Linkage {
             constraints,
         }
     }
+
+    /// Name of the body whose joint has a coordinate.
+    pub fn body_of(&self, coordinate: usize) -> &str {
+        let body = self.links.partition_point(|link| link.first <= coordinate);
+        self.names.get(body.wrapping_sub(1)).map_or("", String::as_str)
+    }
 }
 
 /// The body that `joint` connects to `body` becomes its parent.

@@ -17,6 +17,7 @@
 //! | `kernels` | one coordinate and small fronts, in closed form |
 //! | `lanes` | the recursion over lanes of variants, in vector instructions |
 //! | `singular` | the recursion near singular configurations |
+//! | `implicit` | the recursion for a stage of an implicit method |
 //! | [`real`] | what it runs over: one number, or lanes of variants |
 
 // fixed-size blocks are indexed as the formulas are written
@@ -27,6 +28,7 @@ mod coordinates;
 mod elastic;
 mod front;
 mod general;
+mod implicit;
 mod kernels;
 mod lanes;
 pub mod linkage;
@@ -39,6 +41,7 @@ pub mod rotary;
 mod schedule;
 mod singular;
 
+pub use implicit::AddedInertia;
 pub use linkage::{Closure, Link, Linkage, Parent};
 pub use real::{Lanes, Real};
 pub use reduce::{Reduction, Task};

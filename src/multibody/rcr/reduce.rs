@@ -67,6 +67,8 @@ pub struct Reduction<T> {
     /// Acceleration of each body.
     pub accelerations: Vec<[T; 3]>,
     pub(super) front: Scratch<T>,
+    /// Added to the inertia of each body's joint by an implicit step, see [`super::implicit`]; empty otherwise.
+    pub(super) joint_inertia: Vec<[T; 6]>,
     /// Worst of lever/pivot over the dependent coordinates of the last reduction: 1 in a well-conditioned loop, infinite in
     /// a singular configuration. The squares of it multiply rounding errors.
     pub nearness: T,
@@ -138,6 +140,7 @@ impl<T: Real> Reduction<T> {
             turned: vec![[[T::ZERO; 3]; 3]; if turns.iter().any(|t| t.freedom > 1) { count } else { 0 }],
             accelerations: vec![[T::ZERO; 3]; count],
             front: scratch,
+            joint_inertia: Vec::new(),
             nearness: T::ZERO,
             schedule,
         }

@@ -143,6 +143,7 @@ impl Reduction<f64> {
         let (mut m, mut g) = (vec![0.0; k * k], vec![0.0; k]);
         let torque: Vec<f64> = (0..nd).map(|q| self.torque[turn.first + q] / units[q]).collect();
         self.assemble(linkage, task, body, turn, &axes, &torque, &mut m, &mut g);
+        self.add_joint_inertia(body, turn, true, &mut m);
         // the articulated-body step, whose coordinates' own rows √D·(x + …) join the heavy ones
         let mut own: Vec<Row> = Vec::with_capacity(nd);
         for e in 0..nd {
@@ -168,7 +169,8 @@ impl Reduction<f64> {
             let biggest = |rows: &[Row], left: &[usize]| {
                 left.iter()
                     .map(|&c| (c, rows.iter().map(|r| r.entries[c] * r.entries[c]).sum::<f64>().sqrt()))
-                    .fold((0, 0.0), |best, x| if x.1 > best.1 { x } else { best })
+                    // the first where nothing is larger: numbers that are not finite go through
+                    .fold((left[0], 0.0), |best, x| if x.1 > best.1 { x } else { best })
             };
             let (coordinate, size) = biggest(&hard, &left);
             if size > task.zero() {

@@ -89,11 +89,12 @@ pub struct Pair {
 }
 
 impl Pair {
-    fn zeros(n: usize) -> Self {
+    /// All zero.
+    pub fn zeros(n: usize) -> Self {
         Self { q: vec![0.0; n], v: vec![0.0; n] }
     }
 
-    fn copy(&mut self, q: &[f64], v: &[f64]) {
+    pub(super) fn copy(&mut self, q: &[f64], v: &[f64]) {
         self.q.copy_from_slice(q);
         self.v.copy_from_slice(v);
     }
