@@ -1,5 +1,6 @@
 //! Time against size, from 10² to 10⁶ coordinates, for the kernels and the Rodas4 step of every topology with flexible joints,
-//! and for the accelerations of the same on pins by recursive coordinate reduction: nanoseconds per body at each size, and the
+//! and for the accelerations of the same on pins by recursive coordinate reduction, explicit and as one iteration of an
+//! implicit stage: nanoseconds per body at each size, and the
 //! least-squares exponent of time against size, over all sizes and over those that outgrow the caches (from 10⁴ on).
 //!
 //!     taskset -c 0 cargo bench --no-default-features --bench scaling [-- TOPOLOGY …]
@@ -12,22 +13,33 @@ mod topologies;
 
 use bimorph::gaps::drive::Electrics;
 use bimorph::gaps::{Drive, Ramp, System};
+use bimorph::multibody::forces::RestStrain;
 use bimorph::multibody::planar::Pose;
-use bimorph::multibody::rcr::{Linkage, Reduction};
+use bimorph::multibody::rcr::{AddedInertia, Linkage, Reduction};
 use bimorph::multibody::{BlockMatrix, forces};
+use bimorph::solve::joint_stage::{ImplicitMotion, Loads, Stage};
 use bimorph::solve::method::{Method, Motion};
 use bimorph::solve::rodas4::Rodas4;
 use std::hint::black_box;
 use std::time::Instant;
 
 const SIZES: [usize; 9] = [100, 316, 1_000, 3_160, 10_000, 31_600, 100_000, 316_000, 1_000_000];
-const WHAT: [&str; 7] =
-    ["residual", "tangent + residual", "tangent + factor", "factor", "solve", "Rodas4 step", "reduction on pins"];
+const WHAT: [&str; 8] = [
+    "residual",
+    "tangent + residual",
+    "tangent + factor",
+    "factor",
+    "solve",
+    "Rodas4 step",
+    "reduction on pins",
+    "implicit on pins",
+];
 
 /// Nanoseconds of each kind of work on a topology of about `coordinates` coordinates, and its number of bodies.
-fn measure(name: &str, coordinates: usize) -> (usize, [f64; 7]) {
+fn measure(name: &str, coordinates: usize) -> (usize, [f64; 8]) {
     let topology = topologies::sized(name, coordinates);
     let reduction = reduction(&topology);
+    let implicit = implicit(&topology);
     let model = topology.model();
     let electrics = Electrics::default();
     let system = System { model, gaps: Vec::new(), loads: Vec::new(), electrics, length_scale: 2e-6 };
@@ -66,7 +78,7 @@ fn measure(name: &str, coordinates: usize) -> (usize, [f64; 7]) {
         motion.v.fill(Pose::zeros());
         rodas.step(&system, &ramp, 0.0, 4e-8, &mut motion, &mut error).unwrap_or_else(|e| panic!("{e:?}"));
     });
-    (n, [residual, tangent, both, factor, solve, step, reduction])
+    (n, [residual, tangent, both, factor, solve, step, reduction, implicit])
 }
 
 /// Nanoseconds of one evaluation of accelerations on pins.
@@ -77,6 +89,31 @@ fn reduction(topology: &topologies::Topology) -> f64 {
     let q: Vec<f64> = (0..linkage.coordinates).map(|k| 1e-2 * (k as f64 * 0.7).sin()).collect();
     let mut out = vec![0.0; q.len()];
     median(1, |_| reduction.accelerate(&linkage, black_box(&q), &q, &mut out))
+}
+
+/// Springs of the joints alone.
+struct Springs<'a>(&'a Linkage);
+
+impl Loads for Springs<'_> {
+    fn add(&mut self, _: f64, q: &[f64], _: &[f64], reduction: &mut Reduction<f64>) {
+        reduction.add_elastic(self.0, q, &RestStrain { expansion: &[], built_in: 0.0 });
+    }
+
+    fn stiffen(&mut self, reduction: &Reduction<f64>, (beta, _): (f64, f64), added: &mut AddedInertia) {
+        reduction.add_stiffness(self.0, beta, added);
+    }
+}
+
+/// Nanoseconds of one iteration of a stage on pins with springs: placing, forces and stiffness, reduction.
+fn implicit(topology: &topologies::Topology) -> f64 {
+    let linkage = Linkage::new(&topology.pinned());
+    let n = linkage.coordinates;
+    let mut motion = ImplicitMotion::new(&linkage, Springs(&linkage), &vec![1.0; n]);
+    let q: Vec<f64> = (0..n).map(|k| 1e-2 * (k as f64 * 0.7).sin()).collect();
+    let mut a = vec![0.0; n];
+    let stage = Stage { t: 0.0, q: &q, v: &q, beta: 1e-16, gamma: 1e-8 };
+    // any correction is small enough: one iteration
+    median(1, |_| motion.stage(black_box(&stage), f64::INFINITY, &mut a).unwrap_or_else(|e| panic!("{e}")))
 }
 
 /// Median nanoseconds of `work`, which does `repeat` units of work at a call.
@@ -130,7 +167,7 @@ fn exponent(points: &[(f64, f64)]) -> f64 {
 fn main() {
     let asked: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
     for name in topologies::NAMES.into_iter().filter(|n| asked.is_empty() || asked.iter().any(|a| a == n)) {
-        let mut points: Vec<(f64, [f64; 7])> = Vec::new();
+        let mut points: Vec<(f64, [f64; 8])> = Vec::new();
         println!("{name}, ns per body\n{:>9}{}", "bodies", WHAT.map(|w| format!("{w:>20}")).concat());
         for size in SIZES {
             let (n, times) = measure(name, size);

@@ -12,9 +12,17 @@ use bimorph::solve::joint_dirk::{JointMethod, Rule};
 use bimorph::solve::joint_stage::{ImplicitMotion, Loads};
 use bimorph::solve::method::Motion;
 use bimorph::solve::rodas4::Rodas4;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 #[global_allocator]
 static HEAP: dhat::Alloc = dhat::Alloc;
+
+/// The heap is counted for the whole process: one test at a time.
+static COUNTING: Mutex<()> = Mutex::new(());
+
+fn alone() -> MutexGuard<'static, ()> {
+    COUNTING.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 /// Bytes per body that a model, its motion, an error estimate and the storage of Rodas4 hold; and at the highest, while
 /// they were made.
@@ -35,6 +43,7 @@ fn bytes(name: &str, coordinates: usize) -> (usize, usize, usize) {
 /// Rodas4 step needs, takes no more bytes than stand here; neither does making the model take more. Counted at 10⁵ bodies.
 #[test]
 fn a_body_takes_less_than_a_kilobyte() {
+    let _alone = alone();
     let most = [("chain", 840), ("ladder", 930), ("arms", 860), ("bank", 850), ("quarter", 850), ("rotary", 850)];
     for (name, most) in most {
         let (n, held, peak) = bytes(name, 300_000);
@@ -47,6 +56,7 @@ fn a_body_takes_less_than_a_kilobyte() {
 #[test]
 #[ignore = "takes 1 GB"]
 fn a_million_bodies_take_less_than_a_gigabyte() {
+    let _alone = alone();
     for name in topologies::NAMES {
         let (n, held, peak) = bytes(name, 3_000_000);
         println!("{name}: {n} bodies, {held} bytes a body, {peak} at the highest");
@@ -54,11 +64,12 @@ fn a_million_bodies_take_less_than_a_gigabyte() {
     }
 }
 
-/// Springs of the joints alone.
+/// Springs of the joints, and a force on each body.
 struct Springs<'a>(&'a Linkage);
 
 impl Loads for Springs<'_> {
     fn add(&mut self, _: f64, q: &[f64], _: &[f64], reduction: &mut Reduction<f64>) {
+        reduction.force.fill([1e-9, -1e-8, 0.0]);
         reduction.add_elastic(self.0, q, &RestStrain { expansion: &[], built_in: 0.0 });
     }
 
@@ -71,13 +82,13 @@ impl Loads for Springs<'_> {
 /// history of the iteration are laid out once.
 #[test]
 fn an_implicit_step_in_joint_coordinates_allocates_nothing() {
+    let _alone = alone();
     for name in ["chain", "ladder", "arms", "bank"] {
         let linkage = Linkage::new(&topologies::sized(name, 300).pinned());
         let n = linkage.coordinates;
         let mut motion = ImplicitMotion::new(&linkage, Springs(&linkage), &vec![1.0; n]);
         let mut method = JointMethod::new(Rule::TrBdf2, n);
-        let mut now = Pair { q: vec![0.0; n], v: (0..n).map(|k| 1e3 * (k as f64).sin()).collect() };
-        motion.project(&mut now.q, &mut now.v);
+        let now = Pair::zeros(n);
         let (mut end, mut error) = (Pair::zeros(n), Pair::zeros(n));
         let profiler = dhat::Profiler::builder().testing().build();
         method.step(&mut motion, (0.0, 1e-7), 1e-12, &now, &mut end, &mut error).unwrap();
