@@ -11,21 +11,21 @@ use super::schedule::{NONE, Turn};
 
 impl<T: Real> Reduction<T> {
     #[inline(never)]
-    pub(super) fn any_inward(&mut self, linkage: &Linkage, task: Task, body: usize) {
+    pub(super) fn any_inward(&mut self, task: Task, body: usize) {
         let mut scratch = Scratch {
             m: std::mem::take(&mut self.front.m),
             g: std::mem::take(&mut self.front.g),
             r: std::mem::take(&mut self.front.r),
         };
-        self.take_turn(linkage, task, body, &mut scratch.m, &mut scratch.g, &mut scratch.r);
+        self.take_turn(task, body, &mut scratch.m, &mut scratch.g, &mut scratch.r);
         self.front = scratch;
     }
 
     /// Assembles a body's front, takes its coordinates out, and hands the rest on.
     #[inline(always)]
     #[allow(clippy::too_many_arguments)]
-    fn take_turn(&mut self, linkage: &Linkage, task: Task, body: usize, m: &mut [T], g: &mut [T], r: &mut [T]) {
-        let turn = self.schedule.turns[body];
+    fn take_turn(&mut self, task: Task, body: usize, m: &mut [T], g: &mut [T], r: &mut [T]) {
+        let turn = self.schedule.turn(body);
         let (nd, w, h) = (turn.freedom, turn.front, turn.rows);
         let k = nd + 3 * w;
         // several coordinates are combined, so they get one unit first
@@ -38,7 +38,7 @@ impl<T: Real> Reduction<T> {
                 (s[q], torque[q], unit[q]) = (axis.map(|x| x * inverse), torque[q] * inverse, T::ONE);
             }
         }
-        self.assemble(linkage, task, body, turn, &s, &torque, m, g);
+        self.assemble(task, body, turn, &s, &torque, m, g);
         let [dx, dy] = self.placed[body].shift;
         let bias = if task == Task::Accelerations { self.placed[body].bias } else { [T::ZERO; 2] };
         let source = 3 + 3 * w + 1;
@@ -68,15 +68,15 @@ impl<T: Real> Reduction<T> {
         if nd > 1 {
             self.turned[body] = turned;
         }
-        self.hand_on(linkage, body, turn, m, g);
+        self.hand_on(turn, m, g);
         if turn.next != NONE {
-            let next = self.schedule.turns[turn.next];
+            let next = self.schedule.turn(turn.next);
             let width = 3 + 3 * next.front + 1;
             for (l, from) in (nd.min(h)..h).enumerate() {
                 let to = next.row_start + (turn.next_row + l) * width;
                 self.rows[to..to + width].fill(T::ZERO);
                 for slot in 0..w {
-                    let place = self.schedule.maps[turn.map_start + slot];
+                    let place = self.schedule.map(turn.map_start + slot);
                     if place != NONE {
                         for i in 0..3 {
                             self.rows[to + 3 * place + i] = r[from * (k + 1) + nd + 3 * slot + i];
@@ -94,7 +94,6 @@ impl<T: Real> Reduction<T> {
     #[allow(clippy::too_many_arguments)]
     pub(super) fn assemble(
         &mut self,
-        linkage: &Linkage,
         task: Task,
         body: usize,
         turn: Turn,
@@ -104,7 +103,7 @@ impl<T: Real> Reduction<T> {
         g: &mut [T],
     ) {
         let (nd, w) = (turn.freedom, turn.front);
-        let (k, start) = (nd + 3 * w, linkage.pattern.column(body).start);
+        let k = nd + 3 * w;
         let [a, b, c, d, e, f] = self.take_inertia(body);
         let own = [[a, b, d], [b, c, e], [d, e, f]];
         let mut force = self.take_force(task, body);
@@ -128,7 +127,8 @@ impl<T: Real> Reduction<T> {
         }
         let [dx, dy] = placed.shift;
         for slot in 0..w {
-            let block = std::mem::replace(&mut self.coupling[start + slot], [T::ZERO; 9]);
+            let at = self.schedule.blocks[turn.column + slot] as usize;
+            let block = std::mem::replace(&mut self.coupling[at], [T::ZERO; 9]);
             for i in 0..3 {
                 let row = [block[3 * i], block[3 * i + 1], block[3 * i + 2]];
                 let at = nd + 3 * slot + i;
@@ -183,13 +183,13 @@ impl<T: Real> Reduction<T> {
 
     /// Adds what is left of a front to the bodies in it.
     #[inline(always)]
-    pub(super) fn hand_on(&mut self, linkage: &Linkage, body: usize, turn: Turn, m: &[T], g: &[T]) {
+    pub(super) fn hand_on(&mut self, turn: Turn, m: &[T], g: &[T]) {
         let (nd, w) = (turn.freedom, turn.front);
-        let (k, start) = (nd + 3 * w, linkage.pattern.column(body).start);
-        let mut target = linkage.pattern.targets(body).iter();
+        let k = nd + 3 * w;
+        let mut target = self.schedule.targets[turn.targets..].iter();
         for row in 0..w {
             let at = nd + 3 * row;
-            let to = linkage.pattern.row(start + row);
+            let to = self.schedule.nodes[turn.column + row] as usize;
             for column in 0..row {
                 let from = nd + 3 * column;
                 if let Some(&block) = target.next() {
@@ -218,7 +218,7 @@ impl<T: Real> Reduction<T> {
     /// Acceleration of the body, from those of its front.
     pub(super) fn any_outward(&mut self, linkage: &Linkage, task: Task, body: usize, out: &mut [T]) {
         {
-            let turn = self.schedule.turns[body];
+            let turn = self.schedule.turn(body);
             let placed = &self.placed[body];
             let (nd, k) = (turn.freedom, turn.freedom + 3 * turn.front);
             let start = linkage.pattern.column(body).start;

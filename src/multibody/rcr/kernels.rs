@@ -9,7 +9,7 @@ impl<T: Real> Reduction<T> {
     /// A body with one coordinate, a front of `W` bodies and `H` constraint rows.
     #[inline(always)]
     pub(super) fn one_inward<const W: usize, const H: usize>(&mut self, task: Task, body: usize) {
-        let turn = self.schedule.turns[body];
+        let turn = self.schedule.turn(body);
         let inertia = self.take_inertia(body);
         let mut force = self.take_force(task, body);
         let s = self.axes[turn.first];
@@ -33,7 +33,8 @@ impl<T: Real> Reduction<T> {
         let (mut c, mut g, mut m) = ([[T::ZERO; 3]; W], [[T::ZERO; 3]; W], [[[T::ZERO; 9]; W]; W]);
         if turn.coupled {
             for slot in 0..W {
-                let block = std::mem::replace(&mut self.coupling[turn.column + slot], [T::ZERO; 9]);
+                let at = self.schedule.blocks[turn.column + slot] as usize;
+                let block = std::mem::replace(&mut self.coupling[at], [T::ZERO; 9]);
                 for i in 0..3 {
                     let row = [block[3 * i], block[3 * i + 1], block[3 * i + 2]];
                     c[slot][i] = row[0] * s[0] + row[1] * s[1] + row[2] * s[2];
@@ -177,11 +178,11 @@ impl<T: Real> Reduction<T> {
         let at = turn.coefficient_start;
         for slot in 0..W {
             for i in 0..3 {
-                self.coefficients[at + 1 + 3 * slot + i] = slope[slot][i];
+                self.coefficients[at + 3 * slot + i] = slope[slot][i];
             }
         }
         for r in 0..W {
-            let to = self.schedule.fronts[turn.column + r] as usize;
+            let to = self.schedule.nodes[turn.column + r] as usize;
             let block = &m[r][r];
             let inertia = &mut self.nodes[to].inertia;
             for (x, k) in inertia.iter_mut().zip([0, 3, 4, 6, 7, 8]) {
@@ -199,14 +200,14 @@ impl<T: Real> Reduction<T> {
             }
         }
         if H > 1 && turn.next != NONE {
-            let next = &self.schedule.turns[turn.next];
+            let next = self.schedule.turn(turn.next);
             let width = 3 * next.front + 4;
             for l in 1..H {
                 let to = next.row_start + (turn.next_row + l - 1) * width;
                 let row = &mut self.rows[to..to + width];
                 row.fill(T::ZERO);
                 for slot in 0..W {
-                    let place = self.schedule.maps[turn.map_start + slot];
+                    let place = self.schedule.map(turn.map_start + slot);
                     if place != NONE {
                         row[3 * place..3 * place + 3].copy_from_slice(&on[l][slot]);
                     }
@@ -220,14 +221,14 @@ impl<T: Real> Reduction<T> {
     #[inline(always)]
     pub(super) fn one_outward<const W: usize>(&mut self, task: Task, body: usize, out: &mut [T]) {
         let step = self.schedule.steps[body];
-        let turn = &self.schedule.turns[body];
+        let turn = self.schedule.turn(body);
         let first = step.first as usize;
         let placed = &self.placed[body];
         let s = self.axes[first];
         let mut x = self.base[first];
         for slot in 0..W {
             let other = &self.accelerations[self.schedule.fronts[turn.column + slot] as usize];
-            let c = &self.coefficients[turn.coefficient_start + 1 + 3 * slot..turn.coefficient_start + 4 + 3 * slot];
+            let c = &self.coefficients[turn.coefficient_start + 3 * slot..turn.coefficient_start + 3 + 3 * slot];
             x -= c[0] * other[0] + c[1] * other[1] + c[2] * other[2];
         }
         let mut a = if task == Task::Accelerations { [placed.bias[0], placed.bias[1], T::ZERO] } else { [T::ZERO; 3] };

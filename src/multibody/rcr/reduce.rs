@@ -27,21 +27,17 @@ pub enum Task {
     Positions,
 }
 
-/// What gathers at a body on the way in, and what a pin keeps for the way out.
+/// What gathers at a body on the way in.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Node<T> {
     /// Inertia that outer bodies hand on: xx, xy, yy, xθ, yθ, θθ.
     pub(super) inertia: [T; 6],
     /// Wrench that they hand on.
     pub(super) momentum: [T; 3],
-    /// A pin body's angular acceleration per acceleration of the pin.
-    pub(super) slope: [T; 2],
-    /// A pin body's angular acceleration when the pin rests.
-    pub(super) base: T,
 }
 
 impl<T: Real> Node<T> {
-    const CLEAN: Self = Self { inertia: [T::ZERO; 6], momentum: [T::ZERO; 3], slope: [T::ZERO; 2], base: T::ZERO };
+    const CLEAN: Self = Self { inertia: [T::ZERO; 6], momentum: [T::ZERO; 3] };
 }
 
 /// The recursion with its storage, over one model or over lanes of variants.
@@ -61,7 +57,9 @@ pub struct Reduction<T> {
     pub(super) nodes: Vec<Node<T>>,
     pub(super) coupling: Vec<[T; 9]>,
     pub(super) rows: Vec<T>,
+    /// Acceleration of a coordinate per acceleration of the bodies of its front; a pin's per acceleration of its point.
     pub(super) coefficients: Vec<T>,
+    /// Acceleration of a coordinate when its front rests; a pin's body's.
     pub(super) base: Vec<T>,
     pub(super) turned: Vec<[[T; 3]; 3]>,
     /// Acceleration of each body.
@@ -113,8 +111,7 @@ impl<T: Real> Reduction<T> {
                 }
             }
         }
-        let turns = &schedule.turns;
-        let most = |f: &dyn Fn(&Turn) -> usize| turns.iter().map(f).max().unwrap_or(0);
+        let most = |f: &dyn Fn(Turn) -> usize| schedule.turns().map(f).max().unwrap_or(0);
         let size = most(&|t| t.freedom + 3 * t.front);
         let scratch = Scratch {
             m: vec![T::ZERO; size * size],
@@ -130,12 +127,12 @@ impl<T: Real> Reduction<T> {
             axes: vec![[T::ZERO; 3]; linkage.coordinates],
             force: vec![[T::ZERO; 3]; count],
             torque: vec![T::ZERO; linkage.coordinates],
-            nodes: vec![Node::CLEAN; count],
-            coupling: vec![[T::ZERO; 9]; linkage.pattern.off_blocks()],
+            nodes: vec![Node::CLEAN; schedule.node_count],
+            coupling: vec![[T::ZERO; 9]; schedule.block_count],
             rows: vec![T::ZERO; schedule.row_entries],
             coefficients: vec![T::ZERO; schedule.coefficient_entries],
             base: vec![T::ZERO; linkage.coordinates],
-            turned: vec![[[T::ZERO; 3]; 3]; if turns.iter().any(|t| t.freedom > 1) { count } else { 0 }],
+            turned: vec![[[T::ZERO; 3]; 3]; if most(&|t| t.freedom) > 1 { count } else { 0 }],
             accelerations: vec![[T::ZERO; 3]; count],
             front: scratch,
             nearness: T::ZERO,
@@ -173,7 +170,7 @@ impl<T: Real> Reduction<T> {
         }
         let rest = Placed::REST;
         for (closure, entry) in self.closures.iter().zip(&self.schedule.entries) {
-            let turn = &self.schedule.turns[entry.body];
+            let turn = self.schedule.turn(entry.body);
             let width = 3 + 3 * turn.front + 1;
             let [a, b] = entry.ends.map(|end| end.map_or(&rest, |body| &self.placed[body as usize]));
             let first_is_a = entry.ends[0] == Some(entry.body as u32);
@@ -204,17 +201,17 @@ impl<T: Real> Reduction<T> {
     #[inline(always)]
     pub fn reduce(&mut self, linkage: &Linkage, task: Task, out: &mut [T]) {
         self.write_rows(task);
-        self.inward(linkage, task);
+        self.inward(task);
         self.outward(linkage, task, out);
     }
 
     #[inline(always)]
-    fn inward(&mut self, linkage: &Linkage, task: Task) {
+    fn inward(&mut self, task: Task) {
         self.nearness = T::ZERO;
         let mut body = 0;
         while body < self.links.len() {
             let Kind::Pin = self.schedule.steps[body].kind else {
-                self.front_inward(linkage, task, body);
+                self.front_inward(task, body);
                 body += 1;
                 continue;
             };
@@ -227,7 +224,7 @@ impl<T: Real> Reduction<T> {
     }
 
     #[inline(always)]
-    fn front_inward(&mut self, linkage: &Linkage, task: Task, body: usize) {
+    fn front_inward(&mut self, task: Task, body: usize) {
         match self.schedule.steps[body].kind {
             Kind::Pin => {}
             Kind::One(0) => self.one_inward::<1, 0>(task, body),
@@ -238,14 +235,15 @@ impl<T: Real> Reduction<T> {
             Kind::Two(1) => self.one_inward::<2, 1>(task, body),
             Kind::Two(2) => self.one_inward::<2, 2>(task, body),
             Kind::Two(_) => self.one_inward::<2, 3>(task, body),
-            Kind::Any => self.any_inward(linkage, task, body),
+            Kind::Any => self.any_inward(task, body),
         }
     }
 
     /// What the outer bodies have left at this one, with its own mass; their place is clean for the next reduction.
     #[inline(always)]
     pub(super) fn take_inertia(&mut self, body: usize) -> [T; 6] {
-        let mut inertia = std::mem::replace(&mut self.nodes[body].inertia, [T::ZERO; 6]);
+        let node = &mut self.nodes[self.schedule.steps[body].node as usize];
+        let mut inertia = std::mem::replace(&mut node.inertia, [T::ZERO; 6]);
         let link = &self.links[body];
         inertia[0] += link.mass;
         inertia[2] += link.mass;
@@ -256,7 +254,8 @@ impl<T: Real> Reduction<T> {
     /// The same for forces; accelerations add the body's own.
     #[inline(always)]
     pub(super) fn take_force(&mut self, task: Task, body: usize) -> [T; 3] {
-        let mut force = std::mem::replace(&mut self.nodes[body].momentum, [T::ZERO; 3]);
+        let node = &mut self.nodes[self.schedule.steps[body].node as usize];
+        let mut force = std::mem::replace(&mut node.momentum, [T::ZERO; 3]);
         if task == Task::Accelerations {
             for (f, own) in force.iter_mut().zip(&self.force[body]) {
                 *f += *own;

@@ -88,7 +88,7 @@ impl Reduction<f64> {
     fn entering(&self, linkage: &Linkage) -> Vec<Vec<Row>> {
         let mut waiting = vec![Vec::new(); linkage.links.len()];
         for (entry, closure) in self.schedule.entries.iter().zip(&linkage.closures) {
-            let turn = &self.schedule.turns[entry.body];
+            let turn = self.schedule.turn(entry.body);
             let width = 3 + 3 * turn.front + 1;
             for k in 0..closure.constraints() {
                 let start = turn.row_start + (entry.row + k) * width;
@@ -107,7 +107,7 @@ impl Reduction<f64> {
         waiting: &mut [Vec<Row>],
         report: &mut Singularity,
     ) -> Vec<Taken> {
-        let turn = self.schedule.turns[body];
+        let turn = self.schedule.turn(body);
         let (nd, w) = (turn.freedom, turn.front);
         let k = nd + 3 * w;
         let length = linkage.links[body].lever;
@@ -142,7 +142,7 @@ impl Reduction<f64> {
         let mut soft: Vec<Row> = heavy.iter().map(local).collect();
         let (mut m, mut g) = (vec![0.0; k * k], vec![0.0; k]);
         let torque: Vec<f64> = (0..nd).map(|q| self.torque[turn.first + q] / units[q]).collect();
-        self.assemble(linkage, task, body, turn, &axes, &torque, &mut m, &mut g);
+        self.assemble(task, body, turn, &axes, &torque, &mut m, &mut g);
         // the articulated-body step, whose coordinates' own rows √D·(x + …) join the heavy ones
         let mut own: Vec<Row> = Vec::with_capacity(nd);
         for e in 0..nd {
@@ -220,13 +220,13 @@ impl Reduction<f64> {
                 report.contradiction = report.contradiction.max(row.entries[k].abs());
             }
         }
-        self.hand_on(linkage, body, turn, &m, &g);
+        self.hand_on(turn, &m, &g);
         taken
     }
 
     /// Hands a row to the first body of the front that it touches.
     fn pass(&self, linkage: &Linkage, body: usize, row: &Row, waiting: &mut [Vec<Row>]) {
-        let turn = &self.schedule.turns[body];
+        let turn = self.schedule.turn(body);
         let nd = turn.freedom;
         let k = nd + 3 * turn.front;
         let pattern = &linkage.pattern;
@@ -251,7 +251,7 @@ impl Reduction<f64> {
     }
 
     fn outward_singular(&mut self, linkage: &Linkage, task: Task, body: usize, taken: &[Taken], out: &mut [f64]) {
-        let turn = self.schedule.turns[body];
+        let turn = self.schedule.turn(body);
         let (nd, start) = (turn.freedom, linkage.pattern.column(body).start);
         let k = nd + 3 * turn.front;
         let mut x = [0.0; 3];
