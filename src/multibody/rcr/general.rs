@@ -31,7 +31,7 @@ impl<T: Real> Reduction<T> {
         // several coordinates are combined, so they get one unit first
         let (mut s, mut torque, mut unit) = ([[T::ZERO; 3]; 3], [T::ZERO; 3], [T::ONE; 3]);
         for q in 0..nd {
-            let (axis, lever) = (self.axes[turn.first + q], self.units[turn.first + q]);
+            let (axis, lever) = (self.axis(body, turn.first + q), self.units[turn.first + q]);
             (s[q], torque[q], unit[q]) = (axis, self.torque[turn.first + q], lever);
             if nd > 1 {
                 let inverse = T::ONE / lever;
@@ -39,8 +39,8 @@ impl<T: Real> Reduction<T> {
             }
         }
         self.assemble(task, body, turn, &s, &torque, m, g);
-        let [dx, dy] = self.placed[body].shift;
-        let bias = if task == Task::Accelerations { self.placed[body].bias } else { [T::ZERO; 2] };
+        let [dx, dy] = self.hanging[body].shift();
+        let bias = if task == Task::Accelerations { self.hanging[body].bias } else { [T::ZERO; 2] };
         let source = 3 + 3 * w + 1;
         for l in 0..h {
             let row = &self.rows[turn.row_start + l * source..turn.row_start + (l + 1) * source];
@@ -107,8 +107,8 @@ impl<T: Real> Reduction<T> {
         let [a, b, c, d, e, f] = self.take_inertia(body);
         let own = [[a, b, d], [b, c, e], [d, e, f]];
         let mut force = self.take_force(task, body);
-        let placed = &self.placed[body];
-        let bias = if task == Task::Accelerations { placed.bias } else { [T::ZERO; 2] };
+        let hanging = &self.hanging[body];
+        let bias = if task == Task::Accelerations { hanging.bias } else { [T::ZERO; 2] };
         for i in 0..3 {
             force[i] -= own[i][0] * bias[0] + own[i][1] * bias[1];
         }
@@ -125,7 +125,7 @@ impl<T: Real> Reduction<T> {
                 m[q * k + p] = s[p][0] * hs[q][0] + s[p][1] * hs[q][1] + s[p][2] * hs[q][2];
             }
         }
-        let [dx, dy] = placed.shift;
+        let [dx, dy] = hanging.shift();
         for slot in 0..w {
             let at = self.schedule.blocks[turn.column + slot] as usize;
             let block = std::mem::replace(&mut self.coupling[at], [T::ZERO; 9]);
@@ -219,7 +219,7 @@ impl<T: Real> Reduction<T> {
     pub(super) fn any_outward(&mut self, linkage: &Linkage, task: Task, body: usize, out: &mut [T]) {
         {
             let turn = self.schedule.turn(body);
-            let placed = &self.placed[body];
+            let hanging = &self.hanging[body];
             let (nd, k) = (turn.freedom, turn.freedom + 3 * turn.front);
             let start = linkage.pattern.column(body).start;
             let mut x = [T::ZERO; 3];
@@ -250,15 +250,15 @@ impl<T: Real> Reduction<T> {
             }
             let mut a = [T::ZERO; 3];
             if let Parent::Body(p) = linkage.links[body].parent {
-                let up = self.accelerations[p];
-                a = [up[0] - placed.shift[1] * up[2], up[1] + placed.shift[0] * up[2], up[2]];
+                let (up, [dx, dy]) = (self.accelerations[p], hanging.shift());
+                a = [up[0] - dy * up[2], up[1] + dx * up[2], up[2]];
             }
             if task == Task::Accelerations {
-                a[0] += placed.bias[0];
-                a[1] += placed.bias[1];
+                a[0] += hanging.bias[0];
+                a[1] += hanging.bias[1];
             }
             for q in 0..nd {
-                let axis = &self.axes[turn.first + q];
+                let axis = self.axis(body, turn.first + q);
                 for i in 0..3 {
                     a[i] += axis[i] * x[q];
                 }

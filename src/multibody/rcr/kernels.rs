@@ -12,17 +12,17 @@ impl<T: Real> Reduction<T> {
         let turn = self.schedule.turn(body);
         let inertia = self.take_inertia(body);
         let mut force = self.take_force(task, body);
-        let s = self.axes[turn.first];
+        let s = self.axis(body, turn.first);
         let [i0, i1, i2, i3, i4, i5] = inertia;
         let u =
             [i0 * s[0] + i1 * s[1] + i3 * s[2], i1 * s[0] + i2 * s[1] + i4 * s[2], i3 * s[0] + i4 * s[1] + i5 * s[2]];
         let mass = s[0] * u[0] + s[1] * u[1] + s[2] * u[2];
-        let placed = &self.placed[body];
-        let [dx, dy] = placed.shift;
+        let hanging = &self.hanging[body];
+        let [dx, dy] = hanging.shift();
         let mut bias = [T::ZERO; 2];
         let mut own = T::ZERO;
         if task == Task::Accelerations {
-            bias = placed.bias;
+            bias = hanging.bias;
             own = self.torque[turn.first];
         }
         force[0] -= i0 * bias[0] + i1 * bias[1];
@@ -223,19 +223,20 @@ impl<T: Real> Reduction<T> {
         let step = self.schedule.steps[body];
         let turn = self.schedule.turn(body);
         let first = step.first as usize;
-        let placed = &self.placed[body];
-        let s = self.axes[first];
+        let hanging = &self.hanging[body];
+        let (s, shift) = (self.axis(body, first), hanging.shift());
         let mut x = self.base[first];
         for slot in 0..W {
             let other = &self.accelerations[self.schedule.fronts[turn.column + slot] as usize];
             let c = &self.coefficients[turn.coefficient_start + 3 * slot..turn.coefficient_start + 3 + 3 * slot];
             x -= c[0] * other[0] + c[1] * other[1] + c[2] * other[2];
         }
-        let mut a = if task == Task::Accelerations { [placed.bias[0], placed.bias[1], T::ZERO] } else { [T::ZERO; 3] };
+        let mut a =
+            if task == Task::Accelerations { [hanging.bias[0], hanging.bias[1], T::ZERO] } else { [T::ZERO; 3] };
         if let Some(parent) = step.parent() {
             let up = self.accelerations[parent];
-            a[0] += up[0] - placed.shift[1] * up[2];
-            a[1] += up[1] + placed.shift[0] * up[2];
+            a[0] += up[0] - shift[1] * up[2];
+            a[1] += up[1] + shift[0] * up[2];
             a[2] = up[2];
         }
         out[first] = x;

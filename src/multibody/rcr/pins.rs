@@ -55,14 +55,14 @@ impl<T: Real> Reduction<T> {
         // a pin has one coordinate, so those of a run follow each other
         let coordinates = steps[0].first as usize..steps[0].first as usize + steps.len();
         let (slopes, _) = self.coefficients[steps[0].coefficient_start()..].as_chunks_mut();
-        let zipped = (steps.iter().zip(&self.links[run.clone()]))
-            .zip(self.placed[run.clone()].iter().zip(&self.force[run]))
+        let zipped = (steps.iter().zip(self.links[run.clone()].iter().zip(&self.signs[run.clone()])))
+            .zip(self.hanging[run.clone()].iter().zip(&self.force[run]))
             .zip(self.base[coordinates.clone()].iter_mut().zip(slopes).zip(&self.torque[coordinates]));
-        for (((step, link), (placed, own)), ((to_base, to_slope), torque)) in zipped {
-            let [px, py] = placed.lever_parent;
-            let (lx, ly) = (px - placed.shift[0], py - placed.shift[1]);
+        for (((step, (link, sign)), (hanging, own)), ((to_base, to_slope), torque)) in zipped {
+            let ([px, py], [dx, dy]) = (hanging.lever_parent, hanging.shift());
+            let (lx, ly) = (px - dx, py - dy);
             let own = if FORCED { *own } else { [T::ZERO; 3] };
-            let [cx, cy] = placed.bias;
+            let [cx, cy] = hanging.bias;
             // own mass, and what came by way of memory
             let (mut kxx, mut kxy, mut kyy) = (link.mass, T::ZERO, link.mass);
             let (mut ux, mut uy) = (link.mass * ly, -(link.mass * lx));
@@ -98,7 +98,7 @@ impl<T: Real> Reduction<T> {
                 gx -= hxx * cx + hxy * cy;
                 gy -= hxy * cx + hyy * cy;
             }
-            let drive = if FORCED { link.sign * *torque } else { T::ZERO };
+            let drive = if FORCED { *sign * *torque } else { T::ZERO };
             let push = ((drive + moment) + (ly * fx - lx * fy)) + ((rx * gy - ry * gx) + handed.moment);
             let base = push * inverse;
             (ux, uy) = (ux + hx, uy + hy);
@@ -144,22 +144,22 @@ impl<T: Real> Reduction<T> {
         let steps = &self.schedule.steps[run.clone()];
         let coordinates = steps[0].first as usize..steps[0].first as usize + steps.len();
         let (slopes, _) = self.coefficients[steps[0].coefficient_start()..].as_chunks::<2>();
-        let zipped = (steps.iter().zip(&self.links[run.clone()]))
-            .zip(&self.placed[run])
+        let zipped = (steps.iter().zip(&self.signs[run.clone()]))
+            .zip(&self.hanging[run])
             .zip(self.base[coordinates.clone()].iter().zip(&slopes[..steps.len()]).zip(&mut out[coordinates]));
-        for (k, (((step, link), placed), ((base, slope), out))) in zipped.enumerate().rev() {
+        for (k, (((step, sign), hanging), ((base, slope), out))) in zipped.enumerate().rev() {
             let up = match step.parent() {
                 _ if step.hands_on => after,
                 Some(parent) => self.accelerations[parent],
                 None => [T::ZERO; 3],
             };
-            let [px, py] = placed.lever_parent;
-            let (lx, ly) = (px - placed.shift[0], py - placed.shift[1]);
+            let ([px, py], [dx, dy]) = (hanging.lever_parent, hanging.shift());
+            let (lx, ly) = (px - dx, py - dy);
             let mut a = [up[0] - py * up[2], up[1] + px * up[2]];
             let angular = (*base - slope[0] * a[0]) - slope[1] * a[1];
-            *out = link.sign * (angular - up[2]);
+            *out = *sign * (angular - up[2]);
             if FORCED {
-                a = [a[0] + placed.bias[0], a[1] + placed.bias[1]];
+                a = [a[0] + hanging.bias[0], a[1] + hanging.bias[1]];
             }
             after = [a[0] + ly * angular, a[1] - lx * angular, angular];
             self.accelerations[first + k] = after;

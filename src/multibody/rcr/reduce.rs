@@ -12,7 +12,7 @@
 
 use super::closure::ClosureData;
 use super::linkage::Linkage;
-use super::motion::{JointData, LinkData, Placed, place_all};
+use super::motion::{Arms, Hanging, JointData, LinkData, Placed, lane, place_all};
 use super::real::Real;
 use super::schedule::{Kind, NONE, Schedule, Turn};
 
@@ -45,11 +45,16 @@ impl<T: Real> Node<T> {
 pub struct Reduction<T> {
     pub(super) schedule: Schedule,
     pub(super) links: Vec<LinkData<T>>,
+    arms: Vec<Arms<T>>,
+    /// See [`super::Link::sign`].
+    pub(super) signs: Vec<T>,
     pub(super) joints: Vec<JointData<T>>,
     pub(super) closures: Vec<ClosureData<T>>,
     pub(super) units: Vec<T>,
     pub(super) placed: Vec<Placed<T>>,
-    pub(super) axes: Vec<[T; 3]>,
+    pub(super) hanging: Vec<Hanging<T>>,
+    /// Axes of the coordinates of joints that are no pins.
+    axes: Vec<[T; 3]>,
     /// Wrench on each body: forces along x and y and moment about the centre of mass [N, N·m]. Set before reducing.
     pub force: Vec<[T; 3]>,
     /// Force on each coordinate [N or N·m]. Set before reducing.
@@ -84,12 +89,8 @@ impl<T: Real> Reduction<T> {
         let linkage = variants[0];
         let schedule = Schedule::new(linkage);
         let count = linkage.links.len();
-        let links: Vec<LinkData<T>> =
-            (0..count).map(|b| LinkData::new(&variants.iter().map(|v| &v.links[b]).collect::<Vec<_>>())).collect();
-        let joints = (0..count)
-            .filter(|&b| !linkage.links[b].pin)
-            .map(|b| JointData::new(&variants.iter().map(|v| &v.links[b]).collect::<Vec<_>>()))
-            .collect();
+        let of = |b: usize| variants.iter().map(|v| &v.links[b]).collect::<Vec<_>>();
+        let joints: Vec<_> = (0..count).filter(|&b| !linkage.links[b].pin).map(|b| JointData::new(&of(b))).collect();
         let closures = (0..linkage.closures.len())
             .map(|c| {
                 let of: Vec<_> =
@@ -119,12 +120,15 @@ impl<T: Real> Reduction<T> {
             r: vec![T::ZERO; most(&|t| t.rows) * (size + 1)],
         };
         Self {
-            links,
-            joints,
+            links: (0..count).map(|b| LinkData::new(&of(b))).collect(),
+            arms: (0..count).map(|b| Arms::new(&of(b))).collect(),
+            signs: (0..count).map(|b| lane(&of(b), &|link| link.sign)).collect(),
             closures,
             units,
             placed: vec![Placed::REST; count],
-            axes: vec![[T::ZERO; 3]; linkage.coordinates],
+            hanging: vec![Hanging::REST; count],
+            axes: vec![[T::ZERO; 3]; if joints.is_empty() { 0 } else { linkage.coordinates }],
+            joints,
             force: vec![[T::ZERO; 3]; count],
             torque: vec![T::ZERO; linkage.coordinates],
             nodes: vec![Node::CLEAN; schedule.node_count],
@@ -148,7 +152,18 @@ impl<T: Real> Reduction<T> {
     /// Places all bodies for coordinates `q` and rates `v`.
     #[inline(always)]
     pub fn place(&mut self, linkage: &Linkage, q: &[T], v: &[T]) {
-        place_all(linkage, &self.schedule.steps, (&self.links, &self.joints), q, v, &mut self.placed, &mut self.axes);
+        let (steps, given) = (&self.schedule.steps, (&self.arms[..], &self.signs[..], &self.joints[..]));
+        place_all(linkage, steps, given, q, v, &mut self.placed, (&mut self.hanging, &mut self.axes));
+    }
+
+    /// Axis of a coordinate of `body`.
+    #[inline(always)]
+    pub(super) fn axis(&self, body: usize, coordinate: usize) -> [T; 3] {
+        if self.schedule.steps[body].pin {
+            self.hanging[body].pin_axis(self.signs[body])
+        } else {
+            self.axes[coordinate]
+        }
     }
 
     /// Displacement and rotation of a body from its drawn place [m, m, rad].

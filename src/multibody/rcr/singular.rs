@@ -116,12 +116,12 @@ impl Reduction<f64> {
         let hard = shorten(hard, 3 + 3 * w, &columns, task.zero(), report);
         let heavy = shorten(heavy, 3 + 3 * w, &columns, 0.0, report);
         report.heavy = report.heavy.max(heavy.len());
-        let placed = self.placed[body];
-        let bias = if task == Task::Accelerations { placed.bias } else { [0.0; 2] };
+        let hanging = self.hanging[body];
+        let bias = if task == Task::Accelerations { hanging.bias } else { [0.0; 2] };
         // coordinates in units of length
         let units: Vec<f64> = self.units[turn.first..turn.first + nd].to_vec();
-        let axes: Vec<[f64; 3]> = (0..nd).map(|q| self.axes[turn.first + q].map(|x| x / units[q])).collect();
-        let [dx, dy] = placed.shift;
+        let axes: Vec<[f64; 3]> = (0..nd).map(|q| self.axis(body, turn.first + q).map(|x| x / units[q])).collect();
+        let [dx, dy] = hanging.shift();
         let local = |row: &Row| -> Row {
             let own = [row.entries[0], row.entries[1], row.entries[2]];
             let mut entries = vec![0.0; k + 1];
@@ -270,21 +270,22 @@ impl Reduction<f64> {
             }
             x[step.coordinate] = value / step.row[step.coordinate];
         }
-        let placed = &self.placed[body];
+        let hanging = &self.hanging[body];
         let mut a = [0.0; 3];
         if let Parent::Body(p) = linkage.links[body].parent {
-            let up = self.accelerations[p];
-            a = [up[0] - placed.shift[1] * up[2], up[1] + placed.shift[0] * up[2], up[2]];
+            let (up, [dx, dy]) = (self.accelerations[p], hanging.shift());
+            a = [up[0] - dy * up[2], up[1] + dx * up[2], up[2]];
         }
         if task == Task::Accelerations {
-            a[0] += placed.bias[0];
-            a[1] += placed.bias[1];
+            a[0] += hanging.bias[0];
+            a[1] += hanging.bias[1];
         }
         for q in 0..nd {
             let value = x[q] / self.units[turn.first + q];
             out[turn.first + q] = value;
+            let axis = self.axis(body, turn.first + q);
             for i in 0..3 {
-                a[i] += self.axes[turn.first + q][i] * value;
+                a[i] += axis[i] * value;
             }
         }
         self.accelerations[body] = a;
