@@ -271,44 +271,46 @@ pub(super) fn place_all<T: Real>(
     while end > 0 {
         let start = end.saturating_sub(BLOCK);
         let mut halves = [[T::ZERO; BLOCK]; 2];
-        for body in (start..end).rev() {
-            let step = &steps[body];
+        let block = start..end;
+        let (some, signs) = (&steps[block.clone()], &signs[block.clone()]);
+        for (k, (step, sign)) in some.iter().zip(signs).enumerate().rev() {
             let (mut theta, mut omega) = match step.parent() {
                 Some(p) => (placed[p].pose[2], placed[p].rate[2]),
                 None => (T::ZERO, T::ZERO),
             };
             if let Some(k) = step.turning() {
-                theta += signs[body] * q[k];
-                omega += signs[body] * v[k];
+                theta += *sign * q[k];
+                omega += *sign * v[k];
             }
-            (placed[body].pose[2], placed[body].rate[2]) = (theta, omega);
-            halves[0][body - start] = T::splat(0.5) * theta;
+            let out = &mut placed[start + k];
+            (out.pose[2], out.rate[2]) = (theta, omega);
+            halves[0][k] = T::splat(0.5) * theta;
         }
         let [sin, cos] = &mut halves;
         T::sin_cos_each(&mut sin[..end - start], &mut cos[..end - start]);
-        for body in (start..end).rev() {
-            let step = &steps[body];
+        let given = some.iter().zip(signs).zip(arms[block.clone()].iter().zip(&mut hanging[block]));
+        for (k, ((step, sign), (arms, hanging))) in given.enumerate().rev() {
+            let body = start + k;
             let (before, after) = placed.split_at_mut(body + 1);
             let out = &mut before[body];
-            out.half = [halves[0][body - start], halves[1][body - start]];
+            out.half = [halves[0][k], halves[1][k]];
             let parent = match step.parent() {
                 Some(p) => &after[p - body - 1],
                 None => &rest,
             };
-            let first = step.first as usize;
             if step.pin {
-                hanging[body] = place_pin(&arms[body], parent, out);
+                *hanging = place_pin(arms, parent, out);
                 continue;
             }
             let link = &linkage.links[body];
+            let first = step.first as usize;
             let range = first..first + link.freedom();
             let (q, v, axes) = (&q[range.clone()], &v[range.clone()], &mut axes[range]);
-            hanging[body] = if link.parent == Parent::Free {
+            *hanging = if link.parent == Parent::Free {
                 place_free(out, q, v, axes);
                 Hanging::REST
             } else {
-                let joint = &joints[step.joint as usize];
-                place_joint(link, (&arms[body], signs[body], joint), parent, out, q, v, axes)
+                place_joint(link, (arms, *sign, &joints[step.joint as usize]), parent, out, q, v, axes)
             };
         }
         end = start;
