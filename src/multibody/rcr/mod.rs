@@ -8,6 +8,7 @@
 //! | `motion` | outward: poses, rates, joint axes, velocity parts |
 //! | `closure` | the rows of loop closures and their velocity parts |
 //! | `schedule` | who meets whom: fronts, rows passing through, places in the arenas |
+//! | `turn` | one body's turn, in few bytes |
 //! | `slots` | places that serve one user after another |
 //! | `front` | elimination of one body's coordinates, with a loop's row or without |
 //! | [`reduce`] | the recursion |
@@ -40,6 +41,7 @@ pub mod rotary;
 mod schedule;
 mod singular;
 mod slots;
+mod turn;
 
 pub use linkage::{Closure, Link, Linkage, Parent};
 pub use real::{Lanes, Real};

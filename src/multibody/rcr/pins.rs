@@ -54,7 +54,7 @@ impl<T: Real> Reduction<T> {
         let steps = &self.schedule.steps[run.clone()];
         // a pin has one coordinate, so those of a run follow each other
         let coordinates = steps[0].first as usize..steps[0].first as usize + steps.len();
-        let (slopes, _) = self.coefficients[steps[0].coefficient_start()..].as_chunks_mut();
+        let (slopes, _) = self.coefficients[steps[0].coefficient_start as usize..].as_chunks_mut();
         let zipped = (steps.iter().zip(self.links[run.clone()].iter().zip(&self.signs[run.clone()])))
             .zip(self.hanging[run.clone()].iter().zip(&self.force[run]))
             .zip(self.base[coordinates.clone()].iter_mut().zip(slopes).zip(&self.torque[coordinates]));
@@ -118,7 +118,7 @@ impl<T: Real> Reduction<T> {
             if !step.hands_on {
                 handed = Handed::NOTHING;
                 if step.parent().is_some() {
-                    left.give(&mut self.nodes[self.schedule.nodes[step.column()] as usize]);
+                    left.give(&mut self.nodes[self.schedule.nodes[step.column as usize] as usize]);
                 }
             }
         }
@@ -143,7 +143,7 @@ impl<T: Real> Reduction<T> {
         let first = run.start;
         let steps = &self.schedule.steps[run.clone()];
         let coordinates = steps[0].first as usize..steps[0].first as usize + steps.len();
-        let (slopes, _) = self.coefficients[steps[0].coefficient_start()..].as_chunks::<2>();
+        let (slopes, _) = self.coefficients[steps[0].coefficient_start as usize..].as_chunks::<2>();
         let zipped = (steps.iter().zip(&self.signs[run.clone()]))
             .zip(&self.hanging[run])
             .zip(self.base[coordinates.clone()].iter().zip(&slopes[..steps.len()]).zip(&mut out[coordinates]));

@@ -5,15 +5,17 @@
 //! joint coordinate takes one row with it (a dependent coordinate, in the words of the reduction), and the rest goes on to
 //! the next body that it touches. A row that reaches no body any more is redundant by count.
 //!
-//! It is read at every reduction, so its indices are 32 bits wide.
+//! It is read at every reduction, so its indices are 32 bits wide (`turn`).
 
 use super::linkage::{Closure, Linkage, Parent};
 use super::slots::Slots;
+pub(super) use super::turn::Turn;
+use super::turn::{Packed, narrow, wide};
 use crate::multibody::BodyId;
 
 /// No place.
 pub(super) const NONE: usize = usize::MAX;
-/// Pins whose turns follow each other without a look at what comes next.
+/// Pins that are looked for at a time.
 const PIECE: usize = 256;
 
 /// Which code a body's turn takes.
@@ -44,9 +46,9 @@ pub(super) struct Step {
     /// Its last coordinate turns it.
     turns: bool,
     /// See [`Turn::coupled`].
-    coupled: bool,
+    pub(super) coupled: bool,
     /// See [`Turn::freedom`].
-    freedom: u8,
+    pub(super) freedom: u8,
     /// First coordinate.
     pub(super) first: u32,
     /// Its place among the joints that are no pins.
@@ -54,9 +56,9 @@ pub(super) struct Step {
     /// Where what is handed to it gathers.
     pub(super) node: u32,
     /// See [`Turn::column`].
-    column: u32,
+    pub(super) column: u32,
     /// See [`Turn::coefficient_start`].
-    coefficient_start: u32,
+    pub(super) coefficient_start: u32,
 }
 
 impl Step {
@@ -71,63 +73,6 @@ impl Step {
     pub(super) fn turning(&self) -> Option<usize> {
         self.turns.then_some((self.first + u32::from(self.freedom)) as usize - 1)
     }
-
-    /// Where a pin's front is listed.
-    #[inline(always)]
-    pub(super) fn column(&self) -> usize {
-        self.column as usize
-    }
-
-    /// Start of its coefficients.
-    #[inline(always)]
-    pub(super) fn coefficient_start(&self) -> usize {
-        self.coefficient_start as usize
-    }
-}
-
-/// What a body's turn needs besides its step; the meanings are those of [`Turn`].
-#[derive(Debug, Clone, Copy)]
-struct Packed {
-    front: u32,
-    rows: u32,
-    parent: u32,
-    targets: u32,
-    row_start: u32,
-    next: u32,
-    next_row: u32,
-    map_start: u32,
-}
-
-/// One body's turn.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Turn {
-    /// Coordinates of its joint.
-    pub(super) freedom: usize,
-    /// Bodies of its front: rows of its column in the pattern.
-    pub(super) front: usize,
-    /// Constraint rows that reach it.
-    pub(super) rows: usize,
-    /// Place of its parent in the front; none: ground or free.
-    pub(super) parent: usize,
-    /// A loop that was closed before couples it to its front.
-    pub(super) coupled: bool,
-    /// Start of its front among the schedule's fronts, nodes and blocks.
-    pub(super) column: usize,
-    /// Start of the couplings that its front's update changes.
-    pub(super) targets: usize,
-    /// First coordinate.
-    pub(super) first: usize,
-    /// Start of its rows in the row arena; each row has 3 + 3·front + 1 entries.
-    pub(super) row_start: usize,
-    /// Start of its coefficients in the coefficient arena: two of a pin, 3·front of any other coordinate that is alone,
-    /// `freedom` rows of freedom + 3·front entries where [`Kind::Any`] takes them out.
-    pub(super) coefficient_start: usize,
-    /// Start of its row transformation in the transformation arena.
-    pub(super) next: usize,
-    /// Where the rows that are left go within the next body's rows.
-    pub(super) next_row: usize,
-    /// Start of the map from this front's bodies to places at the next body.
-    pub(super) map_start: usize,
 }
 
 /// Where the rows of a closure enter.
@@ -317,22 +262,7 @@ impl Schedule {
     /// One body's turn.
     #[inline(always)]
     pub(super) fn turn(&self, body: usize) -> Turn {
-        let (step, packed) = (&self.steps[body], &self.turns[body]);
-        Turn {
-            freedom: step.freedom as usize,
-            front: packed.front as usize,
-            rows: packed.rows as usize,
-            parent: wide(packed.parent),
-            coupled: step.coupled,
-            column: step.column as usize,
-            targets: packed.targets as usize,
-            first: step.first as usize,
-            row_start: packed.row_start as usize,
-            coefficient_start: step.coefficient_start as usize,
-            next: wide(packed.next),
-            next_row: packed.next_row as usize,
-            map_start: packed.map_start as usize,
-        }
+        self.turns[body].unpack(&self.steps[body])
     }
 
     /// The turns of all bodies.
@@ -360,31 +290,20 @@ impl Schedule {
         }
     }
 
-    /// Pins of one run from `first` on, some of them: those that are read twice stay in the caches.
+    /// Pins of one run from `first` on, at most [`PIECE`]: what is read here is still near when their turn comes.
     #[inline(always)]
     pub(super) fn run(&self, first: usize) -> std::ops::Range<usize> {
         let steps = &self.steps[first..self.steps.len().min(first + PIECE)];
         first..first + steps.iter().position(|s| s.kind != Kind::Pin).unwrap_or(steps.len())
     }
 
-    /// Pins of one run up to before `end`, some of them.
+    /// Pins of one run that end before `end`, at most [`PIECE`].
     #[inline(always)]
     pub(super) fn run_before(&self, end: usize) -> std::ops::Range<usize> {
         let start = end.saturating_sub(PIECE);
         let first = self.steps[start..end].iter().rposition(|s| s.kind != Kind::Pin);
         first.map_or(start, |k| start + k + 1)..end
     }
-}
-
-/// An index or count of the schedule in 32 bits; [`NONE`] stays none.
-fn narrow(x: usize) -> u32 {
-    debug_assert!(x == NONE || x < u32::MAX as usize, "more than four thousand million entries");
-    x as u32
-}
-
-#[inline(always)]
-fn wide(x: u32) -> usize {
-    if x == u32::MAX { NONE } else { x as usize }
 }
 
 fn slot_of(pattern: &crate::multibody::Pattern, body: usize, other: usize) -> usize {
