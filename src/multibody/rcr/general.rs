@@ -4,6 +4,7 @@
 //! coordinates out, and what is left goes to the bodies of the front. [`super::kernels`] does the same for small fronts.
 
 use super::front::Front;
+use super::implicit::Added;
 use super::linkage::{Linkage, Parent};
 use super::real::Real;
 use super::reduce::{Reduction, Scratch, Task};
@@ -11,37 +12,37 @@ use super::schedule::{NONE, Turn};
 
 impl<T: Real> Reduction<T> {
     #[inline(never)]
-    pub(super) fn any_inward(&mut self, linkage: &Linkage, task: Task, body: usize) {
+    pub(super) fn any_inward(&mut self, task: Task, body: usize) {
         let mut scratch = Scratch {
             m: std::mem::take(&mut self.front.m),
             g: std::mem::take(&mut self.front.g),
             r: std::mem::take(&mut self.front.r),
         };
-        self.take_turn(linkage, task, body, &mut scratch.m, &mut scratch.g, &mut scratch.r);
+        self.take_turn(task, body, &mut scratch.m, &mut scratch.g, &mut scratch.r);
         self.front = scratch;
     }
 
     /// Assembles a body's front, takes its coordinates out, and hands the rest on.
     #[inline(always)]
     #[allow(clippy::too_many_arguments)]
-    fn take_turn(&mut self, linkage: &Linkage, task: Task, body: usize, m: &mut [T], g: &mut [T], r: &mut [T]) {
-        let turn = self.schedule.turns[body];
+    fn take_turn(&mut self, task: Task, body: usize, m: &mut [T], g: &mut [T], r: &mut [T]) {
+        let turn = self.schedule.turn(body);
         let (nd, w, h) = (turn.freedom, turn.front, turn.rows);
         let k = nd + 3 * w;
         // several coordinates are combined, so they get one unit first
         let (mut s, mut torque, mut unit) = ([[T::ZERO; 3]; 3], [T::ZERO; 3], [T::ONE; 3]);
         for q in 0..nd {
-            let (axis, lever) = (self.axes[turn.first + q], self.units[turn.first + q]);
+            let (axis, lever) = (self.axis(body, turn.first + q), self.units[turn.first + q]);
             (s[q], torque[q], unit[q]) = (axis, self.torque[turn.first + q], lever);
             if nd > 1 {
                 let inverse = T::ONE / lever;
                 (s[q], torque[q], unit[q]) = (axis.map(|x| x * inverse), torque[q] * inverse, T::ONE);
             }
         }
-        self.assemble(linkage, task, body, turn, &s, &torque, m, g);
+        self.assemble(task, body, turn, &s, &torque, m, g);
         self.add_joint_inertia(body, turn, nd > 1, m);
-        let [dx, dy] = self.placed[body].shift;
-        let bias = if task == Task::Accelerations { self.placed[body].bias } else { [T::ZERO; 2] };
+        let [dx, dy] = self.hanging[body].shift();
+        let bias = if task == Task::Accelerations { self.hanging[body].bias } else { [T::ZERO; 2] };
         let source = 3 + 3 * w + 1;
         for l in 0..h {
             let row = &self.rows[turn.row_start + l * source..turn.row_start + (l + 1) * source];
@@ -69,15 +70,15 @@ impl<T: Real> Reduction<T> {
         if nd > 1 {
             self.turned[body] = turned;
         }
-        self.hand_on(linkage, body, turn, m, g);
+        self.hand_on(turn, m, g);
         if turn.next != NONE {
-            let next = self.schedule.turns[turn.next];
+            let next = self.schedule.turn(turn.next);
             let width = 3 + 3 * next.front + 1;
             for (l, from) in (nd.min(h)..h).enumerate() {
                 let to = next.row_start + (turn.next_row + l) * width;
                 self.rows[to..to + width].fill(T::ZERO);
                 for slot in 0..w {
-                    let place = self.schedule.maps[turn.map_start + slot];
+                    let place = self.schedule.map(turn.map_start + slot);
                     if place != NONE {
                         for i in 0..3 {
                             self.rows[to + 3 * place + i] = r[from * (k + 1) + nd + 3 * slot + i];
@@ -95,7 +96,6 @@ impl<T: Real> Reduction<T> {
     #[allow(clippy::too_many_arguments)]
     pub(super) fn assemble(
         &mut self,
-        linkage: &Linkage,
         task: Task,
         body: usize,
         turn: Turn,
@@ -105,12 +105,12 @@ impl<T: Real> Reduction<T> {
         g: &mut [T],
     ) {
         let (nd, w) = (turn.freedom, turn.front);
-        let (k, start) = (nd + 3 * w, linkage.pattern.column(body).start);
+        let k = nd + 3 * w;
         let [a, b, c, d, e, f] = self.take_inertia(body);
         let own = [[a, b, d], [b, c, e], [d, e, f]];
         let mut force = self.take_force(task, body);
-        let placed = &self.placed[body];
-        let bias = if task == Task::Accelerations { placed.bias } else { [T::ZERO; 2] };
+        let hanging = &self.hanging[body];
+        let bias = if task == Task::Accelerations { hanging.bias } else { [T::ZERO; 2] };
         for i in 0..3 {
             force[i] -= own[i][0] * bias[0] + own[i][1] * bias[1];
         }
@@ -127,9 +127,9 @@ impl<T: Real> Reduction<T> {
                 m[q * k + p] = s[p][0] * hs[q][0] + s[p][1] * hs[q][1] + s[p][2] * hs[q][2];
             }
         }
-        let [dx, dy] = placed.shift;
+        let [dx, dy] = hanging.shift();
         for slot in 0..w {
-            let block = std::mem::replace(&mut self.coupling[start + slot], [T::ZERO; 9]);
+            let block = self.take_coupling(turn.column + slot);
             for i in 0..3 {
                 let row = [block[3 * i], block[3 * i + 1], block[3 * i + 2]];
                 let at = nd + 3 * slot + i;
@@ -185,7 +185,7 @@ impl<T: Real> Reduction<T> {
     /// Adds what an implicit step adds to the inertia of a body's joint; `scaled`: to coordinates in units of length.
     #[inline(always)]
     pub(super) fn add_joint_inertia(&self, body: usize, turn: Turn, scaled: bool, m: &mut [T]) {
-        let Some(added) = self.joint_inertia.get(body) else { return };
+        let Some(Added { joint: added, .. }) = self.added.get(body) else { return };
         let (nd, k) = (turn.freedom, turn.freedom + 3 * turn.front);
         let mut at = 0;
         for i in 0..nd {
@@ -202,13 +202,13 @@ impl<T: Real> Reduction<T> {
 
     /// Adds what is left of a front to the bodies in it.
     #[inline(always)]
-    pub(super) fn hand_on(&mut self, linkage: &Linkage, body: usize, turn: Turn, m: &[T], g: &[T]) {
+    pub(super) fn hand_on(&mut self, turn: Turn, m: &[T], g: &[T]) {
         let (nd, w) = (turn.freedom, turn.front);
-        let (k, start) = (nd + 3 * w, linkage.pattern.column(body).start);
-        let mut target = linkage.pattern.targets(body).iter();
+        let k = nd + 3 * w;
+        let mut target = self.schedule.targets[turn.targets..].iter();
         for row in 0..w {
             let at = nd + 3 * row;
-            let to = linkage.pattern.row(start + row);
+            let to = self.schedule.nodes[turn.column + row] as usize;
             for column in 0..row {
                 let from = nd + 3 * column;
                 if let Some(&block) = target.next() {
@@ -237,8 +237,8 @@ impl<T: Real> Reduction<T> {
     /// Acceleration of the body, from those of its front.
     pub(super) fn any_outward(&mut self, linkage: &Linkage, task: Task, body: usize, out: &mut [T]) {
         {
-            let turn = self.schedule.turns[body];
-            let placed = &self.placed[body];
+            let turn = self.schedule.turn(body);
+            let hanging = &self.hanging[body];
             let (nd, k) = (turn.freedom, turn.freedom + 3 * turn.front);
             let start = linkage.pattern.column(body).start;
             let mut x = [T::ZERO; 3];
@@ -269,15 +269,15 @@ impl<T: Real> Reduction<T> {
             }
             let mut a = [T::ZERO; 3];
             if let Parent::Body(p) = linkage.links[body].parent {
-                let up = self.accelerations[p];
-                a = [up[0] - placed.shift[1] * up[2], up[1] + placed.shift[0] * up[2], up[2]];
+                let (up, [dx, dy]) = (self.accelerations[p], hanging.shift());
+                a = [up[0] - dy * up[2], up[1] + dx * up[2], up[2]];
             }
             if task == Task::Accelerations {
-                a[0] += placed.bias[0];
-                a[1] += placed.bias[1];
+                a[0] += hanging.bias[0];
+                a[1] += hanging.bias[1];
             }
             for q in 0..nd {
-                let axis = &self.axes[turn.first + q];
+                let axis = self.axis(body, turn.first + q);
                 for i in 0..3 {
                     a[i] += axis[i] * x[q];
                 }

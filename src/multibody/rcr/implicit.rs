@@ -15,9 +15,10 @@
 
 use super::linkage::Linkage;
 use super::reduce::{Reduction, Task};
-use super::schedule::Kind;
+use super::schedule::Schedule;
 use super::singular::Singularity;
 use crate::multibody::BlockMatrix;
+use nalgebra::Matrix3;
 
 /// What an implicit step adds to the inertia: γ·C + β·K.
 #[derive(Debug, Clone)]
@@ -26,6 +27,15 @@ pub struct AddedInertia {
     pub joints: Vec<[f64; 6]>,
     /// Of bodies and pairs of bodies.
     pub bodies: BlockMatrix<f64, 3>,
+}
+
+/// What the turn of one body finds of it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Added<T> {
+    /// Over the coordinates of its joint, the lower triangle by rows.
+    pub(super) joint: [T; 6],
+    /// On the body: xx, xy, yy, xθ, yθ, θθ.
+    pub(super) body: [T; 6],
 }
 
 impl AddedInertia {
@@ -58,32 +68,27 @@ impl AddedInertia {
 impl Reduction<f64> {
     /// Storage for [`Reduction::solve_implicit`] on `linkage`.
     pub fn implicit(linkage: &Linkage) -> Self {
-        let mut reduction = Self::new(&[linkage]);
-        for (step, turn) in reduction.schedule.steps.iter_mut().zip(&mut reduction.schedule.turns) {
-            if step.kind == Kind::Pin {
-                step.kind = if turn.front == 1 { Kind::One(0) } else { Kind::Any };
-            }
-            // springs, gaps and dampers may couple any pair of the pattern
-            turn.coupled = true;
-        }
-        reduction.joint_inertia.reserve_exact(linkage.links.len());
+        // springs, gaps and dampers may couple any pair of the pattern
+        let mut reduction = Self::with_schedule(&[linkage], Schedule::with_couplings(linkage, true));
+        reduction.added.reserve_exact(linkage.links.len());
+        reduction.added_coupling.reserve_exact(linkage.pattern.off_blocks());
         reduction
     }
 
     /// Accelerations of the bodies when the coordinates have the accelerations `a`, at the placed configuration.
     pub fn accelerations_of(&self, linkage: &Linkage, a: &[f64], out: &mut [[f64; 3]]) {
         for (body, link) in linkage.links.iter().enumerate().rev() {
-            let placed = &self.placed[body];
-            let mut sum = [placed.bias[0], placed.bias[1], 0.0];
+            let hanging = &self.hanging[body];
+            let ([dx, dy], [cx, cy]) = (hanging.shift(), hanging.bias);
+            let mut sum = [cx, cy, 0.0];
             if let Some(parent) = self.schedule.steps[body].parent() {
                 let up = out[parent];
-                sum[0] += up[0] - placed.shift[1] * up[2];
-                sum[1] += up[1] + placed.shift[0] * up[2];
-                sum[2] += up[2];
+                sum = [cx + (up[0] - dy * up[2]), cy + (up[1] + dx * up[2]), up[2]];
             }
             for q in link.first..link.first + link.freedom() {
+                let axis = self.axis(body, q);
                 for i in 0..3 {
-                    sum[i] += self.axes[q][i] * a[q];
+                    sum[i] += axis[i] * a[q];
                 }
             }
             out[body] = sum;
@@ -132,27 +137,21 @@ impl Reduction<f64> {
                 }
             }
         }
-        self.joint_inertia.extend_from_slice(&added.joints);
-        self.seed(added);
-        let met = self.solve_with(linkage, Task::Accelerations, out, |reduction| reduction.seed(added));
-        self.joint_inertia.clear();
+        self.lay(added);
+        let met = self.solve(linkage, Task::Accelerations, out);
+        self.added.clear();
+        self.added_coupling.clear();
         met
     }
 
-    /// Lays what is added where bodies and couplings gather.
-    fn seed(&mut self, added: &AddedInertia) {
-        for (node, block) in self.nodes.iter_mut().zip(&added.bodies.diagonal) {
-            let lower = [block[(0, 0)], block[(1, 0)], block[(1, 1)], block[(2, 0)], block[(2, 1)], block[(2, 2)]];
-            for (sum, x) in node.inertia.iter_mut().zip(lower) {
-                *sum += x;
-            }
-        }
-        for (coupling, block) in self.coupling.iter_mut().zip(&added.bodies.below) {
-            for i in 0..3 {
-                for j in 0..3 {
-                    coupling[3 * i + j] += block[(i, j)];
-                }
-            }
-        }
+    /// Lays what is added where the turns find it.
+    fn lay(&mut self, added: &AddedInertia) {
+        let own = added.joints.iter().zip(&added.bodies.diagonal);
+        self.added.extend(own.map(|(&joint, block)| Added {
+            joint,
+            body: [block[(0, 0)], block[(1, 0)], block[(1, 1)], block[(2, 0)], block[(2, 1)], block[(2, 2)]],
+        }));
+        let rows = |block: &Matrix3<f64>| std::array::from_fn(|k| block[(k / 3, k % 3)]);
+        self.added_coupling.extend(added.bodies.below.iter().map(rows));
     }
 }

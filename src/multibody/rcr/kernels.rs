@@ -9,23 +9,23 @@ impl<T: Real> Reduction<T> {
     /// A body with one coordinate, a front of `W` bodies and `H` constraint rows.
     #[inline(always)]
     pub(super) fn one_inward<const W: usize, const H: usize>(&mut self, task: Task, body: usize) {
-        let turn = self.schedule.turns[body];
+        let turn = self.schedule.turn(body);
         let inertia = self.take_inertia(body);
         let mut force = self.take_force(task, body);
-        let s = self.axes[turn.first];
+        let s = self.axis(body, turn.first);
         let [i0, i1, i2, i3, i4, i5] = inertia;
         let u =
             [i0 * s[0] + i1 * s[1] + i3 * s[2], i1 * s[0] + i2 * s[1] + i4 * s[2], i3 * s[0] + i4 * s[1] + i5 * s[2]];
         let mut mass = s[0] * u[0] + s[1] * u[1] + s[2] * u[2];
-        if let Some(added) = self.joint_inertia.get(body) {
-            mass += added[0];
+        if let Some(added) = self.added.get(body) {
+            mass += added.joint[0];
         }
-        let placed = &self.placed[body];
-        let [dx, dy] = placed.shift;
+        let hanging = &self.hanging[body];
+        let [dx, dy] = hanging.shift();
         let mut bias = [T::ZERO; 2];
         let mut own = T::ZERO;
         if task == Task::Accelerations {
-            bias = placed.bias;
+            bias = hanging.bias;
             own = self.torque[turn.first];
         }
         force[0] -= i0 * bias[0] + i1 * bias[1];
@@ -36,7 +36,7 @@ impl<T: Real> Reduction<T> {
         let (mut c, mut g, mut m) = ([[T::ZERO; 3]; W], [[T::ZERO; 3]; W], [[[T::ZERO; 9]; W]; W]);
         if turn.coupled {
             for slot in 0..W {
-                let block = std::mem::replace(&mut self.coupling[turn.column + slot], [T::ZERO; 9]);
+                let block = self.take_coupling(turn.column + slot);
                 for i in 0..3 {
                     let row = [block[3 * i], block[3 * i + 1], block[3 * i + 2]];
                     c[slot][i] = row[0] * s[0] + row[1] * s[1] + row[2] * s[2];
@@ -180,11 +180,11 @@ impl<T: Real> Reduction<T> {
         let at = turn.coefficient_start;
         for slot in 0..W {
             for i in 0..3 {
-                self.coefficients[at + 1 + 3 * slot + i] = slope[slot][i];
+                self.coefficients[at + 3 * slot + i] = slope[slot][i];
             }
         }
         for r in 0..W {
-            let to = self.schedule.fronts[turn.column + r] as usize;
+            let to = self.schedule.nodes[turn.column + r] as usize;
             let block = &m[r][r];
             let inertia = &mut self.nodes[to].inertia;
             for (x, k) in inertia.iter_mut().zip([0, 3, 4, 6, 7, 8]) {
@@ -202,14 +202,14 @@ impl<T: Real> Reduction<T> {
             }
         }
         if H > 1 && turn.next != NONE {
-            let next = &self.schedule.turns[turn.next];
+            let next = self.schedule.turn(turn.next);
             let width = 3 * next.front + 4;
             for l in 1..H {
                 let to = next.row_start + (turn.next_row + l - 1) * width;
                 let row = &mut self.rows[to..to + width];
                 row.fill(T::ZERO);
                 for slot in 0..W {
-                    let place = self.schedule.maps[turn.map_start + slot];
+                    let place = self.schedule.map(turn.map_start + slot);
                     if place != NONE {
                         row[3 * place..3 * place + 3].copy_from_slice(&on[l][slot]);
                     }
@@ -223,21 +223,22 @@ impl<T: Real> Reduction<T> {
     #[inline(always)]
     pub(super) fn one_outward<const W: usize>(&mut self, task: Task, body: usize, out: &mut [T]) {
         let step = self.schedule.steps[body];
-        let turn = &self.schedule.turns[body];
+        let turn = self.schedule.turn(body);
         let first = step.first as usize;
-        let placed = &self.placed[body];
-        let s = self.axes[first];
+        let hanging = &self.hanging[body];
+        let (s, shift) = (self.axis(body, first), hanging.shift());
         let mut x = self.base[first];
         for slot in 0..W {
             let other = &self.accelerations[self.schedule.fronts[turn.column + slot] as usize];
-            let c = &self.coefficients[turn.coefficient_start + 1 + 3 * slot..turn.coefficient_start + 4 + 3 * slot];
+            let c = &self.coefficients[turn.coefficient_start + 3 * slot..turn.coefficient_start + 3 + 3 * slot];
             x -= c[0] * other[0] + c[1] * other[1] + c[2] * other[2];
         }
-        let mut a = if task == Task::Accelerations { [placed.bias[0], placed.bias[1], T::ZERO] } else { [T::ZERO; 3] };
+        let mut a =
+            if task == Task::Accelerations { [hanging.bias[0], hanging.bias[1], T::ZERO] } else { [T::ZERO; 3] };
         if let Some(parent) = step.parent() {
             let up = self.accelerations[parent];
-            a[0] += up[0] - placed.shift[1] * up[2];
-            a[1] += up[1] + placed.shift[0] * up[2];
+            a[0] += up[0] - shift[1] * up[2];
+            a[1] += up[1] + shift[0] * up[2];
             a[2] = up[2];
         }
         out[first] = x;

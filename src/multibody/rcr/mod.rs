@@ -8,6 +8,8 @@
 //! | `motion` | outward: poses, rates, joint axes, velocity parts |
 //! | `closure` | the rows of loop closures and their velocity parts |
 //! | `schedule` | who meets whom: fronts, rows passing through, places in the arenas |
+//! | `turn` | one body's turn, in few bytes |
+//! | `slots` | places that serve one user after another |
 //! | `front` | elimination of one body's coordinates, with a loop's row or without |
 //! | [`reduce`] | the recursion |
 //! | `project` | positions and rates that fulfil the loops |
@@ -40,6 +42,8 @@ pub mod reduce;
 pub mod rotary;
 mod schedule;
 mod singular;
+mod slots;
+mod turn;
 
 pub use implicit::AddedInertia;
 pub use linkage::{Closure, Link, Linkage, Parent};

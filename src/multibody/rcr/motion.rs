@@ -17,14 +17,18 @@ use super::schedule::Step;
 /// Two components.
 pub(super) type Pair<T> = [T; 2];
 
-/// Geometry and inertia of one link over lanes.
+/// Inertia of one link over lanes.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct LinkData<T> {
-    pub(super) arm_parent: Pair<T>,
-    pub(super) arm: Pair<T>,
     pub(super) mass: T,
     pub(super) inertia: T,
-    pub(super) sign: T,
+}
+
+/// From the centres of mass of a link's parent and of itself to their joint, as drawn [m], over lanes.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Arms<T> {
+    arm_parent: Pair<T>,
+    arm: Pair<T>,
 }
 
 /// What a joint has beyond a pin.
@@ -37,7 +41,7 @@ pub(super) struct JointData<T> {
 }
 
 /// A number of each variant, side by side.
-fn lane<T: Real>(of: &[&Link], f: &dyn Fn(&Link) -> f64) -> T {
+pub(super) fn lane<T: Real>(of: &[&Link], f: &dyn Fn(&Link) -> f64) -> T {
     let mut out = T::ZERO;
     for k in 0..T::LANES {
         out.set_lane(k, f(of[k % of.len()]));
@@ -58,18 +62,21 @@ impl<T: Real> JointData<T> {
 
 impl<T: Real> LinkData<T> {
     pub(super) fn new(of: &[&Link]) -> Self {
+        Self { mass: lane(of, &|l| l.mass), inertia: lane(of, &|l| l.inertia) }
+    }
+}
+
+impl<T: Real> Arms<T> {
+    pub(super) fn new(of: &[&Link]) -> Self {
         let lane = |f: &dyn Fn(&Link) -> f64| lane(of, f);
         Self {
             arm_parent: [lane(&|l| l.frame.arm_a.x), lane(&|l| l.frame.arm_a.y)],
             arm: [lane(&|l| l.frame.arm_b.x), lane(&|l| l.frame.arm_b.y)],
-            mass: lane(&|l| l.mass),
-            inertia: lane(&|l| l.inertia),
-            sign: lane(&|l| l.sign),
         }
     }
 }
 
-/// Where a body is and how it moves, with what the inward pass needs of it.
+/// Where a body is and how it moves: what its children and the closures need of it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Placed<T> {
     /// Displacement and rotation from the drawn place.
@@ -78,10 +85,15 @@ pub(super) struct Placed<T> {
     pub(super) rate: [T; 3],
     /// Sine and cosine of half the rotation.
     half: Pair<T>,
-    /// From the parent's centre of mass to this one, d [m].
-    pub(super) shift: Pair<T>,
-    /// R_p·arm_p: from the parent's centre of mass to the joint [m].
+}
+
+/// How a placed body hangs on its parent: what the reduction needs of it, inward and outward.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Hanging<T> {
+    /// From the parent's centre of mass to the pin, R_p·arm_p; where there is no pin, to this body's centre of mass [m].
     pub(super) lever_parent: Pair<T>,
+    /// From this body's centre of mass to the pin, R·arm; zero where there is none [m].
+    lever: Pair<T>,
     /// Velocity part c of the acceleration [m/s²].
     pub(super) bias: Pair<T>,
 }
@@ -94,14 +106,7 @@ fn turned<T: Real>(half: Pair<T>) -> Pair<T> {
 }
 
 impl<T: Real> Placed<T> {
-    pub(super) const REST: Self = Self {
-        pose: [T::ZERO; 3],
-        rate: [T::ZERO; 3],
-        half: [T::ZERO, T::ONE],
-        shift: [T::ZERO; 2],
-        lever_parent: [T::ZERO; 2],
-        bias: [T::ZERO; 2],
-    };
+    pub(super) const REST: Self = Self { pose: [T::ZERO; 3], rate: [T::ZERO; 3], half: [T::ZERO, T::ONE] };
 
     /// (R − 1)·v without cancellation at small angles.
     #[inline(always)]
@@ -116,6 +121,22 @@ impl<T: Real> Placed<T> {
         let c = self.half[1] * other.half[1] - self.half[0] * other.half[0];
         let s = self.half[0] * other.half[1] + self.half[1] * other.half[0];
         [c * v[0] - s * v[1], s * v[0] + c * v[1]]
+    }
+}
+
+impl<T: Real> Hanging<T> {
+    pub(super) const REST: Self = Self { lever_parent: [T::ZERO; 2], lever: [T::ZERO; 2], bias: [T::ZERO; 2] };
+
+    /// From the parent's centre of mass to this one, d [m].
+    #[inline(always)]
+    pub(super) fn shift(&self) -> Pair<T> {
+        minus(self.lever_parent, self.lever)
+    }
+
+    /// Joint axis of a pin, whose one column of S it is.
+    #[inline(always)]
+    pub(super) fn pin_axis(&self, sign: T) -> [T; 3] {
+        [sign * self.lever[1], -(sign * self.lever[0]), sign]
     }
 }
 
@@ -153,31 +174,28 @@ fn place_free<T: Real>(out: &mut Placed<T>, q: &[T], v: &[T], axes: &mut [[T; 3]
 
 /// A pin: rotation alone, no axial second-order strain.
 #[inline(always)]
-fn place_pin<T: Real>(data: &LinkData<T>, parent: &Placed<T>, out: &mut Placed<T>) -> [T; 3] {
+fn place_pin<T: Real>(arms: &Arms<T>, parent: &Placed<T>, out: &mut Placed<T>) -> Hanging<T> {
     let (wp, w) = (parent.rate[2], out.rate[2]);
-    let (swung, swung_parent) = (out.swing(data.arm), parent.swing(data.arm_parent));
-    let lever = plus(data.arm, swung);
-    let to = plus(data.arm_parent, swung_parent);
+    let (swung, swung_parent) = (out.swing(arms.arm), parent.swing(arms.arm_parent));
+    let lever = plus(arms.arm, swung);
+    let to = plus(arms.arm_parent, swung_parent);
     let (wp2, w2) = (wp * wp, w * w);
     out.pose[0] = parent.pose[0] + (swung_parent[0] - swung[0]);
     out.pose[1] = parent.pose[1] + (swung_parent[1] - swung[1]);
     out.rate[0] = parent.rate[0] + (w * lever[1] - wp * to[1]);
     out.rate[1] = parent.rate[1] + (wp * to[0] - w * lever[0]);
-    out.shift = minus(to, lever);
-    out.lever_parent = to;
-    out.bias = [w2 * lever[0] - wp2 * to[0], w2 * lever[1] - wp2 * to[1]];
-    [data.sign * lever[1], -(data.sign * lever[0]), data.sign]
+    Hanging { lever_parent: to, lever, bias: [w2 * lever[0] - wp2 * to[0], w2 * lever[1] - wp2 * to[1]] }
 }
 
 fn place_joint<T: Real>(
     link: &Link,
-    (data, joint): (&LinkData<T>, &JointData<T>),
+    (arms, sign, joint): (&Arms<T>, T, &JointData<T>),
     parent: &Placed<T>,
     out: &mut Placed<T>,
     q: &[T],
     v: &[T],
     axes: &mut [[T; 3]],
-) {
+) -> Hanging<T> {
     let (mut e, mut de) = ([joint.rest, T::ZERO, T::ZERO], [T::ZERO; 3]);
     let mut next = 0;
     for i in 0..3 {
@@ -195,33 +213,33 @@ fn place_joint<T: Real>(
     let dw = [de[0] - two * (bent[0] * de[1] + bent[1] * de[2]), de[1]];
     let ddw = [-(two * (bent_rate[0] * de[1] + bent_rate[1] * de[2])), T::ZERO];
     let omega = out.rate[2];
-    let (swung, swung_parent) = (out.swing(data.arm), parent.swing(data.arm_parent));
-    let lever = plus(data.arm, swung);
-    out.lever_parent = plus(data.arm_parent, swung_parent);
+    let (swung, swung_parent) = (out.swing(arms.arm), parent.swing(arms.arm_parent));
+    let lever = plus(arms.arm, swung);
+    let lever_parent = plus(arms.arm_parent, swung_parent);
     let e1 = out.mean(parent, joint.axis);
     let e2 = turn(e1);
     let along = |w: Pair<T>| plus(times(w[0], e1), times(w[1], e2));
     let (rw, rdw, rddw) = (along(w), along(dw), along(ddw));
-    let opening = times(data.sign, rw);
-    out.shift = minus(plus(out.lever_parent, opening), lever);
+    let opening = times(sign, rw);
+    let shift = minus(plus(lever_parent, opening), lever);
     let d = minus(plus(swung_parent, opening), swung);
     (out.pose[0], out.pose[1]) = (parent.pose[0] + d[0], parent.pose[1] + d[1]);
     let wp = parent.rate[2];
-    let frame_rate = wp + data.sign * T::splat(0.5) * de[2];
-    let (to_joint, from_joint) = (turn(out.lever_parent), turn(lever));
+    let frame_rate = wp + sign * T::splat(0.5) * de[2];
+    let (to_joint, from_joint) = (turn(lever_parent), turn(lever));
     let opening_rate = plus(times(frame_rate, turn(rw)), rdw);
-    let x = minus(plus(times(wp, to_joint), times(data.sign, opening_rate)), times(omega, from_joint));
+    let x = minus(plus(times(wp, to_joint), times(sign, opening_rate)), times(omega, from_joint));
     (out.rate[0], out.rate[1]) = (parent.rate[0] + x[0], parent.rate[1] + x[1]);
     let turning = plus(minus(times(two * frame_rate, turn(rdw)), times(frame_rate * frame_rate, rw)), rddw);
-    out.bias = minus(plus(times(omega * omega, lever), times(data.sign, turning)), times(wp * wp, out.lever_parent));
+    let bias = minus(plus(times(omega * omega, lever), times(sign, turning)), times(wp * wp, lever_parent));
     let slope = [two * bent[0], two * bent[1]];
     let columns = [
-        [data.sign * e1[0], data.sign * e1[1], T::ZERO],
-        [data.sign * (e2[0] - slope[0] * e1[0]), data.sign * (e2[1] - slope[0] * e1[1]), T::ZERO],
+        [sign * e1[0], sign * e1[1], T::ZERO],
+        [sign * (e2[0] - slope[0] * e1[0]), sign * (e2[1] - slope[0] * e1[1]), T::ZERO],
         {
             let half = times(T::splat(0.5), turn(rw));
-            let x = minus(minus(half, times(data.sign, from_joint)), times(data.sign * slope[1], e1));
-            [x[0], x[1], data.sign]
+            let x = minus(minus(half, times(sign, from_joint)), times(sign * slope[1], e1));
+            [x[0], x[1], sign]
         },
     ];
     let mut next = 0;
@@ -231,6 +249,7 @@ fn place_joint<T: Real>(
             next += 1;
         }
     }
+    Hanging { lever_parent: shift, lever: [T::ZERO; 2], bias }
 }
 
 /// Bodies whose sines are taken together.
@@ -241,54 +260,58 @@ const BLOCK: usize = 16;
 pub(super) fn place_all<T: Real>(
     linkage: &Linkage,
     steps: &[Step],
-    (data, joints): (&[LinkData<T>], &[JointData<T>]),
+    (arms, signs, joints): (&[Arms<T>], &[T], &[JointData<T>]),
     q: &[T],
     v: &[T],
     placed: &mut [Placed<T>],
-    axes: &mut [[T; 3]],
+    (hanging, axes): (&mut [Hanging<T>], &mut [[T; 3]]),
 ) {
     let rest = Placed::REST;
     let mut end = steps.len();
     while end > 0 {
         let start = end.saturating_sub(BLOCK);
         let mut halves = [[T::ZERO; BLOCK]; 2];
-        for body in (start..end).rev() {
-            let step = &steps[body];
+        let block = start..end;
+        let (some, signs) = (&steps[block.clone()], &signs[block.clone()]);
+        for (k, (step, sign)) in some.iter().zip(signs).enumerate().rev() {
             let (mut theta, mut omega) = match step.parent() {
                 Some(p) => (placed[p].pose[2], placed[p].rate[2]),
                 None => (T::ZERO, T::ZERO),
             };
             if let Some(k) = step.turning() {
-                theta += data[body].sign * q[k];
-                omega += data[body].sign * v[k];
+                theta += *sign * q[k];
+                omega += *sign * v[k];
             }
-            (placed[body].pose[2], placed[body].rate[2]) = (theta, omega);
-            halves[0][body - start] = T::splat(0.5) * theta;
+            let out = &mut placed[start + k];
+            (out.pose[2], out.rate[2]) = (theta, omega);
+            halves[0][k] = T::splat(0.5) * theta;
         }
         let [sin, cos] = &mut halves;
         T::sin_cos_each(&mut sin[..end - start], &mut cos[..end - start]);
-        for body in (start..end).rev() {
-            let step = &steps[body];
+        let given = some.iter().zip(signs).zip(arms[block.clone()].iter().zip(&mut hanging[block]));
+        for (k, ((step, sign), (arms, hanging))) in given.enumerate().rev() {
+            let body = start + k;
             let (before, after) = placed.split_at_mut(body + 1);
             let out = &mut before[body];
-            out.half = [halves[0][body - start], halves[1][body - start]];
+            out.half = [halves[0][k], halves[1][k]];
             let parent = match step.parent() {
                 Some(p) => &after[p - body - 1],
                 None => &rest,
             };
-            let first = step.first as usize;
             if step.pin {
-                axes[first] = place_pin(&data[body], parent, out);
+                *hanging = place_pin(arms, parent, out);
                 continue;
             }
             let link = &linkage.links[body];
+            let first = step.first as usize;
             let range = first..first + link.freedom();
             let (q, v, axes) = (&q[range.clone()], &v[range.clone()], &mut axes[range]);
-            if link.parent == Parent::Free {
+            *hanging = if link.parent == Parent::Free {
                 place_free(out, q, v, axes);
+                Hanging::REST
             } else {
-                place_joint(link, (&data[body], &joints[step.joint as usize]), parent, out, q, v, axes);
-            }
+                place_joint(link, (arms, *sign, &joints[step.joint as usize]), parent, out, q, v, axes)
+            };
         }
         end = start;
     }

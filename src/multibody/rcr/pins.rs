@@ -16,7 +16,7 @@
 
 use super::real::Real;
 use super::reduce::{Node, Reduction};
-use super::schedule::Kind;
+use std::ops::Range;
 
 /// What one pin's body hands to the next inward, about the pin between them.
 #[derive(Clone, Copy)]
@@ -40,17 +40,29 @@ impl<T: Real> Reduction<T> {
     /// forces and velocity parts.
     #[inline(always)]
     pub(super) fn pins_inward<const FORCED: bool>(&mut self, first: usize) -> usize {
-        let run = self.schedule.run(first);
-        let mut handed = Handed::NOTHING;
-        let zipped = (self.schedule.steps[run.clone()].iter().zip(&self.links[run.clone()]))
-            .zip(self.placed[run.clone()].iter().zip(&self.force[run.clone()]));
-        for (k, ((step, link), (placed, own))) in zipped.enumerate() {
-            let (inner, outer) = self.nodes.split_at_mut(first + k + 1);
-            let node = &mut inner[first + k];
-            let [px, py] = placed.lever_parent;
-            let (lx, ly) = (px - placed.shift[0], py - placed.shift[1]);
+        let (mut run, mut handed) = (self.schedule.run(first), Handed::NOTHING);
+        while !run.is_empty() {
+            handed = self.some_pins_inward::<FORCED>(run.clone(), handed);
+            run = self.schedule.run(run.end);
+        }
+        run.end
+    }
+
+    /// The part `run` of a run of pins, to whose first body `handed` comes. Returns what its last one hands to the next.
+    #[inline(always)]
+    fn some_pins_inward<const FORCED: bool>(&mut self, run: Range<usize>, mut handed: Handed<T>) -> Handed<T> {
+        let steps = &self.schedule.steps[run.clone()];
+        // a pin has one coordinate, so those of a run follow each other
+        let coordinates = steps[0].first as usize..steps[0].first as usize + steps.len();
+        let (slopes, _) = self.coefficients[steps[0].coefficient_start as usize..].as_chunks_mut();
+        let zipped = (steps.iter().zip(self.links[run.clone()].iter().zip(&self.signs[run.clone()])))
+            .zip(self.hanging[run.clone()].iter().zip(&self.force[run]))
+            .zip(self.base[coordinates.clone()].iter_mut().zip(slopes).zip(&self.torque[coordinates]));
+        for (((step, (link, sign)), (hanging, own)), ((to_base, to_slope), torque)) in zipped {
+            let ([px, py], [dx, dy]) = (hanging.lever_parent, hanging.shift());
+            let (lx, ly) = (px - dx, py - dy);
             let own = if FORCED { *own } else { [T::ZERO; 3] };
-            let [cx, cy] = placed.bias;
+            let [cx, cy] = hanging.bias;
             // own mass, and what came by way of memory
             let (mut kxx, mut kxy, mut kyy) = (link.mass, T::ZERO, link.mass);
             let (mut ux, mut uy) = (link.mass * ly, -(link.mass * lx));
@@ -61,6 +73,7 @@ impl<T: Real> Reduction<T> {
                 fy -= link.mass * cy;
             }
             if step.gathers {
+                let node = &mut self.nodes[step.node as usize];
                 let [a, b, c, d_, e, f] = std::mem::replace(&mut node.inertia, [T::ZERO; 6]);
                 let momentum = std::mem::replace(&mut node.momentum, [T::ZERO; 3]);
                 let (gx, gy) = ((a * ly - b * lx) + d_, (b * ly - c * lx) + e);
@@ -85,12 +98,12 @@ impl<T: Real> Reduction<T> {
                 gx -= hxx * cx + hxy * cy;
                 gy -= hxy * cx + hyy * cy;
             }
-            let drive = if FORCED { link.sign * self.torque[step.first as usize] } else { T::ZERO };
+            let drive = if FORCED { *sign * *torque } else { T::ZERO };
             let push = ((drive + moment) + (ly * fx - lx * fy)) + ((rx * gy - ry * gx) + handed.moment);
             let base = push * inverse;
             (ux, uy) = (ux + hx, uy + hy);
             let (vx, vy) = (ux * inverse, uy * inverse);
-            (node.base, node.slope) = (base, [vx, vy]);
+            (*to_base, *to_slope) = (base, [vx, vy]);
             let left = Handed {
                 inertia: [
                     (kxx + hxx) - (ux * ux) * inverse,
@@ -104,42 +117,54 @@ impl<T: Real> Reduction<T> {
             handed = left;
             if !step.hands_on {
                 handed = Handed::NOTHING;
-                if let Some(parent) = step.parent() {
-                    left.give(&mut outer[parent - (first + k + 1)]);
+                if step.parent().is_some() {
+                    left.give(&mut self.nodes[self.schedule.nodes[step.column as usize] as usize]);
                 }
             }
         }
-        run.end
+        handed
     }
 
     /// Accelerations of the bodies of a run of pins that ends before `end`, root → leaf. Returns its first body.
     #[inline(always)]
     pub(super) fn pins_outward<const FORCED: bool>(&mut self, end: usize, out: &mut [T]) -> usize {
-        let steps = &self.schedule.steps[..end];
-        let first = steps.iter().rposition(|s| s.kind != Kind::Pin).map_or(0, |k| k + 1);
-        let run = first..end;
-        let zipped = (steps[run.clone()].iter().zip(&self.links[run.clone()]))
-            .zip(self.placed[run.clone()].iter().zip(&self.nodes[run.clone()]));
         // of the body after, which is the parent along a chain
-        let mut after = [T::ZERO; 3];
-        for (k, ((step, link), (placed, node))) in zipped.enumerate().rev() {
+        let (mut run, mut after) = (self.schedule.run_before(end), [T::ZERO; 3]);
+        while !run.is_empty() {
+            after = self.some_pins_outward::<FORCED>(run.clone(), after, out);
+            run = self.schedule.run_before(run.start);
+        }
+        run.start
+    }
+
+    /// The part `run` of a run of pins; `after` is the acceleration of the body after it. Returns that of its first one.
+    #[inline(always)]
+    fn some_pins_outward<const FORCED: bool>(&mut self, run: Range<usize>, mut after: [T; 3], out: &mut [T]) -> [T; 3] {
+        let first = run.start;
+        let steps = &self.schedule.steps[run.clone()];
+        let coordinates = steps[0].first as usize..steps[0].first as usize + steps.len();
+        let (slopes, _) = self.coefficients[steps[0].coefficient_start as usize..].as_chunks::<2>();
+        let zipped = (steps.iter().zip(&self.signs[run.clone()]))
+            .zip(&self.hanging[run])
+            .zip(self.base[coordinates.clone()].iter().zip(&slopes[..steps.len()]).zip(&mut out[coordinates]));
+        for (k, (((step, sign), hanging), ((base, slope), out))) in zipped.enumerate().rev() {
             let up = match step.parent() {
                 _ if step.hands_on => after,
                 Some(parent) => self.accelerations[parent],
                 None => [T::ZERO; 3],
             };
-            let [px, py] = placed.lever_parent;
-            let (lx, ly) = (px - placed.shift[0], py - placed.shift[1]);
+            let ([px, py], [dx, dy]) = (hanging.lever_parent, hanging.shift());
+            let (lx, ly) = (px - dx, py - dy);
             let mut a = [up[0] - py * up[2], up[1] + px * up[2]];
-            let angular = (node.base - node.slope[0] * a[0]) - node.slope[1] * a[1];
-            out[step.first as usize] = link.sign * (angular - up[2]);
+            let angular = (*base - slope[0] * a[0]) - slope[1] * a[1];
+            *out = *sign * (angular - up[2]);
             if FORCED {
-                a = [a[0] + placed.bias[0], a[1] + placed.bias[1]];
+                a = [a[0] + hanging.bias[0], a[1] + hanging.bias[1]];
             }
             after = [a[0] + ly * angular, a[1] - lx * angular, angular];
             self.accelerations[first + k] = after;
         }
-        first
+        after
     }
 }
 

@@ -19,23 +19,11 @@ impl Reduction<f64> {
     /// [`Reduction::reduce`], or [`Reduction::reduce_singular`] where that is too near to a singular configuration; then
     /// says what was met.
     pub fn solve(&mut self, linkage: &Linkage, task: Task, out: &mut [f64]) -> Option<Singularity> {
-        self.solve_with(linkage, task, out, |_| ())
-    }
-
-    /// [`Reduction::solve`] with something laid where bodies gather: `again` lays it once more for the second path.
-    pub(super) fn solve_with(
-        &mut self,
-        linkage: &Linkage,
-        task: Task,
-        out: &mut [f64],
-        again: impl FnOnce(&mut Self),
-    ) -> Option<Singularity> {
         if self.schedule.redundant == 0 {
             self.reduce(linkage, task, out);
             if self.nearness <= NEAR && out.iter().all(|x| x.is_finite()) {
                 return None;
             }
-            again(self);
         }
         Some(self.reduce_singular(linkage, task, out))
     }

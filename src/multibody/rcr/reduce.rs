@@ -11,8 +11,9 @@
 //! multi-rigid-body dynamic systems", Multibody System Dynamics 9 (2003) 185–212.
 
 use super::closure::ClosureData;
+use super::implicit::Added;
 use super::linkage::Linkage;
-use super::motion::{JointData, LinkData, Placed, place_all};
+use super::motion::{Arms, Hanging, JointData, LinkData, Placed, lane, place_all};
 use super::real::Real;
 use super::schedule::{Kind, NONE, Schedule, Turn};
 
@@ -27,21 +28,17 @@ pub enum Task {
     Positions,
 }
 
-/// What gathers at a body on the way in, and what a pin keeps for the way out.
+/// What gathers at a body on the way in.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Node<T> {
     /// Inertia that outer bodies hand on: xx, xy, yy, xθ, yθ, θθ.
     pub(super) inertia: [T; 6],
     /// Wrench that they hand on.
     pub(super) momentum: [T; 3],
-    /// A pin body's angular acceleration per acceleration of the pin.
-    pub(super) slope: [T; 2],
-    /// A pin body's angular acceleration when the pin rests.
-    pub(super) base: T,
 }
 
 impl<T: Real> Node<T> {
-    const CLEAN: Self = Self { inertia: [T::ZERO; 6], momentum: [T::ZERO; 3], slope: [T::ZERO; 2], base: T::ZERO };
+    const CLEAN: Self = Self { inertia: [T::ZERO; 6], momentum: [T::ZERO; 3] };
 }
 
 /// The recursion with its storage, over one model or over lanes of variants.
@@ -49,11 +46,16 @@ impl<T: Real> Node<T> {
 pub struct Reduction<T> {
     pub(super) schedule: Schedule,
     pub(super) links: Vec<LinkData<T>>,
+    arms: Vec<Arms<T>>,
+    /// See [`super::Link::sign`].
+    pub(super) signs: Vec<T>,
     pub(super) joints: Vec<JointData<T>>,
     pub(super) closures: Vec<ClosureData<T>>,
     pub(super) units: Vec<T>,
     pub(super) placed: Vec<Placed<T>>,
-    pub(super) axes: Vec<[T; 3]>,
+    pub(super) hanging: Vec<Hanging<T>>,
+    /// Axes of the coordinates of joints that are no pins.
+    axes: Vec<[T; 3]>,
     /// Wrench on each body: forces along x and y and moment about the centre of mass [N, N·m]. Set before reducing.
     pub force: Vec<[T; 3]>,
     /// Force on each coordinate [N or N·m]. Set before reducing.
@@ -61,14 +63,18 @@ pub struct Reduction<T> {
     pub(super) nodes: Vec<Node<T>>,
     pub(super) coupling: Vec<[T; 9]>,
     pub(super) rows: Vec<T>,
+    /// Acceleration of a coordinate per acceleration of the bodies of its front; a pin's per acceleration of its point.
     pub(super) coefficients: Vec<T>,
+    /// Acceleration of a coordinate when its front rests; a pin's body's.
     pub(super) base: Vec<T>,
     pub(super) turned: Vec<[[T; 3]; 3]>,
     /// Acceleration of each body.
     pub accelerations: Vec<[T; 3]>,
     pub(super) front: Scratch<T>,
-    /// Added to the inertia of each body's joint by an implicit step, see [`super::implicit`]; empty otherwise.
-    pub(super) joint_inertia: Vec<[T; 6]>,
+    /// What an implicit step adds to each body, see [`super::implicit`]; empty otherwise.
+    pub(super) added: Vec<Added<T>>,
+    /// The same to each coupling, in the order of the pattern.
+    pub(super) added_coupling: Vec<[T; 9]>,
     /// Worst of lever/pivot over the dependent coordinates of the last reduction: 1 in a well-conditioned loop, infinite in
     /// a singular configuration. The squares of it multiply rounding errors.
     pub nearness: T,
@@ -85,15 +91,14 @@ pub(super) struct Scratch<T> {
 impl<T: Real> Reduction<T> {
     /// Storage for one variant per lane; all must have the same tree and loops (fewer variants are repeated).
     pub fn new(variants: &[&Linkage]) -> Self {
+        Self::with_schedule(variants, Schedule::new(variants[0]))
+    }
+
+    pub(super) fn with_schedule(variants: &[&Linkage], schedule: Schedule) -> Self {
         let linkage = variants[0];
-        let schedule = Schedule::new(linkage);
         let count = linkage.links.len();
-        let links: Vec<LinkData<T>> =
-            (0..count).map(|b| LinkData::new(&variants.iter().map(|v| &v.links[b]).collect::<Vec<_>>())).collect();
-        let joints = (0..count)
-            .filter(|&b| !linkage.links[b].pin)
-            .map(|b| JointData::new(&variants.iter().map(|v| &v.links[b]).collect::<Vec<_>>()))
-            .collect();
+        let of = |b: usize| variants.iter().map(|v| &v.links[b]).collect::<Vec<_>>();
+        let joints: Vec<_> = (0..count).filter(|&b| !linkage.links[b].pin).map(|b| JointData::new(&of(b))).collect();
         let closures = (0..linkage.closures.len())
             .map(|c| {
                 let of: Vec<_> =
@@ -115,8 +120,7 @@ impl<T: Real> Reduction<T> {
                 }
             }
         }
-        let turns = &schedule.turns;
-        let most = |f: &dyn Fn(&Turn) -> usize| turns.iter().map(f).max().unwrap_or(0);
+        let most = |f: &dyn Fn(Turn) -> usize| schedule.turns().map(f).max().unwrap_or(0);
         let size = most(&|t| t.freedom + 3 * t.front);
         let scratch = Scratch {
             m: vec![T::ZERO; size * size],
@@ -124,23 +128,27 @@ impl<T: Real> Reduction<T> {
             r: vec![T::ZERO; most(&|t| t.rows) * (size + 1)],
         };
         Self {
-            links,
-            joints,
+            links: (0..count).map(|b| LinkData::new(&of(b))).collect(),
+            arms: (0..count).map(|b| Arms::new(&of(b))).collect(),
+            signs: (0..count).map(|b| lane(&of(b), &|link| link.sign)).collect(),
             closures,
             units,
             placed: vec![Placed::REST; count],
-            axes: vec![[T::ZERO; 3]; linkage.coordinates],
+            hanging: vec![Hanging::REST; count],
+            axes: vec![[T::ZERO; 3]; if joints.is_empty() { 0 } else { linkage.coordinates }],
+            joints,
             force: vec![[T::ZERO; 3]; count],
             torque: vec![T::ZERO; linkage.coordinates],
-            nodes: vec![Node::CLEAN; count],
-            coupling: vec![[T::ZERO; 9]; linkage.pattern.off_blocks()],
+            nodes: vec![Node::CLEAN; schedule.node_count],
+            coupling: vec![[T::ZERO; 9]; schedule.block_count],
             rows: vec![T::ZERO; schedule.row_entries],
             coefficients: vec![T::ZERO; schedule.coefficient_entries],
             base: vec![T::ZERO; linkage.coordinates],
-            turned: vec![[[T::ZERO; 3]; 3]; if turns.iter().any(|t| t.freedom > 1) { count } else { 0 }],
+            turned: vec![[[T::ZERO; 3]; 3]; if most(&|t| t.freedom) > 1 { count } else { 0 }],
             accelerations: vec![[T::ZERO; 3]; count],
             front: scratch,
-            joint_inertia: Vec::new(),
+            added: Vec::new(),
+            added_coupling: Vec::new(),
             nearness: T::ZERO,
             schedule,
         }
@@ -154,7 +162,18 @@ impl<T: Real> Reduction<T> {
     /// Places all bodies for coordinates `q` and rates `v`.
     #[inline(always)]
     pub fn place(&mut self, linkage: &Linkage, q: &[T], v: &[T]) {
-        place_all(linkage, &self.schedule.steps, (&self.links, &self.joints), q, v, &mut self.placed, &mut self.axes);
+        let (steps, given) = (&self.schedule.steps, (&self.arms[..], &self.signs[..], &self.joints[..]));
+        place_all(linkage, steps, given, q, v, &mut self.placed, (&mut self.hanging, &mut self.axes));
+    }
+
+    /// Axis of a coordinate of `body`.
+    #[inline(always)]
+    pub(super) fn axis(&self, body: usize, coordinate: usize) -> [T; 3] {
+        if self.schedule.steps[body].pin {
+            self.hanging[body].pin_axis(self.signs[body])
+        } else {
+            self.axes[coordinate]
+        }
     }
 
     /// Displacement and rotation of a body from its drawn place [m, m, rad].
@@ -176,7 +195,7 @@ impl<T: Real> Reduction<T> {
         }
         let rest = Placed::REST;
         for (closure, entry) in self.closures.iter().zip(&self.schedule.entries) {
-            let turn = &self.schedule.turns[entry.body];
+            let turn = self.schedule.turn(entry.body);
             let width = 3 + 3 * turn.front + 1;
             let [a, b] = entry.ends.map(|end| end.map_or(&rest, |body| &self.placed[body as usize]));
             let first_is_a = entry.ends[0] == Some(entry.body as u32);
@@ -207,17 +226,17 @@ impl<T: Real> Reduction<T> {
     #[inline(always)]
     pub fn reduce(&mut self, linkage: &Linkage, task: Task, out: &mut [T]) {
         self.write_rows(task);
-        self.inward(linkage, task);
+        self.inward(task);
         self.outward(linkage, task, out);
     }
 
     #[inline(always)]
-    fn inward(&mut self, linkage: &Linkage, task: Task) {
+    fn inward(&mut self, task: Task) {
         self.nearness = T::ZERO;
         let mut body = 0;
         while body < self.links.len() {
             let Kind::Pin = self.schedule.steps[body].kind else {
-                self.front_inward(linkage, task, body);
+                self.front_inward(task, body);
                 body += 1;
                 continue;
             };
@@ -230,7 +249,7 @@ impl<T: Real> Reduction<T> {
     }
 
     #[inline(always)]
-    fn front_inward(&mut self, linkage: &Linkage, task: Task, body: usize) {
+    fn front_inward(&mut self, task: Task, body: usize) {
         match self.schedule.steps[body].kind {
             Kind::Pin => {}
             Kind::One(0) => self.one_inward::<1, 0>(task, body),
@@ -241,25 +260,45 @@ impl<T: Real> Reduction<T> {
             Kind::Two(1) => self.one_inward::<2, 1>(task, body),
             Kind::Two(2) => self.one_inward::<2, 2>(task, body),
             Kind::Two(_) => self.one_inward::<2, 3>(task, body),
-            Kind::Any => self.any_inward(linkage, task, body),
+            Kind::Any => self.any_inward(task, body),
         }
     }
 
     /// What the outer bodies have left at this one, with its own mass; their place is clean for the next reduction.
     #[inline(always)]
     pub(super) fn take_inertia(&mut self, body: usize) -> [T; 6] {
-        let mut inertia = std::mem::replace(&mut self.nodes[body].inertia, [T::ZERO; 6]);
+        let node = &mut self.nodes[self.schedule.steps[body].node as usize];
+        let mut inertia = std::mem::replace(&mut node.inertia, [T::ZERO; 6]);
         let link = &self.links[body];
         inertia[0] += link.mass;
         inertia[2] += link.mass;
         inertia[5] += link.inertia;
+        if let Some(added) = self.added.get(body) {
+            for (sum, x) in inertia.iter_mut().zip(&added.body) {
+                *sum += *x;
+            }
+        }
         inertia
+    }
+
+    /// What has gathered in a block of the pattern; its place is clean for the next.
+    #[inline(always)]
+    pub(super) fn take_coupling(&mut self, block: usize) -> [T; 9] {
+        let at = self.schedule.blocks[block] as usize;
+        let mut coupling = std::mem::replace(&mut self.coupling[at], [T::ZERO; 9]);
+        if let Some(added) = self.added_coupling.get(block) {
+            for (sum, x) in coupling.iter_mut().zip(added) {
+                *sum += *x;
+            }
+        }
+        coupling
     }
 
     /// The same for forces; accelerations add the body's own.
     #[inline(always)]
     pub(super) fn take_force(&mut self, task: Task, body: usize) -> [T; 3] {
-        let mut force = std::mem::replace(&mut self.nodes[body].momentum, [T::ZERO; 3]);
+        let node = &mut self.nodes[self.schedule.steps[body].node as usize];
+        let mut force = std::mem::replace(&mut node.momentum, [T::ZERO; 3]);
         if task == Task::Accelerations {
             for (f, own) in force.iter_mut().zip(&self.force[body]) {
                 *f += *own;

@@ -4,12 +4,19 @@
 //! Constraint rows enter at the body of their closure that is eliminated first. There and at every body they pass, each
 //! joint coordinate takes one row with it (a dependent coordinate, in the words of the reduction), and the rest goes on to
 //! the next body that it touches. A row that reaches no body any more is redundant by count.
+//!
+//! It is read at every reduction, so its indices are 32 bits wide (`turn`).
 
 use super::linkage::{Closure, Linkage, Parent};
+use super::slots::Slots;
+pub(super) use super::turn::Turn;
+use super::turn::{Packed, narrow, wide};
 use crate::multibody::BodyId;
 
 /// No place.
 pub(super) const NONE: usize = usize::MAX;
+/// Pins that are looked for at a time.
+const PIECE: usize = 256;
 
 /// Which code a body's turn takes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -36,12 +43,22 @@ pub(super) struct Step {
     pub(super) hands_on: bool,
     /// Parent body; `u32::MAX`: ground or free.
     parent: u32,
+    /// Its last coordinate turns it.
+    turns: bool,
+    /// See [`Turn::coupled`].
+    pub(super) coupled: bool,
+    /// See [`Turn::freedom`].
+    pub(super) freedom: u8,
     /// First coordinate.
     pub(super) first: u32,
-    /// The coordinate that turns it; `u32::MAX`: none.
-    turning: u32,
     /// Its place among the joints that are no pins.
     pub(super) joint: u32,
+    /// Where what is handed to it gathers.
+    pub(super) node: u32,
+    /// See [`Turn::column`].
+    pub(super) column: u32,
+    /// See [`Turn::coefficient_start`].
+    pub(super) coefficient_start: u32,
 }
 
 impl Step {
@@ -54,39 +71,8 @@ impl Step {
     /// The coordinate that turns it, if one does.
     #[inline(always)]
     pub(super) fn turning(&self) -> Option<usize> {
-        (self.turning != u32::MAX).then_some(self.turning as usize)
+        self.turns.then_some((self.first + u32::from(self.freedom)) as usize - 1)
     }
-}
-
-/// One body's turn.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Turn {
-    /// Coordinates of its joint.
-    pub(super) freedom: usize,
-    /// Bodies of its front: rows of its column in the pattern.
-    pub(super) front: usize,
-    /// Constraint rows that reach it.
-    pub(super) rows: usize,
-    /// Place of its parent in the front; none: ground or free.
-    pub(super) parent: usize,
-    /// A loop that was closed before couples it to its front.
-    pub(super) coupled: bool,
-    /// Start of its front among the schedule's, and of its blocks among the couplings.
-    pub(super) column: usize,
-    /// Start of the couplings that its front's update changes.
-    pub(super) targets: usize,
-    /// First coordinate.
-    pub(super) first: usize,
-    /// Start of its rows in the row arena; each row has 3 + 3·front + 1 entries.
-    pub(super) row_start: usize,
-    /// Start of its coefficients in the coefficient arena; `freedom` rows of freedom + 3·front entries.
-    pub(super) coefficient_start: usize,
-    /// Start of its row transformation in the transformation arena.
-    pub(super) next: usize,
-    /// Where the rows that are left go within the next body's rows.
-    pub(super) next_row: usize,
-    /// Start of the map from this front's bodies to places at the next body.
-    pub(super) map_start: usize,
 }
 
 /// Where the rows of a closure enter.
@@ -107,15 +93,23 @@ pub(super) struct Entry {
 /// The whole schedule.
 #[derive(Debug, Clone)]
 pub(super) struct Schedule {
-    pub(super) turns: Vec<Turn>,
+    turns: Vec<Packed>,
     pub(super) steps: Vec<Step>,
     /// Bodies of all fronts.
     pub(super) fronts: Vec<u32>,
-    /// Couplings that updates change, see [`crate::multibody::Pattern::targets`].
+    /// Where what is handed to them gathers: [`Step::node`] of each.
+    pub(super) nodes: Vec<u32>,
+    /// Where the couplings of a body to them gather.
+    pub(super) blocks: Vec<u32>,
+    /// Where the couplings gather that updates change, in the order of [`crate::multibody::Pattern::targets`].
     pub(super) targets: Vec<u32>,
+    /// Nodes in use at one time.
+    pub(super) node_count: usize,
+    /// Couplings in use at one time.
+    pub(super) block_count: usize,
     pub(super) entries: Vec<Entry>,
     /// Place of each front body at the body the rows go to: 0 itself, 1 + slot of its front.
-    pub(super) maps: Vec<usize>,
+    maps: Vec<u32>,
     pub(super) row_entries: usize,
     pub(super) coefficient_entries: usize,
     /// Rows that reach no body: more constraints than coordinates in some loop.
@@ -126,10 +120,15 @@ pub(super) struct Schedule {
 
 impl Schedule {
     pub(super) fn new(linkage: &Linkage) -> Self {
+        Self::with_couplings(linkage, false)
+    }
+
+    /// The schedule where more than loops may couple a body to its front: every pair of the pattern, if `all`.
+    pub(super) fn with_couplings(linkage: &Linkage, all: bool) -> Self {
         let pattern = &linkage.pattern;
         let count = linkage.links.len();
         let mut incoming = vec![0usize; count];
-        let mut coupled = vec![false; pattern.off_blocks()];
+        let mut coupled = vec![all; pattern.off_blocks()];
         for body in 0..count {
             for &block in pattern.targets(body) {
                 coupled[block as usize] = true;
@@ -155,7 +154,11 @@ impl Schedule {
             turns: Vec::with_capacity(count),
             steps: Vec::with_capacity(count),
             fronts: Vec::with_capacity(pattern.off_blocks()),
+            nodes: Vec::with_capacity(pattern.off_blocks()),
+            blocks: Vec::with_capacity(pattern.off_blocks()),
             targets: Vec::new(),
+            node_count: 0,
+            block_count: 0,
             entries,
             maps: Vec::new(),
             row_entries: 0,
@@ -163,6 +166,7 @@ impl Schedule {
             redundant: 0,
             multiplications: 0,
         };
+        let (mut nodes, mut blocks) = (Slots::new(count), Slots::new(pattern.off_blocks()));
         let mut joint = 0;
         for body in 0..count {
             let link = &linkage.links[body];
@@ -180,74 +184,101 @@ impl Schedule {
             }
             bodies.sort_unstable();
             bodies.dedup();
-            let mut turn = Turn {
-                freedom,
-                front,
-                rows,
-                parent,
-                coupled: pattern.column(body).any(|k| coupled[k]),
-                column: pattern.column(body).start,
-                targets: schedule.targets.len(),
-                first: link.first,
-                row_start: schedule.row_entries,
-                coefficient_start: schedule.coefficient_entries,
-                next: NONE,
+            let coupled = pattern.column(body).any(|k| coupled[k]);
+            let mut turn = Packed {
+                front: narrow(front),
+                rows: narrow(rows),
+                parent: narrow(parent),
+                targets: narrow(schedule.targets.len()),
+                row_start: narrow(schedule.row_entries),
+                next: u32::MAX,
                 next_row: 0,
-                map_start: schedule.maps.len(),
+                map_start: narrow(schedule.maps.len()),
             };
             schedule.row_entries += rows * (3 + 3 * front + 1);
-            let local = freedom + 3 * front;
-            schedule.coefficient_entries += freedom * local;
             schedule.multiplications += multiplications(freedom, front, rows, parent != NONE);
             if left > 0 {
                 match bodies.first() {
                     None => schedule.redundant += left,
                     Some(&next) => {
-                        turn.next = next;
-                        turn.next_row = incoming[next];
+                        turn.next = narrow(next);
+                        turn.next_row = narrow(incoming[next]);
                         incoming[next] += left;
                         support[next].extend(bodies.iter().skip(1));
                         for k in pattern.column(body) {
                             let b = pattern.row(k);
                             schedule.maps.push(match b.cmp(&next) {
                                 std::cmp::Ordering::Equal => 0,
-                                std::cmp::Ordering::Greater => 1 + slot_of(pattern, next, b),
+                                std::cmp::Ordering::Greater => narrow(1 + slot_of(pattern, next, b)),
                                 // not touched by these rows: its entries are zero
-                                std::cmp::Ordering::Less => NONE,
+                                std::cmp::Ordering::Less => u32::MAX,
                             });
                         }
                     }
                 }
             }
-            schedule.fronts.extend(pattern.column(body).map(|k| pattern.row(k) as u32));
-            schedule.targets.extend_from_slice(pattern.targets(body));
+            // what has gathered for this body is taken before it hands anything on
+            let node = nodes.hold(body);
+            nodes.release(body);
+            let column = pattern.column(body);
+            schedule.blocks.extend(column.clone().map(|k| blocks.hold(k)));
+            column.clone().for_each(|k| blocks.release(k));
+            schedule.fronts.extend(column.clone().map(|k| pattern.row(k) as u32));
+            schedule.nodes.extend(column.clone().map(|k| nodes.hold(pattern.row(k))));
+            schedule.targets.extend(pattern.targets(body).iter().map(|&k| blocks.hold(k as usize)));
             let kind = match (freedom, front, rows) {
-                (1, 0, 0) | (1, 1, 0) if link.pin && !turn.coupled && (front == 0 || parent != NONE) => Kind::Pin,
+                (1, 0, 0) | (1, 1, 0) if link.pin && !coupled && !all && (front == 0 || parent != NONE) => Kind::Pin,
                 (1, 1, 0..=3) => Kind::One(rows as u8),
                 (1, 2, 0..=3) => Kind::Two(rows as u8),
                 _ => Kind::Any,
             };
-            let parent = match link.parent {
-                Parent::Body(p) => p as u32,
-                Parent::Ground | Parent::Free => u32::MAX,
-            };
-            let turning = if link.moving[2] { (link.first + freedom - 1) as u32 } else { u32::MAX };
             let step = Step {
                 kind,
                 pin: link.pin,
                 gathers: false,
                 hands_on: false,
-                parent,
-                first: link.first as u32,
-                turning,
+                parent: match link.parent {
+                    Parent::Body(p) => narrow(p),
+                    Parent::Ground | Parent::Free => u32::MAX,
+                },
+                turns: link.moving[2],
+                coupled,
+                freedom: freedom as u8,
+                first: narrow(link.first),
                 joint,
+                node,
+                column: narrow(column.start),
+                coefficient_start: narrow(schedule.coefficient_entries),
+            };
+            schedule.coefficient_entries += match kind {
+                Kind::Pin => 2,
+                Kind::One(_) | Kind::Two(_) => 3 * front,
+                Kind::Any => freedom * (freedom + 3 * front),
             };
             joint += u32::from(!link.pin);
             schedule.steps.push(step);
             schedule.turns.push(turn);
         }
+        (schedule.node_count, schedule.block_count) = (nodes.count(), blocks.count());
         schedule.mark_runs(pattern);
         schedule
+    }
+
+    /// One body's turn.
+    #[inline(always)]
+    pub(super) fn turn(&self, body: usize) -> Turn {
+        self.turns[body].unpack(&self.steps[body])
+    }
+
+    /// The turns of all bodies.
+    pub(super) fn turns(&self) -> impl Iterator<Item = Turn> {
+        (0..self.steps.len()).map(|body| self.turn(body))
+    }
+
+    /// Place of a front body at the body its rows go to, by the index from [`Turn::map_start`] on; none: not there.
+    #[inline(always)]
+    pub(super) fn map(&self, index: usize) -> usize {
+        wide(self.maps[index])
     }
 }
 
@@ -264,11 +295,19 @@ impl Schedule {
         }
     }
 
-    /// The bodies after `first` that are pins of its run, itself included.
+    /// Pins of one run from `first` on, at most [`PIECE`]: what is read here is still near when their turn comes.
     #[inline(always)]
     pub(super) fn run(&self, first: usize) -> std::ops::Range<usize> {
-        let steps = &self.steps[first..];
+        let steps = &self.steps[first..self.steps.len().min(first + PIECE)];
         first..first + steps.iter().position(|s| s.kind != Kind::Pin).unwrap_or(steps.len())
+    }
+
+    /// Pins of one run that end before `end`, at most [`PIECE`].
+    #[inline(always)]
+    pub(super) fn run_before(&self, end: usize) -> std::ops::Range<usize> {
+        let start = end.saturating_sub(PIECE);
+        let first = self.steps[start..end].iter().rposition(|s| s.kind != Kind::Pin);
+        first.map_or(start, |k| start + k + 1)..end
     }
 }
 

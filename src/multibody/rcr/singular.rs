@@ -88,7 +88,7 @@ impl Reduction<f64> {
     fn entering(&self, linkage: &Linkage) -> Vec<Vec<Row>> {
         let mut waiting = vec![Vec::new(); linkage.links.len()];
         for (entry, closure) in self.schedule.entries.iter().zip(&linkage.closures) {
-            let turn = &self.schedule.turns[entry.body];
+            let turn = self.schedule.turn(entry.body);
             let width = 3 + 3 * turn.front + 1;
             for k in 0..closure.constraints() {
                 let start = turn.row_start + (entry.row + k) * width;
@@ -107,7 +107,7 @@ impl Reduction<f64> {
         waiting: &mut [Vec<Row>],
         report: &mut Singularity,
     ) -> Vec<Taken> {
-        let turn = self.schedule.turns[body];
+        let turn = self.schedule.turn(body);
         let (nd, w) = (turn.freedom, turn.front);
         let k = nd + 3 * w;
         let length = linkage.links[body].lever;
@@ -116,12 +116,12 @@ impl Reduction<f64> {
         let hard = shorten(hard, 3 + 3 * w, &columns, task.zero(), report);
         let heavy = shorten(heavy, 3 + 3 * w, &columns, 0.0, report);
         report.heavy = report.heavy.max(heavy.len());
-        let placed = self.placed[body];
-        let bias = if task == Task::Accelerations { placed.bias } else { [0.0; 2] };
+        let hanging = self.hanging[body];
+        let bias = if task == Task::Accelerations { hanging.bias } else { [0.0; 2] };
         // coordinates in units of length
         let units: Vec<f64> = self.units[turn.first..turn.first + nd].to_vec();
-        let axes: Vec<[f64; 3]> = (0..nd).map(|q| self.axes[turn.first + q].map(|x| x / units[q])).collect();
-        let [dx, dy] = placed.shift;
+        let axes: Vec<[f64; 3]> = (0..nd).map(|q| self.axis(body, turn.first + q).map(|x| x / units[q])).collect();
+        let [dx, dy] = hanging.shift();
         let local = |row: &Row| -> Row {
             let own = [row.entries[0], row.entries[1], row.entries[2]];
             let mut entries = vec![0.0; k + 1];
@@ -142,7 +142,7 @@ impl Reduction<f64> {
         let mut soft: Vec<Row> = heavy.iter().map(local).collect();
         let (mut m, mut g) = (vec![0.0; k * k], vec![0.0; k]);
         let torque: Vec<f64> = (0..nd).map(|q| self.torque[turn.first + q] / units[q]).collect();
-        self.assemble(linkage, task, body, turn, &axes, &torque, &mut m, &mut g);
+        self.assemble(task, body, turn, &axes, &torque, &mut m, &mut g);
         self.add_joint_inertia(body, turn, true, &mut m);
         // the articulated-body step, whose coordinates' own rows √D·(x + …) join the heavy ones
         let mut own: Vec<Row> = Vec::with_capacity(nd);
@@ -222,13 +222,13 @@ impl Reduction<f64> {
                 report.contradiction = report.contradiction.max(row.entries[k].abs());
             }
         }
-        self.hand_on(linkage, body, turn, &m, &g);
+        self.hand_on(turn, &m, &g);
         taken
     }
 
     /// Hands a row to the first body of the front that it touches.
     fn pass(&self, linkage: &Linkage, body: usize, row: &Row, waiting: &mut [Vec<Row>]) {
-        let turn = &self.schedule.turns[body];
+        let turn = self.schedule.turn(body);
         let nd = turn.freedom;
         let k = nd + 3 * turn.front;
         let pattern = &linkage.pattern;
@@ -253,7 +253,7 @@ impl Reduction<f64> {
     }
 
     fn outward_singular(&mut self, linkage: &Linkage, task: Task, body: usize, taken: &[Taken], out: &mut [f64]) {
-        let turn = self.schedule.turns[body];
+        let turn = self.schedule.turn(body);
         let (nd, start) = (turn.freedom, linkage.pattern.column(body).start);
         let k = nd + 3 * turn.front;
         let mut x = [0.0; 3];
@@ -272,21 +272,22 @@ impl Reduction<f64> {
             }
             x[step.coordinate] = value / step.row[step.coordinate];
         }
-        let placed = &self.placed[body];
+        let hanging = &self.hanging[body];
         let mut a = [0.0; 3];
         if let Parent::Body(p) = linkage.links[body].parent {
-            let up = self.accelerations[p];
-            a = [up[0] - placed.shift[1] * up[2], up[1] + placed.shift[0] * up[2], up[2]];
+            let (up, [dx, dy]) = (self.accelerations[p], hanging.shift());
+            a = [up[0] - dy * up[2], up[1] + dx * up[2], up[2]];
         }
         if task == Task::Accelerations {
-            a[0] += placed.bias[0];
-            a[1] += placed.bias[1];
+            a[0] += hanging.bias[0];
+            a[1] += hanging.bias[1];
         }
         for q in 0..nd {
             let value = x[q] / self.units[turn.first + q];
             out[turn.first + q] = value;
+            let axis = self.axis(body, turn.first + q);
             for i in 0..3 {
-                a[i] += self.axes[turn.first + q][i] * value;
+                a[i] += axis[i] * value;
             }
         }
         self.accelerations[body] = a;
