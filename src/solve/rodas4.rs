@@ -110,8 +110,8 @@ impl<S: LinearSolver> Method for Rodas4<S> {
         ramp.rate(s, &mut self.rate);
         system.drive_force(&motion.q, &self.drive, &self.rate, &mut self.stages.forcing);
         self.ports.begin(system, ramp, s, &motion.q, (&self.drive, &self.rate));
-        for i in 0..6 {
-            let at = s + ALPHA[i] * h;
+        for (i, alpha) in ALPHA.into_iter().enumerate() {
+            let at = s + alpha * h;
             ramp.at(at, &mut self.drive);
             self.stages.begin(model, i, h, motion);
             let (q, force) = self.stages.place(i, motion);
