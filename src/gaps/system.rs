@@ -78,6 +78,14 @@ impl System {
         self.model.project(r);
     }
 
+    /// `r += ∂Π/∂q − load`, held directions removed from the sum. Goes from the last joint to the first: between sweeps
+    /// over the bodies from the first to the last it finds in the caches what the one before left there.
+    pub fn add_residual(&self, q: &[Pose], drive: &Drive, r: &mut [Pose]) {
+        forces::add_elastic_backwards(&self.model, q, &drive.rest(), r);
+        self.add_body_forces(q, drive, r);
+        self.model.project(r);
+    }
+
     /// `r +=` the share of gaps, contacts and dead loads in the residual: minus the wrench on each body. A formulation that
     /// has its own way with joints needs only this of a system.
     pub fn add_body_forces(&self, q: &[Pose], drive: &Drive, r: &mut [Pose]) {
@@ -98,6 +106,11 @@ impl System {
     /// The tangent ∂r/∂q and the residual r. The tangent's held directions are left to the caller, who may add inertia.
     pub fn tangent(&self, q: &[Pose], drive: &Drive, tangent: &mut BlockMatrix<f64, 3>, r: &mut [Pose]) {
         r.fill(Pose::zeros());
+        self.add_tangent(q, drive, tangent, r);
+    }
+
+    /// [`System::tangent`] with the residual added to `r`, held directions removed from the sum.
+    pub fn add_tangent(&self, q: &[Pose], drive: &Drive, tangent: &mut BlockMatrix<f64, 3>, r: &mut [Pose]) {
         tangent.clear();
         forces::add_tangent(&self.model, q, &drive.rest(), tangent, r);
         for (gap, &volts) in self.gaps.iter().zip(&drive.volts) {
@@ -113,6 +126,11 @@ impl System {
     /// `out = (∂r/∂drive)·change` at `drive`, held directions removed.
     pub fn drive_force(&self, q: &[Pose], drive: &Drive, change: &Drive, out: &mut [Pose]) {
         out.fill(Pose::zeros());
+        self.add_drive_force(q, drive, change, out);
+    }
+
+    /// `out += (∂r/∂drive)·change` at `drive`, held directions removed from the sum.
+    pub fn add_drive_force(&self, q: &[Pose], drive: &Drive, change: &Drive, out: &mut [Pose]) {
         forces::add_rest_change(&self.model, q, &change.rest(), out);
         for ((gap, &volts), &dv) in self.gaps.iter().zip(&drive.volts).zip(&change.volts) {
             if dv != 0.0 {

@@ -22,6 +22,14 @@ pub struct Body {
     pub free: Option<Box<Block>>,
 }
 
+impl Body {
+    /// The mass matrix' diagonal.
+    #[inline]
+    pub fn mass_diagonal(&self) -> Pose {
+        Pose::new(self.mass, self.mass, self.inertia)
+    }
+}
+
 /// A name that the bodies of one beam share, with the number of the segment: `beam[3]`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct BodyName {

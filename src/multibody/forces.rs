@@ -96,8 +96,24 @@ pub fn add_offset_change(model: &Model, joint: &LaidJoint, q: &[Pose], offset: f
 
 /// `r += ∂U/∂q`, the elastic forces at displacement `q`.
 pub fn add_elastic(model: &Model, q: &[Pose], rest: &RestStrain<'_>, r: &mut [Pose]) {
+    add_joints(model, model.joints.iter(), q, rest, r);
+}
+
+/// [`add_elastic`] from the last joint to the first.
+pub fn add_elastic_backwards(model: &Model, q: &[Pose], rest: &RestStrain<'_>, r: &mut [Pose]) {
+    add_joints(model, model.joints.iter().rev(), q, rest, r);
+}
+
+#[inline(always)]
+fn add_joints<'a>(
+    model: &Model,
+    joints: impl Iterator<Item = &'a LaidJoint>,
+    q: &[Pose],
+    rest: &RestStrain<'_>,
+    r: &mut [Pose],
+) {
     let mut turns = Turns::new();
-    for joint in &model.joints {
+    for joint in joints {
         let section = model.section(joint);
         let k = turns.kinematics(model.linear, joint, section, q);
         scatter(joint.place, k.forces(&joint.stress(section, &k, rest)), r);
@@ -184,6 +200,9 @@ pub fn kinetic_energy(model: &Model, v: &[Pose]) -> f64 {
 
 /// `r += (∂²U/∂q∂rest)·change`: the forces that a change of the rest offsets brings.
 pub fn add_rest_change(model: &Model, q: &[Pose], change: &RestStrain<'_>, r: &mut [Pose]) {
+    if change.built_in == 0.0 && change.expansion.iter().all(|&e| e == 0.0) {
+        return;
+    }
     let mut turns = Turns::new();
     for joint in &model.joints {
         let section = model.section(joint);
@@ -200,8 +219,17 @@ pub fn add_damping(model: &Model, v: &[Pose], r: &mut [Pose]) {
     for (body, (v, r)) in model.bodies.iter().zip(v.iter().zip(r.iter_mut())) {
         *r += body.drag.force(v);
     }
+    add_dampers(model, |k| v[k], r);
+}
+
+/// `r +=` the forces of dampers, with the rate of each body from `v`.
+pub(crate) fn add_dampers(model: &Model, v: impl Fn(usize) -> Pose, r: &mut [Pose]) {
+    let rate = |id: BodyId| match id {
+        BodyId::Ground => Pose::zeros(),
+        BodyId::Free(k) => v(k),
+    };
     for (damper, matrix) in model.dampers.iter().zip(&model.damper_matrix) {
-        let (va, vb) = (Model::pose(v, damper.a), Model::pose(v, damper.b));
+        let (va, vb) = (rate(damper.a), rate(damper.b));
         let pair = nalgebra::Vector6::new(va.x, va.y, va.z, vb.x, vb.y, vb.z);
         let f = matrix * pair;
         for (id, part) in [(damper.a, f.fixed_rows::<3>(0)), (damper.b, f.fixed_rows::<3>(3))] {

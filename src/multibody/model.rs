@@ -3,7 +3,7 @@
 use super::body::Body;
 use super::order::elimination_order;
 use super::pattern::Pattern;
-use super::planar::{JointFrame, Pose};
+use super::planar::{Block, JointFrame, Pose};
 use super::section::{LaidJoint, NONE, Place, Section, Sections};
 use nalgebra::{Matrix2, Matrix3, Matrix6, Vector3};
 use serde::{Deserialize, Serialize};
@@ -232,17 +232,18 @@ impl Model {
     /// The mass matrix' diagonal of one body.
     #[inline]
     pub fn mass(&self, body: usize) -> Pose {
-        let b = &self.bodies[body];
-        Pose::new(b.mass, b.mass, b.inertia)
+        self.bodies[body].mass_diagonal()
+    }
+
+    /// Bodies with held directions, ascending, and the projectors onto the free ones.
+    pub fn held(&self) -> impl Iterator<Item = (usize, &Block)> {
+        self.held.iter().filter_map(|&k| Some((k as usize, self.bodies[k as usize].free.as_deref()?)))
     }
 
     /// Removes the held directions from a vector.
     pub fn project(&self, x: &mut [Pose]) {
-        for &k in &self.held {
-            let k = k as usize;
-            if let Some(p) = &self.bodies[k].free {
-                x[k] = **p * x[k];
-            }
+        for (k, free) in self.held() {
+            x[k] = free * x[k];
         }
     }
 

@@ -8,6 +8,9 @@
 //! r₂ = −r(q_i, t_i) − C·v_i + M·Σ c_ij/h·Uv_j + γ_i·h·∂F/∂t
 //! W·Uq_i = r₂ + (M/(γh) + C)·r₁,   Uv_i = Uq_i/(γh) − r₁
 //! ```
+//! Since r₁ − v_i = Σ c_ij/h·Uq_j, damping acts on that sum alone: everything but r itself is known before the forces are
+//! evaluated, and the forces are added to it.
+//!
 //! Its stability function is L-stable: axial motions of stiff beams, a thousand times faster than the step, die out.
 //!
 //! Sensitivities with respect to the final port voltages go through the same stages with the exact tangent of each, so the
@@ -15,12 +18,16 @@
 //!
 //! Reference: E. Hairer, G. Wanner, "Solving Ordinary Differential Equations II" (1996), §IV.7 and table 7.1 (RODAS).
 
+mod ports;
+mod stages;
+
 use super::linear::{LinearSolver, Recursion};
 pub use super::method::Motion;
 use super::method::{Method, StepFailure, Work};
 use crate::gaps::{Drive, Ramp, System};
-use crate::multibody::planar::Pose;
-use crate::multibody::{BlockMatrix, Pattern, forces};
+use crate::multibody::{BlockMatrix, forces};
+use ports::Ports;
+use stages::Stages;
 
 const GAMMA: f64 = 0.25;
 /// Stage positions α_i and γ_i.
@@ -50,29 +57,13 @@ const C: [[f64; 5]; 6] = [
 pub struct Rodas4<S = Recursion> {
     solver: S,
     w: BlockMatrix<f64, 3>,
-    stage_tangent: BlockMatrix<f64, 3>,
-    stages: Vec<Motion>,
-    at: Motion,
-    force: Vec<Pose>,
-    forcing: Vec<Pose>,
-    scratch: Vec<Pose>,
-    change_work: Vec<Pose>,
+    stages: Stages,
     drive: Drive,
     rate: Drive,
-    change: Drive,
-    sources: Vec<usize>,
-    ports: Vec<PortStages>,
+    ports: Ports,
     /// ∂motion/∂(final voltage of a source), one for each source given to [`Rodas4::new`]; advanced with the motion.
     pub sensitivity: Vec<Motion>,
     work: Work,
-}
-
-/// Stage storage of one port's sensitivity.
-#[derive(Debug, Clone)]
-struct PortStages {
-    stages: Vec<Motion>,
-    at: Motion,
-    forcing: Vec<Pose>,
 }
 
 impl Rodas4 {
@@ -85,144 +76,16 @@ impl Rodas4 {
 impl<S: LinearSolver> Rodas4<S> {
     /// [`Rodas4::new`] with another solver of its linear systems.
     pub fn with_solver(solver: S, system: &System, sources: &[usize]) -> Self {
-        let n = system.bodies();
-        let zeros = vec![Pose::zeros(); n];
-        let nothing = Pattern::new(0, &[]);
-        let port = |_| PortStages { stages: vec![Motion::zeros(n); 6], at: Motion::zeros(n), forcing: zeros.clone() };
         Self {
             solver,
             w: BlockMatrix::new(&system.model.pattern),
-            // only sensitivities need the tangent of every stage
-            stage_tangent: BlockMatrix::new(if sources.is_empty() { &nothing } else { &system.model.pattern }),
-            stages: vec![Motion::zeros(n); 6],
-            at: Motion::zeros(n),
-            force: zeros.clone(),
-            forcing: zeros.clone(),
-            scratch: zeros.clone(),
-            change_work: if sources.is_empty() { Vec::new() } else { zeros.clone() },
+            stages: Stages::new(&system.model),
             drive: system.electrics.drive(),
             rate: system.electrics.drive(),
-            change: system.electrics.drive(),
-            sources: sources.to_vec(),
-            ports: sources.iter().map(port).collect(),
-            sensitivity: vec![Motion::zeros(n); sources.len()],
+            ports: Ports::new(system, sources),
+            sensitivity: vec![Motion::zeros(system.bodies()); sources.len()],
             work: Work::default(),
         }
-    }
-
-    /// The step of [`Method::step`], with the sensitivities of `sensitivity` beside the motion.
-    #[allow(clippy::too_many_arguments)]
-    fn step_with(
-        &mut self,
-        system: &System,
-        ramp: &Ramp<'_>,
-        s: f64,
-        h: f64,
-        motion: &mut Motion,
-        error: &mut Motion,
-        sensitivity: &mut [Motion],
-    ) -> Result<(), StepFailure> {
-        let model = &system.model;
-        let gh = GAMMA * h;
-        ramp.at(s, &mut self.drive);
-        self.drive.load = 1.0;
-        system.tangent(&motion.q, &self.drive, &mut self.w, &mut self.force);
-        if !sensitivity.is_empty() {
-            self.stage_tangent.diagonal.copy_from_slice(&self.w.diagonal);
-            self.stage_tangent.below.copy_from_slice(&self.w.below);
-        }
-        forces::add_inertia(model, 1.0 / (gh * gh), 1.0 / gh, &mut self.w);
-        model.project_matrix(&mut self.w);
-        self.solver.factor(&model.pattern, &mut self.w)?;
-        self.work.factorizations += 1;
-        self.work.forces += 6;
-        ramp.rate(s, &mut self.rate);
-        system.drive_force(&motion.q, &self.drive, &self.rate, &mut self.forcing);
-        self.forcing_sensitivities(system, ramp, s, motion);
-        for i in 0..6 {
-            combine(&mut self.at, motion, &self.stages[..i], &A[i]);
-            if i > 0 {
-                ramp.at(s + ALPHA[i] * h, &mut self.drive);
-                if sensitivity.is_empty() {
-                    system.residual(&self.at.q, &self.drive, &mut self.force);
-                } else {
-                    system.tangent(&self.at.q, &self.drive, &mut self.stage_tangent, &mut self.force);
-                }
-            }
-            // sensitivities first: they need this stage's tangent, and `force` is consumed below
-            for (p, start) in sensitivity.iter().enumerate() {
-                self.sensitivity_stage(system, ramp, s, h, i, p, start);
-            }
-            forces::add_damping(model, &self.at.v, &mut self.force);
-            let (before, rest) = self.stages.split_at_mut(i);
-            let stage = &mut rest[0];
-            finish_stage(
-                system,
-                (&self.solver, &self.w),
-                before,
-                i,
-                h,
-                &self.at.v,
-                &self.force,
-                &self.forcing,
-                stage,
-                &mut self.scratch,
-            );
-            self.work.solves += 1;
-        }
-        // stiffly accurate: the last stage's argument plus its increment is the new value, the increment the error
-        motion.copy(&self.at);
-        motion.add(1.0, &self.stages[5]);
-        error.copy(&self.stages[5]);
-        for (p, s) in sensitivity.iter_mut().enumerate() {
-            s.copy(&self.ports[p].at);
-            s.add(1.0, &self.ports[p].stages[5]);
-        }
-        Ok(())
-    }
-
-    /// ∂(∂r/∂drive·rate)/∂(final voltage) of each port at the start of the step.
-    fn forcing_sensitivities(&mut self, system: &System, ramp: &Ramp<'_>, s: f64, motion: &Motion) {
-        for (port, &source) in self.ports.iter_mut().zip(&self.sources) {
-            ramp.rate_sensitivity(s, source, &mut self.change);
-            system.drive_force(&motion.q, &self.drive, &self.change, &mut port.forcing);
-            // forces are quadratic in gap voltages: the voltage that rate acts on changes too
-            ramp.sensitivity(s, source, &mut self.change);
-            self.change.expansion.fill(0.0);
-            system.drive_force(&motion.q, &self.rate, &self.change, &mut self.scratch);
-            for (f, x) in port.forcing.iter_mut().zip(&self.scratch) {
-                *f += x;
-            }
-        }
-    }
-
-    #[allow(clippy::too_many_arguments)]
-    fn sensitivity_stage(
-        &mut self,
-        system: &System,
-        ramp: &Ramp<'_>,
-        s: f64,
-        h: f64,
-        i: usize,
-        p: usize,
-        start: &Motion,
-    ) {
-        let port = &mut self.ports[p];
-        combine(&mut port.at, start, &port.stages[..i], &A[i]);
-        ramp.sensitivity(s + ALPHA[i] * h, self.sources[p], &mut self.change);
-        let force = &mut self.scratch;
-        system.drive_force(&self.at.q, &self.drive, &self.change, force);
-        self.stage_tangent.multiply_add(&system.model.pattern, &port.at.q, force);
-        forces::add_damping(&system.model, &port.at.v, force);
-        system.model.project(force);
-        let force = std::mem::take(&mut self.scratch);
-        let (before, rest) = port.stages.split_at_mut(i);
-        let mut work = std::mem::take(&mut self.change_work);
-        let matrix = (&self.solver, &self.w);
-        finish_stage(system, matrix, before, i, h, &port.at.v, &force, &port.forcing, &mut rest[0], &mut work);
-        self.scratch = force;
-        self.change_work = work;
-        self.work.solves += 1;
     }
 }
 
@@ -240,10 +103,39 @@ impl<S: LinearSolver> Method for Rodas4<S> {
         motion: &mut Motion,
         error: &mut Motion,
     ) -> Result<(), StepFailure> {
-        let mut sensitivity = std::mem::take(&mut self.sensitivity);
-        let done = self.step_with(system, ramp, s, h, motion, error, &mut sensitivity);
-        self.sensitivity = sensitivity;
-        done
+        let model = &system.model;
+        let gh = GAMMA * h;
+        ramp.at(s, &mut self.drive);
+        self.drive.load = 1.0;
+        ramp.rate(s, &mut self.rate);
+        system.drive_force(&motion.q, &self.drive, &self.rate, &mut self.stages.forcing);
+        self.ports.begin(system, ramp, s, &motion.q, (&self.drive, &self.rate));
+        for (i, alpha) in ALPHA.into_iter().enumerate() {
+            let at = s + alpha * h;
+            ramp.at(at, &mut self.drive);
+            self.stages.begin(model, i, h, motion);
+            let (q, force) = self.stages.place(i, motion);
+            if i == 0 {
+                system.add_tangent(q, &self.drive, &mut self.w, force);
+                self.ports.keep_tangent(&self.w);
+                forces::add_inertia(model, 1.0 / (gh * gh), 1.0 / gh, &mut self.w);
+                model.project_matrix(&mut self.w);
+                self.solver.factor(&model.pattern, &mut self.w)?;
+                self.work.factorizations += 1;
+                self.work.forces += 6;
+            } else if let Some(tangent) = self.ports.tangent() {
+                system.add_tangent(q, &self.drive, tangent, force);
+            } else {
+                system.add_residual(q, &self.drive, force);
+            }
+            self.solver.solve(&model.pattern, &self.w, force);
+            let matrix = (&self.solver, &self.w);
+            let solves = self.ports.stage(system, ramp, (i, at, h), (q, &self.drive), matrix, &mut self.sensitivity);
+            self.work.solves += 1 + solves;
+        }
+        self.stages.finish(model, h, motion, Some(error));
+        self.ports.finish(model, h, &mut self.sensitivity);
+        Ok(())
     }
 
     fn carried(&mut self) -> &mut [Motion] {
@@ -253,60 +145,6 @@ impl<S: LinearSolver> Method for Rodas4<S> {
     fn work(&self) -> Work {
         self.work
     }
-}
-
-/// `at = from + Σ factors[j]·before[j]`, in one pass.
-fn combine(at: &mut Motion, from: &Motion, before: &[Motion], factors: &[f64; 5]) {
-    for (k, (q, v)) in at.q.iter_mut().zip(&mut at.v).enumerate() {
-        let (mut sum_q, mut sum_v) = (from.q[k], from.v[k]);
-        for (stage, &factor) in before.iter().zip(factors) {
-            sum_q += stage.q[k] * factor;
-            sum_v += stage.v[k] * factor;
-        }
-        (*q, *v) = (sum_q, sum_v);
-    }
-}
-
-/// Solves one stage: `force` is r + C·v at the stage, `forcing` ∂r/∂t at the start of the step.
-#[allow(clippy::too_many_arguments)]
-fn finish_stage<S: LinearSolver>(
-    system: &System,
-    (solver, w): (&S, &BlockMatrix<f64, 3>),
-    before: &[Motion],
-    i: usize,
-    h: f64,
-    v: &[Pose],
-    force: &[Pose],
-    forcing: &[Pose],
-    stage: &mut Motion,
-    damped: &mut [Pose],
-) {
-    let model = &system.model;
-    let gh = GAMMA * h;
-    let c = C[i].map(|c| c / h);
-    // r₁ into stage.v, and its damping force into `damped`
-    for (k, r1) in stage.v.iter_mut().enumerate() {
-        let mut sum = v[k];
-        for (u, c) in before.iter().zip(c) {
-            sum += u.q[k] * c;
-        }
-        *r1 = sum;
-    }
-    damped.fill(Pose::zeros());
-    forces::add_damping(model, &stage.v, damped);
-    for (k, b) in stage.q.iter_mut().enumerate() {
-        let mut momentum = stage.v[k] / gh;
-        for (u, c) in before.iter().zip(c) {
-            momentum += u.v[k] * c;
-        }
-        *b = damped[k] - force[k] - forcing[k] * (GAMMA_I[i] * h) + model.mass(k).component_mul(&momentum);
-    }
-    model.project(&mut stage.q);
-    solver.solve(&model.pattern, w, &mut stage.q);
-    for (r1, u) in stage.v.iter_mut().zip(&stage.q) {
-        *r1 = u / gh - *r1;
-    }
-    model.project(&mut stage.v);
 }
 
 #[cfg(test)]
