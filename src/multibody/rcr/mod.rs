@@ -16,6 +16,9 @@
 //! | `general` | the turn of any body |
 //! | `kernels` | one coordinate and small fronts, in closed form |
 //! | `lanes` | the recursion over lanes of variants, in vector instructions |
+//! | `subtrees` | subtrees of one mechanism that are equal in structure |
+//! | `layout` | how they are laid into packs of eight |
+//! | `packs` | their recursion side by side, and what they exchange with the rest |
 //! | `singular` | the recursion near singular configurations |
 //! | [`real`] | what it runs over: one number, or lanes of variants |
 
@@ -29,8 +32,10 @@ mod front;
 mod general;
 mod kernels;
 mod lanes;
+mod layout;
 pub mod linkage;
 mod motion;
+mod packs;
 mod pins;
 mod project;
 pub mod real;
@@ -38,6 +43,7 @@ pub mod reduce;
 pub mod rotary;
 mod schedule;
 mod singular;
+mod subtrees;
 
 pub use linkage::{Closure, Link, Linkage, Parent};
 pub use real::{Lanes, Real};

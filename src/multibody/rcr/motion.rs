@@ -13,6 +13,7 @@
 use super::linkage::{Link, Linkage, Parent};
 use super::real::Real;
 use super::schedule::Step;
+use std::ops::Range;
 
 /// Two components.
 pub(super) type Pair<T> = [T; 2];
@@ -102,6 +103,28 @@ impl<T: Real> Placed<T> {
         lever_parent: [T::ZERO; 2],
         bias: [T::ZERO; 2],
     };
+
+    /// Takes `from` as one of the lanes.
+    #[inline(always)]
+    pub(super) fn set_lane<U: Real>(&mut self, lane: usize, from: &Placed<U>) {
+        let set = |to: &mut [T], from: &[U]| to.iter_mut().zip(from).for_each(|(t, f)| t.set_lane(lane, f.lane(0)));
+        set(&mut self.pose, &from.pose);
+        set(&mut self.rate, &from.rate);
+        set(&mut self.half, &from.half);
+    }
+
+    /// One of the lanes.
+    pub(super) fn one<U: Real>(&self, lane: usize) -> Placed<U> {
+        let pair = |x: Pair<T>| x.map(|x| U::splat(x.lane(lane)));
+        Placed {
+            pose: self.pose.map(|x| U::splat(x.lane(lane))),
+            rate: self.rate.map(|x| U::splat(x.lane(lane))),
+            half: pair(self.half),
+            shift: pair(self.shift),
+            lever_parent: pair(self.lever_parent),
+            bias: pair(self.bias),
+        }
+    }
 
     /// (R − 1)·v without cancellation at small angles.
     #[inline(always)]
@@ -236,8 +259,9 @@ fn place_joint<T: Real>(
 /// Bodies whose sines are taken together.
 const BLOCK: usize = 16;
 
-/// Places every body, root → leaf, in blocks: angles first, so that the sines of a block are taken side by side.
+/// Places the bodies of `range`, root → leaf, in blocks: angles first, so that the sines of a block are taken side by side.
 #[inline(always)]
+#[allow(clippy::too_many_arguments)]
 pub(super) fn place_all<T: Real>(
     linkage: &Linkage,
     steps: &[Step],
@@ -246,11 +270,12 @@ pub(super) fn place_all<T: Real>(
     v: &[T],
     placed: &mut [Placed<T>],
     axes: &mut [[T; 3]],
+    range: Range<usize>,
 ) {
     let rest = Placed::REST;
-    let mut end = steps.len();
-    while end > 0 {
-        let start = end.saturating_sub(BLOCK);
+    let mut end = range.end;
+    while end > range.start {
+        let start = end.saturating_sub(BLOCK).max(range.start);
         let mut halves = [[T::ZERO; BLOCK]; 2];
         for body in (start..end).rev() {
             let step = &steps[body];

@@ -17,6 +17,7 @@
 use super::real::Real;
 use super::reduce::{Node, Reduction};
 use super::schedule::Kind;
+use std::ops::Range;
 
 /// What one pin's body hands to the next inward, about the pin between them.
 #[derive(Clone, Copy)]
@@ -36,11 +37,11 @@ impl<T: Real> Handed<T> {
 }
 
 impl<T: Real> Reduction<T> {
-    /// Takes the coordinates of a run of pins out, from body `first` on. Returns the body after the run. `FORCED`: with
-    /// forces and velocity parts.
+    /// Takes the coordinates of a run of pins out, from body `first` on and not beyond `end`. Returns the body after the
+    /// run. `FORCED`: with forces and velocity parts.
     #[inline(always)]
-    pub(super) fn pins_inward<const FORCED: bool>(&mut self, first: usize) -> usize {
-        let run = self.schedule.run(first);
+    pub(super) fn pins_inward<const FORCED: bool>(&mut self, first: usize, end: usize) -> usize {
+        let run = self.schedule.run(first, end);
         let mut handed = Handed::NOTHING;
         let zipped = (self.schedule.steps[run.clone()].iter().zip(&self.links[run.clone()]))
             .zip(self.placed[run.clone()].iter().zip(&self.force[run.clone()]));
@@ -112,13 +113,14 @@ impl<T: Real> Reduction<T> {
         run.end
     }
 
-    /// Accelerations of the bodies of a run of pins that ends before `end`, root → leaf. Returns its first body.
+    /// Accelerations of the bodies of a run of pins that ends with `range`, root → leaf. Returns its first body, which lies
+    /// in `range`.
     #[inline(always)]
-    pub(super) fn pins_outward<const FORCED: bool>(&mut self, end: usize, out: &mut [T]) -> usize {
-        let steps = &self.schedule.steps[..end];
-        let first = steps.iter().rposition(|s| s.kind != Kind::Pin).map_or(0, |k| k + 1);
-        let run = first..end;
-        let zipped = (steps[run.clone()].iter().zip(&self.links[run.clone()]))
+    pub(super) fn pins_outward<const FORCED: bool>(&mut self, range: Range<usize>, out: &mut [T]) -> usize {
+        let steps = &self.schedule.steps[range.clone()];
+        let first = range.start + steps.iter().rposition(|s| s.kind != Kind::Pin).map_or(0, |k| k + 1);
+        let run = first..range.end;
+        let zipped = (self.schedule.steps[run.clone()].iter().zip(&self.links[run.clone()]))
             .zip(self.placed[run.clone()].iter().zip(&self.nodes[run.clone()]));
         // of the body after, which is the parent along a chain
         let mut after = [T::ZERO; 3];

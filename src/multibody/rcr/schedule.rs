@@ -264,10 +264,10 @@ impl Schedule {
         }
     }
 
-    /// The bodies after `first` that are pins of its run, itself included.
+    /// The bodies after `first` and before `end` that are pins of its run, itself included.
     #[inline(always)]
-    pub(super) fn run(&self, first: usize) -> std::ops::Range<usize> {
-        let steps = &self.steps[first..];
+    pub(super) fn run(&self, first: usize, end: usize) -> std::ops::Range<usize> {
+        let steps = &self.steps[first..end];
         first..first + steps.iter().position(|s| s.kind != Kind::Pin).unwrap_or(steps.len())
     }
 }
