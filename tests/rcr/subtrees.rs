@@ -68,12 +68,12 @@ fn arms_of_a_hub() {
     for count in 3..20 {
         let packed = same_bits(&topologies::arms(count, 2).pinned(), count as u64, 0.05);
         let arms = count - 1;
-        assert_eq!(packed, 2 * if arms % 8 < 3 { arms - arms % 8 } else { arms }, "{count}");
+        assert_eq!(packed, 2 * if arms % 8 < 5 { arms - arms % 8 } else { arms }, "{count}");
     }
 }
 
 /// Bimorphs on yokes, yokes on stages, stages on a rotor, on pins and with flexible joints: every bit is that of each body on
-/// its own, and of twenty bimorphs on a yoke four bodies in five go side by side.
+/// its own, and of twenty bimorphs on a yoke three bodies in four go side by side.
 #[test]
 fn bimorphs_on_yokes() {
     for (name, units) in [("bank", 5), ("bank", 20), ("quarter", 6), ("rotary", 2), ("arms", 9)] {
@@ -81,7 +81,7 @@ fn bimorphs_on_yokes() {
         for (kind, model, size) in [("pins", topology.pinned(), 0.05), ("flexible", topology.model(), 1e-8)] {
             let packed = same_bits(&model, units as u64, size);
             assert!(packed > 0, "{name} {units} {kind}");
-            assert!(units < 20 || 5 * packed > 4 * model.bodies.len(), "{name} {units} {kind}: {packed}");
+            assert!(units < 20 || 4 * packed > 3 * model.bodies.len(), "{name} {units} {kind}: {packed}");
         }
     }
 }
@@ -147,5 +147,5 @@ fn random_trunks() {
         packed += same_bits(&model, seed + 7, 0.2);
         bodies += model.bodies.len();
     }
-    assert!(2 * packed > bodies, "{packed} of {bodies}");
+    assert!(5 * packed > 2 * bodies, "{packed} of {bodies}");
 }

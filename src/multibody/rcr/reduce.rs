@@ -17,6 +17,7 @@ use super::packs::{Item, Packs};
 use super::real::Real;
 use super::schedule::{Kind, NONE, Schedule, Turn};
 use std::ops::Range;
+use std::slice::from_ref;
 
 /// What the right-hand side of a reduction is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -172,8 +173,8 @@ impl<T: Real> Reduction<T> {
     #[inline(always)]
     pub fn place(&mut self, linkage: &Linkage, q: &[T], v: &[T]) {
         let mut packs = self.take_packs();
-        let all = [0..self.links.len()];
-        for range in packs.as_ref().map_or(&all[..], |p| &p.rest).iter().rev() {
+        let all = 0..self.links.len();
+        for range in packs.as_ref().map_or(from_ref(&all), |p| &p.rest).iter().rev() {
             self.place_bodies(linkage, range.clone(), q, v);
         }
         if let Some(packs) = &mut packs {
@@ -214,8 +215,8 @@ impl<T: Real> Reduction<T> {
     pub(super) fn write_rows(&mut self, task: Task) -> T {
         let mut packs = self.take_packs();
         let mut largest = packs.as_mut().map_or(T::ZERO, |p| T::splat(p.rows(task)));
-        let all = [0..self.closures.len()];
-        for range in packs.as_ref().map_or(&all[..], |p| &p.rest_closures) {
+        let all = 0..self.closures.len();
+        for range in packs.as_ref().map_or(from_ref(&all), |p| &p.rest_closures) {
             largest = largest.max(self.rows_of(task, range.clone()));
         }
         self.packs = packs;
@@ -259,16 +260,16 @@ impl<T: Real> Reduction<T> {
     #[inline(always)]
     pub fn reduce(&mut self, linkage: &Linkage, task: Task, out: &mut [T]) {
         let mut packs = self.take_packs();
-        let (bodies, closures) = ([0..self.links.len()], [0..self.closures.len()]);
-        let all = [Item::Turns(bodies[0].clone())];
+        let (bodies, closures) = (0..self.links.len(), 0..self.closures.len());
+        let all = Item::Turns(bodies.clone());
         self.nearness = T::ZERO;
         if let Some(packs) = &mut packs {
             self.nearness = T::splat(packs.inward(task, &self.force, &self.torque));
         }
-        for range in packs.as_ref().map_or(&closures[..], |p| &p.rest_closures) {
+        for range in packs.as_ref().map_or(from_ref(&closures), |p| &p.rest_closures) {
             self.rows_of(task, range.clone());
         }
-        for item in packs.as_ref().map_or(&all[..], |p| &p.items) {
+        for item in packs.as_ref().map_or(from_ref(&all), |p| &p.items) {
             match (item, &packs) {
                 (Item::Turns(range), _) => self.turns_inward(linkage, task, range.clone()),
                 (Item::Node(to, terms), Some(packs)) => {
@@ -279,7 +280,7 @@ impl<T: Real> Reduction<T> {
                 (_, None) => {}
             }
         }
-        for range in packs.as_ref().map_or(&bodies[..], |p| &p.rest).iter().rev() {
+        for range in packs.as_ref().map_or(from_ref(&bodies), |p| &p.rest).iter().rev() {
             self.turns_outward(linkage, task, range.clone(), out);
         }
         if let Some(packs) = &mut packs {

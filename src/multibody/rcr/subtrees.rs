@@ -13,21 +13,16 @@ use super::schedule::{Entry, NONE, Schedule};
 use std::collections::HashMap;
 use std::ops::Range;
 
-/// Fewest subtrees that are reduced side by side: a pack costs about as much as two subtrees one after the other.
-const FEWEST: usize = 3;
+/// Fewest subtrees that are reduced side by side: a pack costs about as much as four subtrees one after the other.
+const FEWEST: usize = 5;
 
 /// Equal subtrees, each the range of its bodies in elimination order.
 pub(super) type Equal = Vec<Range<usize>>;
 
-/// The groups of at least [`FEWEST`] equal subtrees of a mechanism, disjoint. Groups that fill packs of `width` come before
-/// larger subtrees that do not; what is left over of a group when packs are full, and is fewer than `FEWEST`, is left out.
+/// The groups of at least [`FEWEST`] equal subtrees of a mechanism, the largest subtrees there are, disjoint. What is left
+/// over of a group when packs of `width` are full, and is fewer than `FEWEST`, is left out.
 pub(super) fn equal(linkage: &Linkage, schedule: &Schedule, width: usize) -> Vec<Equal> {
-    let shapes = Shapes::new(linkage, schedule);
-    let mut taken = vec![false; linkage.links.len()];
-    let mut groups = Vec::new();
-    for fewest in [width, FEWEST] {
-        groups.extend(shapes.choose(fewest, &mut taken));
-    }
+    let mut groups = Shapes::new(linkage, schedule).choose();
     for group in &mut groups {
         let left = group.len() % width;
         if left < FEWEST {
@@ -94,38 +89,28 @@ impl Shapes {
         Self { shape, size, shapes: known.len() }
     }
 
-    /// The largest subtrees of which there are `fewest` that are equal, among bodies that are not taken; takes them.
-    fn choose(&self, fewest: usize, taken: &mut [bool]) -> Vec<Equal> {
-        let count = self.shape.len();
-        let range = |body: usize| body + 1 - self.size[body]..body + 1;
-        let mut before = vec![0u32; count + 1];
-        for body in 0..count {
-            before[body + 1] = before[body] + u32::from(taken[body]);
-        }
-        let untouched = |r: &Range<usize>| before[r.start] == before[r.end];
-        let free: Vec<Option<u32>> = (0..count).map(|b| self.shape[b].filter(|_| untouched(&range(b)))).collect();
+    /// The largest subtrees of which there are [`FEWEST`] that are equal.
+    fn choose(&self) -> Vec<Equal> {
         let mut number = vec![0usize; self.shapes];
-        for &shape in free.iter().flatten() {
+        for &shape in self.shape.iter().flatten() {
             number[shape as usize] += 1;
         }
         let mut members: Vec<Equal> = vec![Vec::new(); self.shapes];
-        let mut body = count;
-        while body > 0 {
-            match free[body - 1].filter(|&s| number[s as usize] >= fewest) {
+        let mut end = self.shape.len();
+        while end > 0 {
+            let body = end - 1;
+            match self.shape[body].filter(|&s| number[s as usize] >= FEWEST) {
                 Some(shape) => {
-                    members[shape as usize].push(range(body - 1));
-                    body -= self.size[body - 1];
+                    let start = end - self.size[body];
+                    members[shape as usize].push(start..end);
+                    end = start;
                 }
-                None => body -= 1,
+                None => end = body,
             }
         }
-        members.retain(|m| m.len() >= fewest);
-        for member in members.iter_mut() {
-            member.reverse();
-            for range in member.iter() {
-                taken[range.clone()].fill(true);
-            }
-        }
+        // others of a shape may lie within larger subtrees
+        members.retain(|m| m.len() >= FEWEST);
+        members.iter_mut().for_each(|m| m.reverse());
         members
     }
 }
