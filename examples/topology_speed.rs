@@ -1,8 +1,9 @@
 //! Accelerations of pin-jointed chains, banks and ladders by recursive coordinate reduction: nanoseconds per body or loop.
 //!
-//! Prints `name,topology,count,ns` lines: `serial` for one mechanism, `lanes` for eight variants side by side (per variant).
-//! A chain counts bodies, a bank (arms of two rods to ground) and a ladder count loops. Best of several runs of the whole evaluation: positions, rates,
-//! velocity parts, reduction and accelerations.
+//! Prints `name,topology,count,ns` lines: `serial` for one mechanism, whose equal subtrees go side by side, `single` for the
+//! same with every body on its own, `lanes` for eight variants side by side (per variant). A chain counts bodies, a bank (arms
+//! of two rods to ground) and a ladder count loops. Best of several runs of the whole evaluation: positions, rates, velocity
+//! parts, reduction and accelerations.
 //!
 //! `cargo run --release --no-default-features --example topology_speed [COUNT…]`
 
@@ -42,6 +43,13 @@ fn measure(name: &str, count: usize, topology: &Topology) {
         serial.accelerate(linkage, black_box(&q), black_box(&v), &mut out);
     });
     println!("serial,{name},{count},{:.1}", t / count as f64);
+    let mut apart = out.clone();
+    let mut single = Reduction::<f64>::without_packs(&[linkage]);
+    single.force.fill([1e-9, -1e-8, 0.0]);
+    let t = best(|| single.accelerate(linkage, black_box(&q), black_box(&v), &mut apart));
+    println!("single,{name},{count},{:.1}", t / count as f64);
+    let same = out.iter().zip(&apart).all(|(a, b)| a.to_bits() == b.to_bits());
+    assert!(same, "equal subtrees side by side change the bits");
     let mut lanes = Reduction::<Lanes<8>>::new(&[linkage]);
     lanes.force.fill([Lanes::splat(1e-9), Lanes::splat(-1e-8), Lanes::ZERO]);
     let (ql, vl): (Vec<Lanes<8>>, Vec<Lanes<8>>) =

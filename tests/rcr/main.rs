@@ -6,3 +6,4 @@ mod dense;
 mod kinks;
 mod lanes;
 mod mechanism;
+mod subtrees;

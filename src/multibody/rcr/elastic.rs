@@ -24,6 +24,9 @@ impl Reduction<f64> {
                 data.rest = offset(joint.rest, joint.expansion, rest);
             }
         }
+        if let Some(packs) = &mut self.packs {
+            packs.prescribe(&self.joints, &self.closures);
+        }
     }
 
     /// Adds the elastic forces at the placed configuration to `torque` and `force`.
@@ -58,7 +61,7 @@ impl Reduction<f64> {
                 continue;
             }
             let at = |id| match id {
-                BodyId::Free(k) => self.placed[k],
+                BodyId::Free(k) => self.placed(k),
                 BodyId::Ground => Placed::REST,
             };
             let strains = self.closures[c].strains(&at(joint.a), &at(joint.b));
@@ -92,7 +95,7 @@ impl Reduction<f64> {
                 continue;
             }
             let at = |id| match id {
-                BodyId::Free(k) => self.placed[k],
+                BodyId::Free(k) => self.placed(k),
                 BodyId::Ground => Placed::REST,
             };
             let strains = self.closures[c].strains(&at(joint.a), &at(joint.b));
@@ -139,7 +142,7 @@ impl Reduction<f64> {
         for (c, closure) in linkage.closures.iter().enumerate() {
             let Closure::Joint(joint) = closure else { continue };
             let at = |id| match id {
-                BodyId::Free(k) => self.placed[k],
+                BodyId::Free(k) => self.placed(k),
                 BodyId::Ground => Placed::REST,
             };
             let strains = self.closures[c].strains(&at(joint.a), &at(joint.b));
@@ -154,9 +157,9 @@ impl Reduction<f64> {
 
     /// Kinetic energy at the placed configuration [J].
     pub fn kinetic_energy(&self, linkage: &Linkage) -> f64 {
-        (linkage.links.iter().zip(&self.placed))
-            .map(|(l, p)| {
-                let [x, y, w] = p.rate;
+        (linkage.links.iter().enumerate())
+            .map(|(body, l)| {
+                let [x, y, w] = self.rate(body);
                 0.5 * (l.mass * (x * x + y * y) + l.inertia * w * w)
             })
             .sum()

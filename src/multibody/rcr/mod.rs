@@ -18,6 +18,9 @@
 //! | `general` | the turn of any body |
 //! | `kernels` | one coordinate and small fronts, in closed form |
 //! | `lanes` | the recursion over lanes of variants, in vector instructions |
+//! | `subtrees` | subtrees of one mechanism that are equal in structure |
+//! | `layout` | how they are laid into packs of eight |
+//! | `packs` | their recursion side by side, and what they exchange with the rest |
 //! | `singular` | the recursion near singular configurations |
 //! | `implicit` | the recursion for a stage of an implicit method |
 //! | [`real`] | what it runs over: one number, or lanes of variants |
@@ -33,8 +36,10 @@ mod general;
 mod implicit;
 mod kernels;
 mod lanes;
+mod layout;
 pub mod linkage;
 mod motion;
+mod packs;
 mod pins;
 mod project;
 pub mod real;
@@ -43,6 +48,7 @@ pub mod rotary;
 mod schedule;
 mod singular;
 mod slots;
+mod subtrees;
 mod turn;
 
 pub use implicit::AddedInertia;

@@ -13,6 +13,7 @@
 use super::linkage::{Link, Linkage, Parent};
 use super::real::Real;
 use super::schedule::Step;
+use std::ops::Range;
 
 /// Two components.
 pub(super) type Pair<T> = [T; 2];
@@ -108,6 +109,25 @@ fn turned<T: Real>(half: Pair<T>) -> Pair<T> {
 impl<T: Real> Placed<T> {
     pub(super) const REST: Self = Self { pose: [T::ZERO; 3], rate: [T::ZERO; 3], half: [T::ZERO, T::ONE] };
 
+    /// Takes `from` as one of the lanes.
+    #[inline(always)]
+    pub(super) fn set_lane<U: Real>(&mut self, lane: usize, from: &Placed<U>) {
+        let set = |to: &mut [T], from: &[U]| to.iter_mut().zip(from).for_each(|(t, f)| t.set_lane(lane, f.lane(0)));
+        set(&mut self.pose, &from.pose);
+        set(&mut self.rate, &from.rate);
+        set(&mut self.half, &from.half);
+    }
+
+    /// One of the lanes.
+    pub(super) fn one<U: Real>(&self, lane: usize) -> Placed<U> {
+        let pair = |x: Pair<T>| x.map(|x| U::splat(x.lane(lane)));
+        Placed {
+            pose: self.pose.map(|x| U::splat(x.lane(lane))),
+            rate: self.rate.map(|x| U::splat(x.lane(lane))),
+            half: pair(self.half),
+        }
+    }
+
     /// (R − 1)·v without cancellation at small angles.
     #[inline(always)]
     pub(super) fn swing(&self, v: Pair<T>) -> Pair<T> {
@@ -125,6 +145,12 @@ impl<T: Real> Placed<T> {
 }
 
 impl<T: Real> Hanging<T> {
+    /// One of the lanes.
+    pub(super) fn one<U: Real>(&self, lane: usize) -> Hanging<U> {
+        let pair = |x: Pair<T>| x.map(|x| U::splat(x.lane(lane)));
+        Hanging { lever_parent: pair(self.lever_parent), lever: pair(self.lever), bias: pair(self.bias) }
+    }
+
     pub(super) const REST: Self = Self { lever_parent: [T::ZERO; 2], lever: [T::ZERO; 2], bias: [T::ZERO; 2] };
 
     /// From the parent's centre of mass to this one, d [m].
@@ -255,8 +281,9 @@ fn place_joint<T: Real>(
 /// Bodies whose sines are taken together.
 const BLOCK: usize = 16;
 
-/// Places every body, root → leaf, in blocks: angles first, so that the sines of a block are taken side by side.
+/// Places the bodies of `range`, root → leaf, in blocks: angles first, so that the sines of a block are taken side by side.
 #[inline(always)]
+#[allow(clippy::too_many_arguments)]
 pub(super) fn place_all<T: Real>(
     linkage: &Linkage,
     steps: &[Step],
@@ -265,11 +292,12 @@ pub(super) fn place_all<T: Real>(
     v: &[T],
     placed: &mut [Placed<T>],
     (hanging, axes): (&mut [Hanging<T>], &mut [[T; 3]]),
+    range: Range<usize>,
 ) {
     let rest = Placed::REST;
-    let mut end = steps.len();
-    while end > 0 {
-        let start = end.saturating_sub(BLOCK);
+    let mut end = range.end;
+    while end > range.start {
+        let start = end.saturating_sub(BLOCK).max(range.start);
         let mut halves = [[T::ZERO; BLOCK]; 2];
         let block = start..end;
         let (some, signs) = (&steps[block.clone()], &signs[block.clone()]);

@@ -36,14 +36,14 @@ impl<T: Real> Handed<T> {
 }
 
 impl<T: Real> Reduction<T> {
-    /// Takes the coordinates of a run of pins out, from body `first` on. Returns the body after the run. `FORCED`: with
-    /// forces and velocity parts.
+    /// Takes the coordinates of a run of pins out, from body `first` on and not beyond `end`. Returns the body after the
+    /// run. `FORCED`: with forces and velocity parts.
     #[inline(always)]
-    pub(super) fn pins_inward<const FORCED: bool>(&mut self, first: usize) -> usize {
-        let (mut run, mut handed) = (self.schedule.run(first), Handed::NOTHING);
+    pub(super) fn pins_inward<const FORCED: bool>(&mut self, first: usize, end: usize) -> usize {
+        let (mut run, mut handed) = (self.schedule.run(first, end), Handed::NOTHING);
         while !run.is_empty() {
             handed = self.some_pins_inward::<FORCED>(run.clone(), handed);
-            run = self.schedule.run(run.end);
+            run = self.schedule.run(run.end, end);
         }
         run.end
     }
@@ -125,14 +125,15 @@ impl<T: Real> Reduction<T> {
         handed
     }
 
-    /// Accelerations of the bodies of a run of pins that ends before `end`, root → leaf. Returns its first body.
+    /// Accelerations of the bodies of a run of pins that ends with `range`, root → leaf. Returns its first body, which lies
+    /// in `range`.
     #[inline(always)]
-    pub(super) fn pins_outward<const FORCED: bool>(&mut self, end: usize, out: &mut [T]) -> usize {
+    pub(super) fn pins_outward<const FORCED: bool>(&mut self, range: Range<usize>, out: &mut [T]) -> usize {
         // of the body after, which is the parent along a chain
-        let (mut run, mut after) = (self.schedule.run_before(end), [T::ZERO; 3]);
+        let (mut run, mut after) = (self.schedule.run_before(range.clone()), [T::ZERO; 3]);
         while !run.is_empty() {
             after = self.some_pins_outward::<FORCED>(run.clone(), after, out);
-            run = self.schedule.run_before(run.start);
+            run = self.schedule.run_before(range.start..run.start);
         }
         run.start
     }

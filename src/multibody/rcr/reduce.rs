@@ -14,8 +14,11 @@ use super::closure::ClosureData;
 use super::implicit::Added;
 use super::linkage::Linkage;
 use super::motion::{Arms, Hanging, JointData, LinkData, Placed, lane, place_all};
+use super::packs::{Item, Packs};
 use super::real::Real;
 use super::schedule::{Kind, NONE, Schedule, Turn};
+use std::ops::Range;
+use std::slice::from_ref;
 
 /// What the right-hand side of a reduction is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -55,7 +58,7 @@ pub struct Reduction<T> {
     pub(super) placed: Vec<Placed<T>>,
     pub(super) hanging: Vec<Hanging<T>>,
     /// Axes of the coordinates of joints that are no pins.
-    axes: Vec<[T; 3]>,
+    pub(super) axes: Vec<[T; 3]>,
     /// Wrench on each body: forces along x and y and moment about the centre of mass [N, N·m]. Set before reducing.
     pub force: Vec<[T; 3]>,
     /// Force on each coordinate [N or N·m]. Set before reducing.
@@ -78,6 +81,8 @@ pub struct Reduction<T> {
     /// Worst of lever/pivot over the dependent coordinates of the last reduction: 1 in a well-conditioned loop, infinite in
     /// a singular configuration. The squares of it multiply rounding errors.
     pub nearness: T,
+    /// Equal subtrees of the one mechanism, side by side.
+    pub(super) packs: Option<Box<Packs>>,
 }
 
 /// Room for one front at a time.
@@ -89,8 +94,18 @@ pub(super) struct Scratch<T> {
 }
 
 impl<T: Real> Reduction<T> {
-    /// Storage for one variant per lane; all must have the same tree and loops (fewer variants are repeated).
+    /// Storage for one variant per lane; all must have the same tree and loops (fewer variants are repeated). Over one
+    /// `f64`, subtrees that are equal in structure go side by side through vector instructions.
     pub fn new(variants: &[&Linkage]) -> Self {
+        let mut reduction = Self::without_packs(variants);
+        if T::LANES == 1 {
+            reduction.packs = Packs::new(variants[0], &reduction.schedule);
+        }
+        reduction
+    }
+
+    /// [`Reduction::new`] with every body on its own: slower where subtrees are equal, and the same bits.
+    pub fn without_packs(variants: &[&Linkage]) -> Self {
         Self::with_schedule(variants, Schedule::new(variants[0]))
     }
 
@@ -150,6 +165,7 @@ impl<T: Real> Reduction<T> {
             added: Vec::new(),
             added_coupling: Vec::new(),
             nearness: T::ZERO,
+            packs: None,
             schedule,
         }
     }
@@ -159,11 +175,35 @@ impl<T: Real> Reduction<T> {
         self.schedule.multiplications
     }
 
+    /// Number of bodies that are reduced side by side with those of equal subtrees.
+    pub fn side_by_side(&self) -> usize {
+        self.links.len() - self.packs.as_ref().map_or(self.links.len(), |p| p.rest.iter().map(Range::len).sum())
+    }
+
     /// Places all bodies for coordinates `q` and rates `v`.
     #[inline(always)]
     pub fn place(&mut self, linkage: &Linkage, q: &[T], v: &[T]) {
+        let mut packs = self.take_packs();
+        let all = 0..self.links.len();
+        for range in packs.as_ref().map_or(from_ref(&all), |p| &p.rest).iter().rev() {
+            self.place_bodies(linkage, range.clone(), q, v);
+        }
+        if let Some(packs) = &mut packs {
+            packs.place(&self.placed, q, v);
+        }
+        self.packs = packs;
+    }
+
+    /// The packs, to be given back; lanes of variants have none.
+    #[inline(always)]
+    fn take_packs(&mut self) -> Option<Box<Packs>> {
+        if T::LANES == 1 { self.packs.take() } else { None }
+    }
+
+    #[inline(always)]
+    pub(super) fn place_bodies(&mut self, linkage: &Linkage, range: Range<usize>, q: &[T], v: &[T]) {
         let (steps, given) = (&self.schedule.steps, (&self.arms[..], &self.signs[..], &self.joints[..]));
-        place_all(linkage, steps, given, q, v, &mut self.placed, (&mut self.hanging, &mut self.axes));
+        place_all(linkage, steps, given, q, v, &mut self.placed, (&mut self.hanging, &mut self.axes), range);
     }
 
     /// Axis of a coordinate of `body`.
@@ -178,23 +218,38 @@ impl<T: Real> Reduction<T> {
 
     /// Displacement and rotation of a body from its drawn place [m, m, rad].
     pub fn pose(&self, body: usize) -> [T; 3] {
-        self.placed[body].pose
+        self.packs.as_ref().and_then(|p| p.pose(body)).unwrap_or(self.placed[body].pose)
     }
 
     /// Rate of a body's pose.
     pub fn rate(&self, body: usize) -> [T; 3] {
-        self.placed[body].rate
+        self.packs.as_ref().and_then(|p| p.rate(body)).unwrap_or(self.placed[body].rate)
+    }
+
+    /// Where a body is and how it moves.
+    pub(super) fn placed(&self, body: usize) -> Placed<T> {
+        self.packs.as_ref().and_then(|p| p.placed(body)).unwrap_or(self.placed[body])
     }
 
     /// Writes the constraint rows of every closure for `task`. Returns the largest residual of a row.
     #[inline(always)]
     pub(super) fn write_rows(&mut self, task: Task) -> T {
-        let mut largest = T::ZERO;
-        if self.closures.is_empty() {
-            return largest;
+        let mut packs = self.take_packs();
+        let mut largest = packs.as_mut().map_or(T::ZERO, |p| T::splat(p.rows(task)));
+        let all = 0..self.closures.len();
+        for range in packs.as_ref().map_or(from_ref(&all), |p| &p.rest_closures) {
+            largest = largest.max(self.rows_of(task, range.clone()));
         }
+        self.packs = packs;
+        largest
+    }
+
+    /// The same for the closures of `range`.
+    #[inline(always)]
+    pub(super) fn rows_of(&mut self, task: Task, range: Range<usize>) -> T {
+        let mut largest = T::ZERO;
         let rest = Placed::REST;
-        for (closure, entry) in self.closures.iter().zip(&self.schedule.entries) {
+        for (closure, entry) in self.closures[range.clone()].iter().zip(&self.schedule.entries[range]) {
             let turn = self.schedule.turn(entry.body);
             let width = 3 + 3 * turn.front + 1;
             let [a, b] = entry.ends.map(|end| end.map_or(&rest, |body| &self.placed[body as usize]));
@@ -225,25 +280,51 @@ impl<T: Real> Reduction<T> {
     /// The result is right to rounding times the square of [`Reduction::nearness`].
     #[inline(always)]
     pub fn reduce(&mut self, linkage: &Linkage, task: Task, out: &mut [T]) {
-        self.write_rows(task);
-        self.inward(task);
-        self.outward(linkage, task, out);
+        let mut packs = self.take_packs();
+        let (bodies, closures) = (0..self.links.len(), 0..self.closures.len());
+        let all = Item::Turns(bodies.clone());
+        self.nearness = T::ZERO;
+        if let Some(packs) = &mut packs {
+            self.nearness = T::splat(packs.inward(task, &self.force, &self.torque));
+        }
+        for range in packs.as_ref().map_or(from_ref(&closures), |p| &p.rest_closures) {
+            self.rows_of(task, range.clone());
+        }
+        for item in packs.as_ref().map_or(from_ref(&all), |p| &p.items) {
+            match (item, &packs) {
+                (Item::Turns(range), _) => self.turns_inward(task, range.clone()),
+                (Item::Node(to, terms), Some(packs)) => {
+                    let node = &mut self.nodes[self.schedule.steps[*to].node as usize];
+                    packs.add_node(terms.clone(), &mut node.inertia, &mut node.momentum);
+                }
+                (Item::Block(to, terms), Some(packs)) => {
+                    packs.add_block(terms.clone(), &mut self.coupling[self.schedule.blocks[*to] as usize]);
+                }
+                (_, None) => {}
+            }
+        }
+        for range in packs.as_ref().map_or(from_ref(&bodies), |p| &p.rest).iter().rev() {
+            self.turns_outward(linkage, task, range.clone(), out);
+        }
+        if let Some(packs) = &mut packs {
+            packs.outward(task, &mut self.accelerations, out);
+        }
+        self.packs = packs;
     }
 
     #[inline(always)]
-    fn inward(&mut self, task: Task) {
-        self.nearness = T::ZERO;
-        let mut body = 0;
-        while body < self.links.len() {
+    pub(super) fn turns_inward(&mut self, task: Task, range: Range<usize>) {
+        let mut body = range.start;
+        while body < range.end {
             let Kind::Pin = self.schedule.steps[body].kind else {
                 self.front_inward(task, body);
                 body += 1;
                 continue;
             };
             body = if task == Task::Accelerations {
-                self.pins_inward::<true>(body)
+                self.pins_inward::<true>(body, range.end)
             } else {
-                self.pins_inward::<false>(body)
+                self.pins_inward::<false>(body, range.end)
             };
         }
     }
@@ -308,13 +389,13 @@ impl<T: Real> Reduction<T> {
     }
 
     #[inline(always)]
-    fn outward(&mut self, linkage: &Linkage, task: Task, out: &mut [T]) {
-        let mut end = self.links.len();
-        while end > 0 {
+    pub(super) fn turns_outward(&mut self, linkage: &Linkage, task: Task, range: Range<usize>, out: &mut [T]) {
+        let mut end = range.end;
+        while end > range.start {
             let body = end - 1;
             match self.schedule.steps[body].kind {
-                Kind::Pin if task == Task::Accelerations => end = self.pins_outward::<true>(end, out),
-                Kind::Pin => end = self.pins_outward::<false>(end, out),
+                Kind::Pin if task == Task::Accelerations => end = self.pins_outward::<true>(range.start..end, out),
+                Kind::Pin => end = self.pins_outward::<false>(range.start..end, out),
                 Kind::One(_) => self.one_outward::<1>(task, body, out),
                 Kind::Two(_) => self.one_outward::<2>(task, body, out),
                 Kind::Any => self.any_outward(linkage, task, body, out),

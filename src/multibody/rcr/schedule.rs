@@ -295,17 +295,19 @@ impl Schedule {
         }
     }
 
-    /// Pins of one run from `first` on, at most [`PIECE`]: what is read here is still near when their turn comes.
+    /// Pins of one run from `first` on and before `end`, at most [`PIECE`]: what is read here is still near when their turn
+    /// comes.
     #[inline(always)]
-    pub(super) fn run(&self, first: usize) -> std::ops::Range<usize> {
-        let steps = &self.steps[first..self.steps.len().min(first + PIECE)];
+    pub(super) fn run(&self, first: usize, end: usize) -> std::ops::Range<usize> {
+        let steps = &self.steps[first..end.min(first + PIECE)];
         first..first + steps.iter().position(|s| s.kind != Kind::Pin).unwrap_or(steps.len())
     }
 
-    /// Pins of one run that end before `end`, at most [`PIECE`].
+    /// Pins of one run in `range` that end with it, at most [`PIECE`].
     #[inline(always)]
-    pub(super) fn run_before(&self, end: usize) -> std::ops::Range<usize> {
-        let start = end.saturating_sub(PIECE);
+    pub(super) fn run_before(&self, range: std::ops::Range<usize>) -> std::ops::Range<usize> {
+        let end = range.end;
+        let start = end.saturating_sub(PIECE).max(range.start);
         let first = self.steps[start..end].iter().rposition(|s| s.kind != Kind::Pin);
         first.map_or(start, |k| start + k + 1)..end
     }

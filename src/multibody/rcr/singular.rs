@@ -69,7 +69,10 @@ impl Reduction<f64> {
     /// [`Reduction::reduce`] for any configuration: in a singular one too it gives the accelerations of least constraint.
     /// Slower by a factor, and it allocates; meant for when [`Reduction::nearness`] is large.
     pub fn reduce_singular(&mut self, linkage: &Linkage, task: Task, out: &mut [f64]) -> Singularity {
-        self.write_rows(task);
+        if let Some(packs) = &self.packs {
+            packs.spread(&mut self.placed, &mut self.hanging, &mut self.axes);
+        }
+        self.rows_of(task, 0..linkage.closures.len());
         let mut report = Singularity::default();
         let count = linkage.links.len();
         let mut waiting: Vec<Vec<Row>> = self.entering(linkage);
