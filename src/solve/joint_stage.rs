@@ -8,7 +8,7 @@
 //! stiffness there, and reduces with M + γ·C + β·K in the place of M ([`crate::multibody::rcr::AddedInertia`]). No matrix
 //! is assembled, and an iteration costs O(n + m). How inertia and reactions change with the configuration is left out of
 //! that matrix, not out of the equation: the iteration is linear, accelerated by what the last ones tell
-//! ([`super::anderson`]). θ is the ratio of the last two corrections, and it ends when what is left, δ·θ/(1 − θ), is below
+//! (`anderson.rs`). θ is the ratio of the last two corrections, and it ends when what is left, δ·θ/(1 − θ), is below
 //! the tolerance.
 
 use super::anderson::Anderson;
