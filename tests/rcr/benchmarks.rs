@@ -71,6 +71,8 @@ fn n_four_bar() {
         let [x, y, theta] = motion.reduction.pose(place[0]);
         // the upper end of the first upright: half a metre above its centre as drawn
         let at = [x - 0.5 * theta.sin(), 0.5 + y + 0.5 * theta.cos()];
+        let off = (at[0] - b0[0]).hypot(at[1] - b0[1]);
+        println!("four-bar, {t} s: {off:.1e} m, {:?}", method.effort);
         assert!((at[0] - b0[0]).abs() < 1e-8 && (at[1] - b0[1]).abs() < 1e-8, "t = {t}: {at:?}");
     }
 }
@@ -158,9 +160,12 @@ fn andrews_squeezer() {
         -19.2933741050320,
         0.323179149249,
     ];
+    let mut off = [0.0f64; 2];
     for i in 0..7 {
         let (q, v) = (start[i] + relative(&angle)[i], relative(&rate)[i]);
         assert!((q - expected_q[i]).abs() < 1e-9, "angle {i}: {q}");
         assert!((v - expected_v[i]).abs() < 1e-7, "rate {i}: {v}");
+        off = [off[0].max((q - expected_q[i]).abs()), off[1].max((v - expected_v[i]).abs())];
     }
+    println!("squeezer: {:.1e} rad, {:.1e} rad/s, {:?}", off[0], off[1], method.effort);
 }
