@@ -12,6 +12,7 @@
 //! | `slots` | places that serve one user after another |
 //! | `front` | elimination of one body's coordinates, with a loop's row or without |
 //! | [`reduce`] | the recursion |
+//! | `storage` | what it works in, laid out once |
 //! | `project` | positions and rates that fulfil the loops |
 //! | `elastic` | forces of the joints' springs |
 //! | `pins` | runs of pins without loops |
@@ -48,6 +49,7 @@ pub mod rotary;
 mod schedule;
 mod singular;
 mod slots;
+mod storage;
 mod subtrees;
 mod turn;
 
