@@ -91,11 +91,11 @@ fn an_implicit_step_in_joint_coordinates_allocates_nothing() {
         let mut method = JointMethod::new(Rule::TrBdf2, n);
         // bent: straight as drawn, loops are singular, and the path for those allocates
         let mut now = Pair { q: (0..n).map(|k| 1e-2 * (k as f64 * 0.7).sin()).collect(), v: vec![0.0; n] };
-        motion.project(&mut now.q, &mut now.v);
+        motion.project(0.0, &mut now.q, &mut now.v);
         let (mut end, mut error) = (Pair::zeros(n), Pair::zeros(n));
         let profiler = dhat::Profiler::builder().testing().build();
         method.step(&mut motion, (0.0, 1e-9), 1e-12, &now, &mut end, &mut error).unwrap();
-        motion.project(&mut end.q, &mut end.v);
+        motion.project(0.0, &mut end.q, &mut end.v);
         let blocks = dhat::HeapStats::get().total_blocks;
         drop(profiler);
         assert_eq!((motion.singular, blocks), (0, 0), "{name}");

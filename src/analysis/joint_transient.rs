@@ -289,8 +289,7 @@ fn failed(formulation: Formulation, linkage: &Linkage, error: &IntegrationError<
         IntegrationError::Accelerations { t, h, .. } => (t, h, None),
         IntegrationError::TooManySteps { t, .. } => (t, 0.0, None),
     };
-    let body = worst.and_then(|c| linkage.links.iter().position(|l| (l.first..l.first + l.freedom()).contains(&c)));
-    let at = body.map_or(String::new(), |b| format!(" at body \"{}\"", linkage.names[b]));
+    let at = worst.map_or(String::new(), |c| format!(" at body \"{}\"", linkage.names[linkage.body_of(c)]));
     AnalysisError::StepFailed {
         t,
         dt,

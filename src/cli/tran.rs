@@ -49,7 +49,7 @@ Examples:\n  \
     bimorph tran stage.net --set F=100u --release F --stop 30u --draw motion.html\n  \
     bimorph tran stage.net --set F=100u --release F --stop 30u --undamped --formulation rcr --signals c.x --json\n      \
     the model of the paper: joints that only turn, in joint coordinates; \"joint_coordinates\" tells n, m and the gaps\n  \
-    bimorph tran stage.net --stop 30u --formulation rcr-elastic --rotary-inertia --method tr-bdf2 --signals c.x\n      \
+    bimorph tran stage.net --set F=100u --release F --stop 10u --formulation rcr-elastic --rotary-inertia --method tr-bdf2\n      \
     every elastic direction a coordinate, in implicit steps by the same recursion")]
 pub(crate) struct Tran {
     #[command(flatten)]

@@ -113,13 +113,8 @@ impl System {
     pub fn add_tangent(&self, q: &[Pose], drive: &Drive, tangent: &mut BlockMatrix<f64, 3>, r: &mut [Pose]) {
         tangent.clear();
         forces::add_tangent(&self.model, q, &drive.rest(), tangent, r);
-        for (gap, &volts) in self.gaps.iter().zip(&drive.volts) {
-            let half = -0.5 * volts * volts;
-            self.add_gap_force(gap, q, half, true, r);
-            self.add_gap_tangent(gap, q, half, tangent);
-        }
-        self.add_loads(q, -drive.load, r);
-        self.add_load_tangent(q, -drive.load, tangent);
+        self.add_body_forces(q, drive, r);
+        self.add_body_tangent(q, drive, tangent);
         self.model.project(r);
     }
 

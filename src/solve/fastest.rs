@@ -54,8 +54,7 @@ pub fn fastest(linkage: &Linkage, scale: &[f64], groups: usize) -> Option<Fastes
     }
     let size = |k: usize| (x[k] / scale[k]).abs();
     let most = (0..n).fold(0, |best, k| if size(k) > size(best) { k } else { best });
-    let body = linkage.links.iter().position(|l| (l.first..l.first + l.freedom()).contains(&most)).unwrap_or(0);
-    Some(Fastest { omega: omega2.sqrt(), body })
+    Some(Fastest { omega: omega2.sqrt(), body: linkage.body_of(most) })
 }
 
 fn sign(k: usize) -> f64 {

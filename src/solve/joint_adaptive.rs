@@ -114,9 +114,9 @@ impl JointAdaptive {
                 let growth = (0.9 * error.max(1e-10).powf(exponent)).clamp(0.2, 5.0);
                 // a step cut short by the end of the interval says nothing against the longer one
                 h = if step < h { h.max(growth * step) } else { growth * step };
-                self.accept(motion, now);
                 let from = t;
                 t = if last { end } else { t + step };
+                self.accept(motion, t, now);
                 if !observe(from, t - from, now) {
                     return Ok(Some(t));
                 }
@@ -153,7 +153,7 @@ impl JointAdaptive {
             self.method
                 .step(motion, (t, h), tolerance, now, &mut self.end, &mut self.error)
                 .map_err(|source| JointStepError::Stage { t, h, source })?;
-            self.accept(motion, now);
+            self.accept(motion, at(k + 1.0), now);
             if !observe(t, h, now) {
                 return Ok(Some(at(k + 1.0)));
             }
@@ -188,9 +188,10 @@ impl JointAdaptive {
         Ok(())
     }
 
-    fn accept<L: Loads>(&mut self, motion: &mut ImplicitMotion<'_, L>, now: &mut Pair) {
+    /// Takes the step, which ends at `to`.
+    fn accept<L: Loads>(&mut self, motion: &mut ImplicitMotion<'_, L>, to: f64, now: &mut Pair) {
         now.copy(&self.end.q, &self.end.v);
-        motion.project(&mut now.q, &mut now.v);
+        motion.project(to, &mut now.q, &mut now.v);
         motion.work.steps += 1;
     }
 

@@ -47,20 +47,29 @@ impl<'a> JointLoads<'a> {
 
     /// Places the bodies at time `t` [s] of the ramp, locked directions at their prescribed lengths.
     pub fn place(&mut self, t: f64, q: &[f64], v: &[f64], reduction: &mut Reduction<f64>) {
-        self.ramp.at(t, &mut self.drive);
-        if self.prescribes {
-            reduction.prescribe(self.linkage, &self.drive.rest());
-        }
+        self.prescribe(t, reduction);
         reduction.place(self.linkage, q, v);
     }
 
-    /// Adds everything that acts at time `t` [s] to the force and torque of `reduction`, placed at `q` and `v`.
+    /// [`Loads::add`] at what is prescribed at that time, where the bodies are placed anew if anything is.
     pub fn add(&mut self, t: f64, q: &[f64], v: &[f64], reduction: &mut Reduction<f64>) {
         if self.prescribes {
             self.place(t, q, v, reduction);
-        } else {
-            self.ramp.at(t, &mut self.drive);
         }
+        Loads::add(self, t, q, v, reduction);
+    }
+}
+
+impl Loads for JointLoads<'_> {
+    fn prescribe(&mut self, t: f64, reduction: &mut Reduction<f64>) {
+        if self.prescribes {
+            self.ramp.at(t, &mut self.drive);
+            reduction.prescribe(self.linkage, &self.drive.rest());
+        }
+    }
+
+    fn add(&mut self, t: f64, q: &[f64], _: &[f64], reduction: &mut Reduction<f64>) {
+        self.ramp.at(t, &mut self.drive);
         poses(reduction, &mut self.q, &mut self.v);
         self.r.fill(Pose::zeros());
         self.system.add_body_forces(&self.q, &self.drive, &mut self.r);
@@ -71,12 +80,6 @@ impl<'a> JointLoads<'a> {
             }
         }
         reduction.add_elastic(self.linkage, q, &self.drive.rest());
-    }
-}
-
-impl Loads for JointLoads<'_> {
-    fn add(&mut self, t: f64, q: &[f64], v: &[f64], reduction: &mut Reduction<f64>) {
-        JointLoads::add(self, t, q, v, reduction);
     }
 
     fn stiffen(&mut self, reduction: &Reduction<f64>, (beta, gamma): (f64, f64), added: &mut AddedInertia) {

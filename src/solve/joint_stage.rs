@@ -14,7 +14,7 @@
 use super::anderson::Anderson;
 use super::joint_motion::NotFinite;
 use super::method::Work;
-use crate::multibody::rcr::{AddedInertia, Linkage, Reduction};
+use crate::multibody::rcr::{AddedInertia, Linkage, Reduction, Singularity, Task};
 use thiserror::Error;
 
 /// Most iterations of a stage.
@@ -28,6 +28,11 @@ const STALLED: f64 = 1e-10;
 
 /// What acts on a mechanism in joint coordinates.
 pub trait Loads {
+    /// Sets what time alone prescribes, such as the offsets of heated joints that are locked, at `t` [s]. Before placing.
+    fn prescribe(&mut self, t: f64, reduction: &mut Reduction<f64>) {
+        let _ = (t, reduction);
+    }
+
     /// Adds what acts at time `t` [s] to the force and torque of `reduction`, whose bodies are placed at `q` and `v`.
     fn add(&mut self, t: f64, q: &[f64], v: &[f64], reduction: &mut Reduction<f64>);
 
@@ -136,11 +141,9 @@ impl<'a, L: Loads> ImplicitMotion<'a, L> {
         self.q.copy_from_slice(q);
         self.v.copy_from_slice(v);
         self.act(t);
-        self.added.clear();
-        self.next.fill(0.0);
-        self.reduce(t)?;
-        a.copy_from_slice(&self.next);
-        Ok(())
+        let met = self.reduction.solve(self.linkage, Task::Accelerations, a);
+        self.count(met);
+        self.finite(a, t)
     }
 
     /// Solves a stage, from the guess in `a`, until its coordinates are right to `tolerance` in the norm of
@@ -156,9 +159,15 @@ impl<'a, L: Loads> ImplicitMotion<'a, L> {
             self.act(stage.t);
             self.added.clear();
             self.loads.stiffen(&self.reduction, (stage.beta, stage.gamma), &mut self.added);
-            self.next.copy_from_slice(a);
-            self.reduce(stage.t)?;
+            let Self { linkage, reduction, added, bodies, next, .. } = self;
+            let met = reduction.solve_implicit(linkage, added, a, bodies, next);
+            self.count(met);
             self.work.iterations += 1;
+            match self.finite(&self.next, stage.t) {
+                // it was finite where it began: the iteration has left the neighbourhood of the step
+                Err(_) if iteration > 1 => return Err(self.diverged(stage.t, iteration as usize)),
+                found => found?,
+            }
             self.anderson.next(a, &self.next, &self.scale);
             let correction = stage.beta * self.norm(self.anderson.change());
             let shrink = correction / last;
@@ -201,8 +210,10 @@ impl<'a, L: Loads> ImplicitMotion<'a, L> {
             *force = [link.mass * body[0], link.mass * body[1], link.inertia * body[2]];
         }
         self.reduction.torque.fill(0.0);
-        self.next.fill(0.0);
-        self.reduce(t)?;
+        let Self { linkage, reduction, added, bodies, next, zeros, .. } = self;
+        let met = reduction.solve_implicit(linkage, added, zeros, bodies, next);
+        self.count(met);
+        self.finite(&self.next, t)?;
         for ((e, w), x) in error_q.iter_mut().zip(error_v).zip(&self.next) {
             *w = (x - *e) / gamma;
             *e = *x;
@@ -210,8 +221,9 @@ impl<'a, L: Loads> ImplicitMotion<'a, L> {
         Ok(())
     }
 
-    /// Takes a motion back to the loops.
-    pub fn project(&mut self, q: &mut [f64], v: &mut [f64]) {
+    /// Takes a motion back to the loops as they are at time `t` [s].
+    pub fn project(&mut self, t: f64, q: &mut [f64], v: &mut [f64]) {
+        self.loads.prescribe(t, &mut self.reduction);
         let gap = self.reduction.project_positions(self.linkage, q, v, &mut self.next);
         self.gap = self.gap.max(gap);
         self.reduction.project_rates(self.linkage, q, v, &mut self.next);
@@ -226,6 +238,7 @@ impl<'a, L: Loads> ImplicitMotion<'a, L> {
 
     /// Places the bodies and lays what acts on them.
     fn act(&mut self, t: f64) {
+        self.loads.prescribe(t, &mut self.reduction);
         self.reduction.place(self.linkage, &self.q, &self.v);
         self.reduction.force.fill([0.0; 3]);
         self.reduction.torque.fill(0.0);
@@ -233,17 +246,15 @@ impl<'a, L: Loads> ImplicitMotion<'a, L> {
         self.work.forces += 1;
     }
 
-    /// One reduction with what is added, from the accelerations in `next` to the new ones there.
-    fn reduce(&mut self, t: f64) -> Result<(), StageError> {
-        let mut from = std::mem::take(&mut self.zeros);
-        from.copy_from_slice(&self.next);
-        let met = self.reduction.solve_implicit(self.linkage, &self.added, &from, &mut self.bodies, &mut self.next);
-        from.fill(0.0);
-        self.zeros = from;
+    /// Counts one reduction and what it met.
+    fn count(&mut self, met: Option<Singularity>) {
         self.singular += u64::from(met.is_some());
         self.work.factorizations += 1;
         self.work.solves += 1;
-        if self.next.iter().all(|x| x.is_finite()) {
+    }
+
+    fn finite(&self, a: &[f64], t: f64) -> Result<(), StageError> {
+        if a.iter().all(|x| x.is_finite()) {
             return Ok(());
         }
         let accelerations = &self.reduction.accelerations;
@@ -259,6 +270,6 @@ impl<'a, L: Loads> ImplicitMotion<'a, L> {
     pub fn worst(&self, x: &[f64]) -> String {
         let size = |k: usize| (x[k] / self.scale[k]).abs();
         let worst = (0..x.len()).fold(0, |best, k| if size(k) > size(best) { k } else { best });
-        self.linkage.body_of(worst).to_owned()
+        self.linkage.names.get(self.linkage.body_of(worst)).cloned().unwrap_or_default()
     }
 }

@@ -117,18 +117,12 @@ impl<S: LinearSolver> Method for Sdirk4<S> {
                 push += stage.v[k] * (e * h);
             }
             // the raw estimate: its displacements, and the force behind its rates
-            error.v[k] = rate;
-            error.q[k] = (push + mass(k, rate) * c) * c;
-            self.known[k] = rate * c;
+            (error.v[k], error.q[k]) = (rate, push);
             motion.v[k] = self.stages[4].q[k];
             motion.q[k] += self.x[k];
         }
         model.project(&mut motion.v);
-        forces::add_damping(model, &self.known, &mut error.q);
-        self.implicit.solve(system, &mut error.q);
-        for (q, v) in error.q.iter().zip(&mut error.v) {
-            *v = (q - *v) * c;
-        }
+        self.implicit.smooth(system, c, error);
         Ok(())
     }
 

@@ -109,18 +109,12 @@ impl<S: LinearSolver> Method for TrBdf2<S> {
             end[k] = mass(k, rate - motion.v[k]) * c - (start[k] + middle[k]) * (W / D);
             // the raw estimate: its displacements, and the force behind its rates
             error.v[k] = motion.v[k] * weights[0] + self.rate[k] * weights[1] + rate * weights[2];
-            let push = start[k] * weights[0] + middle[k] * weights[1] + end[k] * weights[2];
-            error.q[k] = (push + mass(k, error.v[k]) * c) * c;
-            self.scratch[k] = error.v[k] * c;
+            error.q[k] = start[k] * weights[0] + middle[k] * weights[1] + end[k] * weights[2];
             motion.v[k] = rate;
             motion.q[k] += self.x[k];
         }
         model.project(&mut motion.v);
-        forces::add_damping(model, &self.scratch, &mut error.q);
-        self.implicit.solve(system, &mut error.q);
-        for (q, v) in error.q.iter().zip(&mut error.v) {
-            *v = (q - *v) * c;
-        }
+        self.implicit.smooth(system, c, error);
         Ok(())
     }
 

@@ -72,7 +72,7 @@ fn struck(compiled: &Compiled, rule: Rule, stop: f64, h: f64) -> (Vec<f64>, u64)
     let mut motion = ImplicitMotion::new(&linkage, JointLoads::new(system, &linkage, &ramp), &scale);
     let mut now = Pair::zeros(n);
     now.v.iter_mut().zip(&scale).for_each(|(v, s)| *v = 2e6 * s);
-    motion.project(&mut now.q, &mut now.v);
+    motion.project(0.0, &mut now.q, &mut now.v);
     let mut method = JointAdaptive::new(JointMethod::new(rule, n), n);
     method.advance(&mut motion, (0.0, stop), &mut now, Control::Fixed(h), &mut |_, _, _| true).unwrap();
     (now.q, motion.work.iterations)

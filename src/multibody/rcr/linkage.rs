@@ -211,10 +211,9 @@ impl Linkage {
         }
     }
 
-    /// Name of the body whose joint has a coordinate.
-    pub fn body_of(&self, coordinate: usize) -> &str {
-        let body = self.links.partition_point(|link| link.first <= coordinate);
-        self.names.get(body.wrapping_sub(1)).map_or("", String::as_str)
+    /// The body whose joint has a coordinate.
+    pub fn body_of(&self, coordinate: usize) -> usize {
+        self.links.partition_point(|link| link.first <= coordinate).saturating_sub(1)
     }
 }
 
