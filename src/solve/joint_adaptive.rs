@@ -3,7 +3,8 @@
 //! The error of a step is √(‖e_q‖² + h²‖e_v‖²), root mean squares over the coordinates against their sizes, and must stay
 //! below tol·(‖q‖ + floor); the next step is 0.9·err^(−1/p) times the last, between 0.2 and 5 times (Hairer & Wanner 1996,
 //! §IV.8). A method without an estimate takes each step whole and in two halves, keeps the halves, and takes a third of the
-//! difference for the error (Hairer et al. 1993, eq. II.4.4). Each accepted step is taken back to the loops.
+//! difference for the error (Hairer et al. 1993, eq. II.4.4). Each step is taken to the loops at its
+//! end; where heat moves them, how far that is counts too, since the stages do not see it coming.
 
 use super::adaptive::Control;
 use super::dormand_prince::Pair;
@@ -17,6 +18,8 @@ const FLOOR: f64 = 1e-4;
 const STAGE_SHARE: f64 = 1e-2;
 /// Error of a stage against the motion in equal steps.
 const EQUAL: f64 = 1e-10;
+/// What the loops move an end by delays the motion by a step, over and over but not more and more: it counts by this share.
+const MOVED_SHARE: f64 = 1e-2;
 /// Rejections in a row before giving up.
 const MAX_REJECTED: usize = 40;
 
@@ -107,16 +110,20 @@ impl JointAdaptive {
             self.carried.copy(&self.method.carried.q, &self.method.carried.v);
             let before = motion.norm(&now.q);
             let stepped = self.attempt(motion, (t, step), STAGE_SHARE * tol * (before + FLOOR), now);
-            let error = if stepped.is_ok() { self.relative_error(motion, before, step, tol) } else { f64::INFINITY };
+            let mut error =
+                if stepped.is_ok() { self.relative_error(motion, before, step, tol) } else { f64::INFINITY };
+            let last = t + step >= end * (1.0 - 1e-14);
+            let to = if last { end } else { t + step };
+            if error <= 1.0 {
+                error = error.max(MOVED_SHARE * self.project(motion, to) / (tol * (before + FLOOR)));
+            }
             if error <= 1.0 {
                 rejected = 0;
-                let last = t + step >= end * (1.0 - 1e-14);
                 let growth = (0.9 * error.max(1e-10).powf(exponent)).clamp(0.2, 5.0);
                 // a step cut short by the end of the interval says nothing against the longer one
                 h = if step < h { h.max(growth * step) } else { growth * step };
-                let from = t;
-                t = if last { end } else { t + step };
-                self.accept(motion, t, now);
+                let from = std::mem::replace(&mut t, to);
+                self.accept(motion, now);
                 if !observe(from, t - from, now) {
                     return Ok(Some(t));
                 }
@@ -153,7 +160,8 @@ impl JointAdaptive {
             self.method
                 .step(motion, (t, h), tolerance, now, &mut self.end, &mut self.error)
                 .map_err(|source| JointStepError::Stage { t, h, source })?;
-            self.accept(motion, at(k + 1.0), now);
+            self.project(motion, at(k + 1.0));
+            self.accept(motion, now);
             if !observe(t, h, now) {
                 return Ok(Some(at(k + 1.0)));
             }
@@ -188,10 +196,17 @@ impl JointAdaptive {
         Ok(())
     }
 
-    /// Takes the step, which ends at `to`.
-    fn accept<L: Loads>(&mut self, motion: &mut ImplicitMotion<'_, L>, to: f64, now: &mut Pair) {
+    /// Takes the end of the step to the loops as they are at time `to` [s]. Returns how far that moves it.
+    fn project<L: Loads>(&mut self, motion: &mut ImplicitMotion<'_, L>, to: f64) -> f64 {
+        let Self { end, whole, .. } = self;
+        whole.q.copy_from_slice(&end.q);
+        motion.project(to, &mut end.q, &mut end.v);
+        whole.q.iter_mut().zip(&end.q).for_each(|(from, to)| *from -= to);
+        motion.norm(&self.whole.q)
+    }
+
+    fn accept<L: Loads>(&mut self, motion: &mut ImplicitMotion<'_, L>, now: &mut Pair) {
         now.copy(&self.end.q, &self.end.v);
-        motion.project(to, &mut now.q, &mut now.v);
         motion.work.steps += 1;
     }
 

@@ -172,6 +172,33 @@ fn pull_in_and_contact() {
     }
 }
 
+/// A bimorph whose hot arm is heated, its joints' lengths prescribed by the heat (time constant 2 µs): every implicit
+/// method closes the loop at the lengths of the end of its step, and finds the motion that explicit steps find within five
+/// times the tolerance. (Stages do not see the lengths change; without counting how far they move the end of a step, one
+/// step went through all of it.)
+#[test]
+fn heated_lengths() {
+    let text = "
+        anchor p1 [a] [l=10u w=10u oz=pi]
+        hot beam2det p1 [a t] [l=206u w=2u tau=2u]
+        bar beam2det p1 [t c] [l=23u w=13u oz=-pi/2 tau=2u]
+        cold beam2det p1 [c g] [l=206u w=8u oz=pi tau=2u]
+        anchor p1 [g] [l=10u w=10u oz=pi]
+        eground * [g] []
+        heat port * [a] []";
+    let compiled = model(text, &CompileOptions::default());
+    let options =
+        |method, tol| TransientOptions { voltages: vec![("heat".into(), 3.0)], ..asked(6e-6, "t.y", method, tol) };
+    let (exact, _) = joints(&compiled, Formulation::Rcr, &options(Integrator::Rk45, 1e-4));
+    for (method, _) in ALL {
+        let (found, report) = joints(&compiled, Formulation::Rcr, &options(method, 1e-3));
+        let off = apart(&exact, &found);
+        println!("{}: {off:.2e} {:e} {:?}", method.name(), report.largest_gap_m, found.counters);
+        assert!(off < 5e-3, "{}: {off:e}", method.name());
+        assert!(report.largest_gap_m < 1e-15, "{:e}", report.largest_gap_m);
+    }
+}
+
 /// Methods that joint coordinates do not have are refused with those that they have.
 #[test]
 fn refusals_name_the_way_out() {
