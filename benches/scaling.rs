@@ -13,11 +13,10 @@ mod topologies;
 
 use bimorph::gaps::drive::Electrics;
 use bimorph::gaps::{Drive, Ramp, System};
-use bimorph::multibody::forces::RestStrain;
 use bimorph::multibody::planar::Pose;
-use bimorph::multibody::rcr::{AddedInertia, Linkage, Reduction};
+use bimorph::multibody::rcr::{Linkage, Reduction};
 use bimorph::multibody::{BlockMatrix, BodyId, Model, forces};
-use bimorph::solve::joint_stage::{ImplicitMotion, Loads, Stage};
+use bimorph::solve::joint_stage::{ImplicitMotion, Stage};
 use bimorph::solve::method::{Method, Motion};
 use bimorph::solve::rodas4::Rodas4;
 use std::hint::black_box;
@@ -109,24 +108,11 @@ fn reduction(topology: &topologies::Topology) -> f64 {
     median(1, |_| reduction.accelerate(&linkage, black_box(&q), &q, &mut out))
 }
 
-/// Springs of the joints alone.
-struct Springs<'a>(&'a Linkage);
-
-impl Loads for Springs<'_> {
-    fn add(&mut self, _: f64, q: &[f64], _: &[f64], reduction: &mut Reduction<f64>) {
-        reduction.add_elastic(self.0, q, &RestStrain { expansion: &[], built_in: 0.0 });
-    }
-
-    fn stiffen(&mut self, reduction: &Reduction<f64>, (beta, _): (f64, f64), added: &mut AddedInertia) {
-        reduction.add_stiffness(self.0, beta, added);
-    }
-}
-
 /// Nanoseconds of one iteration of a stage on pins with springs: placing, forces and stiffness, reduction.
 fn implicit(topology: &topologies::Topology) -> f64 {
     let linkage = Linkage::new(&topology.pinned());
     let n = linkage.coordinates;
-    let mut motion = ImplicitMotion::new(&linkage, Springs(&linkage), &vec![1.0; n]);
+    let mut motion = ImplicitMotion::new(&linkage, topologies::Springs(&linkage), &vec![1.0; n]);
     let q: Vec<f64> = (0..n).map(|k| 1e-2 * (k as f64 * 0.7).sin()).collect();
     let mut a = vec![0.0; n];
     let stage = Stage { t: 0.0, q: &q, v: &q, beta: 1e-16, gamma: 1e-8 };

@@ -5,11 +5,10 @@ mod topologies;
 
 use bimorph::gaps::System;
 use bimorph::gaps::drive::Electrics;
-use bimorph::multibody::forces::RestStrain;
-use bimorph::multibody::rcr::{AddedInertia, Linkage, Reduction};
+use bimorph::multibody::rcr::Linkage;
 use bimorph::solve::dormand_prince::Pair;
 use bimorph::solve::joint_dirk::{JointMethod, Rule};
-use bimorph::solve::joint_stage::{ImplicitMotion, Loads};
+use bimorph::solve::joint_stage::ImplicitMotion;
 use bimorph::solve::method::Motion;
 use bimorph::solve::rodas4::Rodas4;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -64,20 +63,6 @@ fn a_million_bodies_take_less_than_a_gigabyte() {
     }
 }
 
-/// Springs of the joints, and a force on each body.
-struct Springs<'a>(&'a Linkage);
-
-impl Loads for Springs<'_> {
-    fn add(&mut self, _: f64, q: &[f64], _: &[f64], reduction: &mut Reduction<f64>) {
-        reduction.force.fill([1e-9, -1e-8, 0.0]);
-        reduction.add_elastic(self.0, q, &RestStrain { expansion: &[], built_in: 0.0 });
-    }
-
-    fn stiffen(&mut self, reduction: &Reduction<f64>, (beta, _): (f64, f64), added: &mut AddedInertia) {
-        reduction.add_stiffness(self.0, beta, added);
-    }
-}
-
 /// An implicit step in joint coordinates away from singular configurations, with its projection onto the loops, allocates
 /// nothing: stages, factors and the
 /// history of the iteration are laid out once.
@@ -87,7 +72,7 @@ fn an_implicit_step_in_joint_coordinates_allocates_nothing() {
     for name in ["chain", "arms"] {
         let linkage = Linkage::new(&topologies::sized(name, 300).pinned());
         let n = linkage.coordinates;
-        let mut motion = ImplicitMotion::new(&linkage, Springs(&linkage), &vec![1.0; n]);
+        let mut motion = ImplicitMotion::new(&linkage, topologies::Springs(&linkage), &vec![1.0; n]);
         let mut method = JointMethod::new(Rule::TrBdf2, n);
         // bent: straight as drawn, loops are singular, and the path for those allocates
         let mut now = Pair { q: (0..n).map(|k| 1e-2 * (k as f64 * 0.7).sin()).collect(), v: vec![0.0; n] };

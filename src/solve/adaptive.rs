@@ -8,7 +8,7 @@
 
 use super::method::{Method, Motion, StepFailure, Work};
 use super::rodas4::Rodas4;
-use super::{SolveError, WhyFailed};
+use super::{SolveError, WhyFailed, step_size};
 use crate::gaps::{Ramp, System};
 use crate::multibody::planar::Pose;
 
@@ -114,8 +114,7 @@ impl<M: Method> Adaptive<M> {
                 return Ok(Advance::OutOfSteps(s));
             }
             let left = ramp.dt - s;
-            // the last two steps share what is left, so that no sliver remains
-            let step = if *h >= 0.999 * left { left } else { h.min(0.5 * left.max(*h)) };
+            let step = step_size::fitted(*h, left);
             self.keep(motion);
             let stepped = self.method.step(system, ramp, s, step, motion, &mut self.error);
             let error = if stepped.is_ok() { self.relative_error(system, motion, step, tol) } else { f64::INFINITY };
@@ -124,9 +123,7 @@ impl<M: Method> Adaptive<M> {
                 s = if last { ramp.dt } else { s + step };
                 (rejected, steps) = (0, steps + 1);
                 self.steps += 1;
-                let growth = (0.9 * error.max(1e-10).powf(exponent)).clamp(0.2, 5.0);
-                // a step cut short by the end of the interval says nothing against the longer one
-                *h = if step < *h { h.max(growth * step) } else { growth * step };
+                *h = step_size::accepted(*h, step, error, exponent);
                 if !observe(s - step, step, &self.before, motion) {
                     return Ok(Advance::Stopped);
                 }
@@ -134,8 +131,7 @@ impl<M: Method> Adaptive<M> {
                 self.put_back(motion);
                 self.rejected += 1;
                 rejected += 1;
-                let shrink = if error.is_finite() { (0.9 * error.powf(exponent)).clamp(0.1, 0.8) } else { 0.1 };
-                *h = shrink * step;
+                *h = step_size::rejected(step, error, exponent, 0.1);
                 if rejected > MAX_REJECTED || *h < 1e-12 * ramp.dt.min(*h * 1e12) || *h < f64::MIN_POSITIVE {
                     stepped.map_err(|e| failed(system, s, step, e))?;
                     return Err(self.too_small(system, s, step, rejected));
@@ -154,7 +150,7 @@ impl<M: Method> Adaptive<M> {
         max_steps: usize,
         observe: Observer<'_>,
     ) -> Result<Advance, SolveError> {
-        let count = (ramp.dt / step * (1.0 - 1e-9)).ceil().max(1.0) as usize;
+        let count = step_size::count(ramp.dt, step);
         let at = |k: usize| if k == count { ramp.dt } else { ramp.dt * (k as f64 / count as f64) };
         for k in 0..count {
             if k == max_steps {

@@ -10,6 +10,7 @@ use super::adaptive::Control;
 use super::dormand_prince::Pair;
 use super::joint_dirk::JointMethod;
 use super::joint_stage::{ImplicitMotion, Loads, StageError};
+use super::step_size;
 use thiserror::Error;
 
 /// Share of the size of a coordinate below which its relative error does not count.
@@ -105,8 +106,7 @@ impl JointAdaptive {
         let mut h = self.first_step(motion, (start, end), now, tol)?;
         while t < end {
             let left = end - t;
-            // the last two steps share what is left, so that no sliver remains
-            let step = if h >= 0.999 * left { left } else { h.min(0.5 * left.max(h)) };
+            let step = step_size::fitted(h, left);
             self.carried.copy(&self.method.carried.q, &self.method.carried.v);
             let before = motion.norm(&now.q);
             let stepped = self.attempt(motion, (t, step), STAGE_SHARE * tol * (before + FLOOR), now);
@@ -119,9 +119,7 @@ impl JointAdaptive {
             }
             if error <= 1.0 {
                 rejected = 0;
-                let growth = (0.9 * error.max(1e-10).powf(exponent)).clamp(0.2, 5.0);
-                // a step cut short by the end of the interval says nothing against the longer one
-                h = if step < h { h.max(growth * step) } else { growth * step };
+                h = step_size::accepted(h, step, error, exponent);
                 let from = std::mem::replace(&mut t, to);
                 self.accept(motion, now);
                 if !observe(from, t - from, now) {
@@ -132,8 +130,7 @@ impl JointAdaptive {
                 self.method.carried.copy(q, v);
                 motion.work.rejected += 1;
                 rejected += 1;
-                let shrink = if error.is_finite() { (0.9 * error.powf(exponent)).clamp(0.1, 0.8) } else { 0.25 };
-                h = shrink * step;
+                h = step_size::rejected(step, error, exponent, 0.25);
                 if rejected > MAX_REJECTED || h <= 4.0 * f64::EPSILON * end {
                     stepped.map_err(|source| JointStepError::Stage { t, h: step, source })?;
                     return Err(JointStepError::TooSmall { t, h: step, rejected, body: motion.worst(&self.error.q) });
@@ -151,21 +148,19 @@ impl JointAdaptive {
         step: f64,
         observe: Observe<'_>,
     ) -> Result<Option<f64>, JointStepError> {
-        let count = ((end - start) / step * (1.0 - 1e-9)).ceil().max(1.0);
-        let at = |k: f64| if k == count { end } else { start + (end - start) * (k / count) };
-        let mut k = 0.0;
-        while k < count {
-            let (t, h) = (at(k), at(k + 1.0) - at(k));
+        let count = step_size::count(end - start, step);
+        let at = |k: usize| if k == count { end } else { start + (end - start) * (k as f64 / count as f64) };
+        for k in 0..count {
+            let (t, h) = (at(k), at(k + 1) - at(k));
             let tolerance = EQUAL * (motion.norm(&now.q) + FLOOR);
             self.method
                 .step(motion, (t, h), tolerance, now, &mut self.end, &mut self.error)
                 .map_err(|source| JointStepError::Stage { t, h, source })?;
-            self.project(motion, at(k + 1.0));
+            self.project(motion, at(k + 1));
             self.accept(motion, now);
             if !observe(t, h, now) {
-                return Ok(Some(at(k + 1.0)));
+                return Ok(Some(at(k + 1)));
             }
-            k += 1.0;
         }
         Ok(None)
     }

@@ -20,6 +20,7 @@
 //! | [`doubling`] | error control by step doubling for methods without an estimate |
 //! | [`linear`] | what solves with the tangent: the block recursion, and the baselines it is measured against |
 //! | [`adaptive`] | drives any of them: error control, or equal steps |
+//! | `step_size` | how long the next step is |
 //! | [`dormand_prince`] | an explicit Runge–Kutta pair on flat slices, for any formulation that tells its accelerations |
 //! | [`consistent`] | natural frequencies of a linear frame with a full mass matrix, densely: a baseline |
 //! | [`newmark`] | linear motion by the trapezoidal rule: a baseline |
@@ -64,6 +65,7 @@ pub mod radau5;
 pub mod rk45;
 pub mod rodas4;
 pub mod sdirk4;
+mod step_size;
 pub mod subspace;
 pub mod tr_bdf2;
 

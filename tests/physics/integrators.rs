@@ -1,6 +1,6 @@
 //! Integrators: orders, energy, stability, work, and that they all find the same motion.
 
-use crate::model;
+use crate::{ARM, model};
 use bimorph::analysis::integrator::Integrator;
 use bimorph::analysis::transient::{TransientOptions, transient};
 use bimorph::compile::{CompileOptions, Compiled};
@@ -26,18 +26,9 @@ const PLATE: &str = "
     eground * [e] []
     drive port * [m e] []";
 
-/// Three thermal bimorphs (206 µm hot arms, 2 µm wide) on one yoke, pulled by a force F along y at its end.
+/// Three of [`ARM`] on one yoke, pulled by a force F along y at its end.
 const BANK: &str = "
     param F=0
-    subnet arm [o] [] [
-      anchor parent [a] [l=10u w=10u oz=pi]
-      anchor parent [g] [l=10u w=10u oz=pi]
-      beam2d parent [a t] [l=206u w=2u]
-      beam2d parent [t c] [l=23u w=13u oz=-pi/2]
-      beam2d parent [c f] [l=112u w=8u oz=pi]
-      beam2d parent [f g] [l=94u w=1.9u oz=pi]
-      beam2d parent [c o] [l=24u w=3u]
-    ]
     arm p1 [y1] []
     arm p1 [y2] []
     arm p1 [y3] []
@@ -75,7 +66,7 @@ fn run(
 fn released_bank() -> (Compiled, Motion) {
     let at = |force: f64| {
         let set = vec![("F".to_owned(), Setting::Number(force))];
-        model(BANK, &CompileOptions { set, undamped: true, ..CompileOptions::default() })
+        model(&format!("{ARM}{BANK}"), &CompileOptions { set, undamped: true, ..CompileOptions::default() })
     };
     let (held, free) = (at(25e-6), at(0.0));
     let system = &held.parts.system;

@@ -1,7 +1,7 @@
 //! Implicit methods in joint coordinates: orders, work, stiffness, contact, and that they find the motion that the explicit
 //! one and the other formulation find.
 
-use crate::model;
+use crate::{ARM, model};
 use bimorph::analysis::AnalysisError;
 use bimorph::analysis::formulation::{Formulation, coordinate_scales};
 use bimorph::analysis::integrator::Integrator;
@@ -17,18 +17,9 @@ use bimorph::solve::joint_dirk::{JointMethod, Rule};
 use bimorph::solve::joint_loads::JointLoads;
 use bimorph::solve::joint_stage::ImplicitMotion;
 
-/// Two bimorphs on a yoke, pulled by F at its end.
+/// Two of [`ARM`] on a yoke, pulled by F at its end.
 const BANK: &str = "
     param F=0
-    subnet arm [o] [] [
-      anchor parent [a] [l=10u w=10u oz=pi]
-      anchor parent [g] [l=10u w=10u oz=pi]
-      beam2d parent [a t] [l=206u w=2u]
-      beam2d parent [t c] [l=23u w=13u oz=-pi/2]
-      beam2d parent [c f] [l=112u w=8u oz=pi]
-      beam2d parent [f g] [l=94u w=1.9u oz=pi]
-      beam2d parent [c o] [l=24u w=3u]
-    ]
     arm p1 [y1] []
     arm p1 [y2] []
     beam2d p1 [y1 y2] [l=49.5u w=11u oz=pi/2]
@@ -44,7 +35,7 @@ const ALL: [(Integrator, Rule); 5] = [
 
 fn undamped(text: &str, force: f64, rotary_inertia: bool) -> Compiled {
     let set = vec![("F".to_owned(), Setting::Number(force))];
-    model(text, &CompileOptions { set, undamped: true, rotary_inertia, ..CompileOptions::default() })
+    model(&format!("{ARM}{text}"), &CompileOptions { set, undamped: true, rotary_inertia, ..CompileOptions::default() })
 }
 
 fn asked(stop: f64, signal: &str, method: Integrator, tol: f64) -> TransientOptions<'static> {

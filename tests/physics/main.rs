@@ -25,6 +25,19 @@ process p1 = [ Poisson=0.3 Youngsmodulus=165e9 density=2300 viscosity=1.78e-5 fl
   sheetresistance=20 stress=0 straingradient=0 thermalexpansion=2.33e-6 ambienttemperature=293 thermcond=41 h=2u ]
 ";
 
+/// A thermal bimorph with a hot arm 206 µm long and 2 µm wide, from two anchors to [o].
+pub(crate) const ARM: &str = "
+    subnet arm [o] [] [
+      anchor parent [a] [l=10u w=10u oz=pi]
+      anchor parent [g] [l=10u w=10u oz=pi]
+      beam2d parent [a t] [l=206u w=2u]
+      beam2d parent [t c] [l=23u w=13u oz=-pi/2]
+      beam2d parent [c f] [l=112u w=8u oz=pi]
+      beam2d parent [f g] [l=94u w=1.9u oz=pi]
+      beam2d parent [c o] [l=24u w=3u]
+    ]
+";
+
 /// Compiles [`POLY`] followed by `text`, beams meeting in points: what closed forms and SUGAR describe.
 pub(crate) fn model(text: &str, options: &CompileOptions) -> Compiled {
     let bundle = Bundle::from_text("model.net", &format!("{POLY}{text}"));

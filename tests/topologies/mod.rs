@@ -15,8 +15,11 @@
 // Each test and bench uses a part of this.
 #![allow(dead_code, unreachable_pub)]
 
+use bimorph::multibody::forces::RestStrain;
 use bimorph::multibody::planar::JointFrame;
+use bimorph::multibody::rcr::{AddedInertia, Linkage, Reduction};
 use bimorph::multibody::{Body, BodyId, BodyName, Drag, Joint, Model};
+use bimorph::solve::joint_stage::Loads;
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
@@ -298,4 +301,19 @@ pub fn named(name: &str, units: usize) -> Topology {
 /// The named topology with about `coordinates` coordinates.
 pub fn sized(name: &str, coordinates: usize) -> Topology {
     named(name, (coordinates / (3 * bodies_per_unit(name))).max(1))
+}
+
+/// Springs of the joints, and a force on each body.
+#[derive(Debug)]
+pub struct Springs<'a>(pub &'a Linkage);
+
+impl Loads for Springs<'_> {
+    fn add(&mut self, _: f64, q: &[f64], _: &[f64], reduction: &mut Reduction<f64>) {
+        reduction.force.fill([1e-9, -1e-8, 0.0]);
+        reduction.add_elastic(self.0, q, &RestStrain { expansion: &[], built_in: 0.0 });
+    }
+
+    fn stiffen(&mut self, reduction: &Reduction<f64>, (beta, _): (f64, f64), added: &mut AddedInertia) {
+        reduction.add_stiffness(self.0, beta, added);
+    }
 }
