@@ -1,8 +1,8 @@
 //! From netlist text to a ready model: netlist → structure → discretize.
 
-use crate::analysis::model_order::{self, ModelOrder};
 use crate::discretize::{DiscretizeError, DiscretizeOptions, Discretized, Scheme, discretize_with, order};
 use crate::netlist::{Bundle, Diagnostics, Setting};
+use crate::refine::model_order::{self, ModelOrder};
 use crate::structure::Structure;
 use thiserror::Error;
 

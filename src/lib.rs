@@ -4,8 +4,9 @@
 //! Data flows one way. A [`netlist`] describes what was drawn; it becomes a [`structure`] (materials, beams, plates,
 //! anchors, gaps, combs, ports, all in SI). `discretize` turns beams into rigid bodies and flexible joints;
 //! `multibody` holds those bodies and the O(n+m) recursion over them; `gaps` are the forces and rest offsets that
-//! heat and voltage cause. `solve` advances or balances a model, [`analysis`] holds the verbs every front shares, and
-//! [`device`] is the electrical view that a circuit simulator drives. [`results`] writes tables and pictures.
+//! heat and voltage cause. `solve` advances or balances a model, [`refine`] chooses how fine it must be, [`analysis`]
+//! holds the verbs every front shares, and [`device`] is the electrical view that a circuit simulator drives. [`results`]
+//! writes tables and pictures.
 //! [`compile`](mod@compile) walks that path once, from netlist text to a ready model.
 //!
 //! Everything inside is SI: metres, kilograms, seconds, volts, kelvin, radians. Units are parsed once, in the netlist.
@@ -19,6 +20,7 @@ pub mod gaps;
 pub mod jobs;
 pub mod multibody;
 pub mod netlist;
+pub mod refine;
 pub mod results;
 #[cfg(feature = "remote")]
 pub mod service;

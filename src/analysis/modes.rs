@@ -1,5 +1,4 @@
 //! Natural frequencies and shapes about the operating point.
-use super::order_error::{of_modes, own_stiffness};
 use super::signal::{Signal, View};
 use super::statics::{NodeMotion, operating_point};
 use super::{AnalysisError, BeamMotions, NodeMotions, PortVoltages};
@@ -8,6 +7,7 @@ use crate::gaps::Point;
 use crate::multibody::BlockMatrix;
 use crate::multibody::forces::add_inertia;
 use crate::multibody::planar::Pose;
+use crate::refine::order_error::{of_modes, own_stiffness};
 use crate::solve::eigen::lowest_modes;
 use serde::Serialize;
 

@@ -1,0 +1,4 @@
+//! How fine a model must be: the error of a mesh is estimated, and beams are refined or coarsened until a tolerance holds.
+
+pub mod model_order;
+pub mod order_error;
