@@ -1,71 +1,13 @@
 //! From netlist text to a ready model: netlist → structure → discretize.
 
-use crate::discretize::{DiscretizeError, DiscretizeOptions, Discretized, Scheme, discretize_with, order};
+use crate::discretize::{DiscretizeError, Discretized, discretize_with, order};
 use crate::netlist::{Bundle, Diagnostics, Setting};
+use crate::options::Refused;
 use crate::refine::model_order::{self, ModelOrder};
 use crate::structure::Structure;
 use thiserror::Error;
 
-pub use crate::discretize::Junctions;
-
-/// What a compilation may be told. `Default` is the only place where the numbers stand.
-#[derive(Debug, Clone, PartialEq)]
-pub struct CompileOptions {
-    /// Netlist parameters set from outside.
-    pub set: Vec<(String, Setting)>,
-    /// Highest frequency the model must resolve [Hz]; none: a rule by slenderness. Higher: more segments.
-    pub band: Option<f64>,
-    /// Relative error aimed at [1], default 1e-3. Smaller: more segments, shorter steps.
-    pub tol: f64,
-    /// Small displacements about the drawn geometry, as SUGAR.
-    pub linear: bool,
-    /// Leave out gas damping.
-    pub undamped: bool,
-    /// How beams meet.
-    pub junctions: Junctions,
-    /// How beams are cut.
-    pub scheme: Scheme,
-    /// Segments of every beam, whatever band and tolerance say; none: by them.
-    pub segments: Option<usize>,
-    /// Shear flexibility of beams (Timoshenko). Off by default, as in SUGAR.
-    pub shear: bool,
-    /// Rotary inertia of the sections of beams. Off by default, as in SUGAR.
-    pub rotary_inertia: bool,
-}
-
-impl Default for CompileOptions {
-    fn default() -> Self {
-        Self {
-            set: Vec::new(),
-            band: None,
-            tol: 1e-3,
-            linear: false,
-            undamped: false,
-            junctions: Junctions::default(),
-            scheme: Scheme::E4,
-            segments: None,
-            shear: false,
-            rotary_inertia: false,
-        }
-    }
-}
-
-impl CompileOptions {
-    /// What the discretization needs of them.
-    pub fn discretize(&self) -> DiscretizeOptions {
-        DiscretizeOptions {
-            band: self.band,
-            tol: self.tol,
-            linear: self.linear,
-            undamped: self.undamped,
-            junctions: self.junctions,
-            scheme: self.scheme,
-            segments: self.segments,
-            shear: self.shear,
-            rotary_inertia: self.rotary_inertia,
-        }
-    }
-}
+pub use crate::options::{CompileOptions, Formulation, Junctions, Scheme};
 
 /// A ready model with everything it came from.
 #[derive(Debug, Clone)]
@@ -88,6 +30,9 @@ pub struct Compiled {
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum CompileError {
+    /// An option is out of its range.
+    #[error(transparent)]
+    Option(#[from] Refused),
     /// The netlist has errors.
     #[error("{0}")]
     Netlist(Diagnostics),
@@ -101,16 +46,16 @@ pub enum CompileError {
 /// # Errors
 /// See [`CompileError`].
 pub fn compile(bundle: &Bundle, options: &CompileOptions) -> Result<Compiled, CompileError> {
+    options.check()?;
     let loaded = crate::netlist::load(bundle, &options.set).map_err(CompileError::Netlist)?;
-    let choices = options.discretize();
     let order = match (options.band, options.segments) {
-        (Some(band), None) => model_order::choose(&loaded.structure, &choices, band)?,
+        (Some(band), None) => model_order::choose(&loaded.structure, options, band)?,
         _ => {
-            let segments = order::a_priori(&loaded.structure, &choices)?;
+            let segments = order::a_priori(&loaded.structure, options)?;
             ModelOrder { segments, estimated_error: None, modes_in_band: 0, passes: 0 }
         }
     };
-    let parts = discretize_with(&loaded.structure, &choices, &order.segments)?;
+    let parts = discretize_with(&loaded.structure, options, &order.segments)?;
     Ok(Compiled {
         structure: loaded.structure,
         parameters: loaded.parameters,

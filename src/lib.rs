@@ -2,7 +2,7 @@
 //!
 //! # Layout
 //! Data flows one way. A [`netlist`] describes what was drawn; it becomes a [`structure`] (materials, beams, plates,
-//! anchors, gaps, combs, ports, all in SI). `discretize` turns beams into rigid bodies and flexible joints;
+//! anchors, gaps, combs, ports, all in SI). [`options`] is the one table of what a model may be told. `discretize` turns beams into rigid bodies and flexible joints;
 //! `multibody` holds those bodies and the O(n+m) recursion over them; `gaps` are the forces and rest offsets that
 //! heat and voltage cause. `solve` advances or balances a model, [`refine`] chooses how fine it must be, [`analysis`]
 //! holds the verbs every front shares, and [`device`] is the electrical view that a circuit simulator drives. [`results`]
@@ -20,6 +20,7 @@ pub mod gaps;
 pub mod jobs;
 pub mod multibody;
 pub mod netlist;
+pub mod options;
 pub mod refine;
 pub mod results;
 #[cfg(feature = "remote")]

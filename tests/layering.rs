@@ -4,9 +4,10 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-const FLOORS: [&[&str]; 8] = [
+const FLOORS: [&[&str]; 9] = [
     &["structure", "multibody"],
     &["netlist", "layout", "gaps", "results"],
+    &["options"],
     &["discretize", "solve"],
     &["refine"],
     &["compile", "device", "analysis"],
@@ -16,10 +17,10 @@ const FLOORS: [&[&str]; 8] = [
 ];
 
 /// The floor whose modules see each other.
-const TOGETHER: usize = 4;
+const TOGETHER: usize = 5;
 
 /// Words that belong to one floor and those above it.
-const RESERVED: [(&str, usize); 4] = [("tonic::", 6), ("tokio::", 6), ("prost::", 6), ("clap::", 7)];
+const RESERVED: [(&str, usize); 4] = [("tonic::", 7), ("tokio::", 7), ("prost::", 7), ("clap::", 8)];
 
 fn floor(module: &str) -> Option<usize> {
     FLOORS.iter().position(|floor| floor.contains(&module))

@@ -1,4 +1,4 @@
-//! The formulations by name: how bodies and joints become equations of motion.
+//! What a formulation makes of bodies and joints: which directions it locks, and tree and loops.
 
 use super::AnalysisError;
 use crate::gaps::System;
@@ -6,44 +6,14 @@ use crate::multibody::rcr::{Linkage, Parent};
 use crate::multibody::{BodyId, Model};
 use std::borrow::Cow;
 
-/// How bodies and joints become equations of motion.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Formulation {
-    /// Every body has its own coordinates, joints are springs in all directions; implicit steps.
-    #[default]
-    Compliant,
-    /// Relative joint coordinates, loops reduced in the recursion, joints of beams only turn: the paper's model.
-    Rcr,
-    /// The same with every direction as a coordinate that the discretization leaves elastic.
-    RcrElastic,
-}
+pub use crate::options::Formulation;
 
 impl Formulation {
-    /// All of them.
-    pub const ALL: [Self; 3] = [Self::Compliant, Self::Rcr, Self::RcrElastic];
-    /// Their names.
-    pub const NAMES: [&str; 3] = ["compliant", "rcr", "rcr-elastic"];
-
-    /// The name on the command line and in files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Compliant => "compliant",
-            Self::Rcr => "rcr",
-            Self::RcrElastic => "rcr-elastic",
-        }
-    }
-
-    /// The formulation of that name.
-    pub fn named(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|f| f.name() == name)
-    }
-
     /// The model with the directions locked that this formulation locks.
     pub fn lock(self, model: &Model) -> Cow<'_, Model> {
         match self {
             Self::Rcr => Cow::Owned(model.rotary()),
-            Self::Compliant | Self::RcrElastic => Cow::Borrowed(model),
+            Self::Auto | Self::Compliant | Self::RcrElastic => Cow::Borrowed(model),
         }
     }
 

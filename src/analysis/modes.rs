@@ -102,10 +102,10 @@ fn estimated(
     lambda: &[f64],
     shapes: &[Vec<Pose>],
 ) -> Vec<Option<f64>> {
-    let options = compiled.options.discretize();
+    let options = &compiled.options;
     let model = &compiled.parts.system.model;
     let none = vec![None; lambda.len()];
-    let own = own_stiffness(&options, &compiled.parts);
+    let own = own_stiffness(options, &compiled.parts);
     let (Some(highest), true) = (lambda.last(), own || !loaded) else { return none };
     let mut shift = 0.0;
     let mut factor = tangent.clone();
@@ -119,7 +119,7 @@ fn estimated(
             return none;
         }
     }
-    of_modes(&compiled.structure, &options, &compiled.parts, (&factor, shift), lambda, shapes)
+    of_modes(&compiled.structure, options, &compiled.parts, (&factor, shift), lambda, shapes)
         .map_or(none, |errors| errors.relative.into_iter().map(Some).collect())
 }
 

@@ -5,6 +5,7 @@ use bimorph::analysis::chart::ChartError;
 use bimorph::compile::CompileError;
 use bimorph::cosim::CosimError;
 use bimorph::jobs::sweep::SweepError;
+use bimorph::options::Refused;
 use bimorph::results::format::UnknownFormat;
 use bimorph::results::plot::render::RenderError;
 use bimorph::results::raw::RawError;
@@ -39,10 +40,12 @@ pub(crate) enum Failure {
     AllRuns(String),
     #[error("the core does not work on this machine; see the lines marked missing")]
     Doctor,
+    #[error("--{}: expected {}, got {}", .0.option.replace('_', "-"), .0.expected, .0.got)]
+    Option(#[from] Refused),
     #[error(transparent)]
     Format(#[from] UnknownFormat),
     #[error(transparent)]
-    Compile(#[from] CompileError),
+    Compile(CompileError),
     #[error(transparent)]
     Analysis(#[from] AnalysisError),
     #[error(transparent)]
@@ -61,6 +64,16 @@ pub(crate) enum Failure {
     Serve(#[from] ServeError),
     #[error(transparent)]
     Address(#[from] AddressError),
+}
+
+/// An option is out of range in the same words, whoever noticed.
+impl From<CompileError> for Failure {
+    fn from(error: CompileError) -> Self {
+        match error {
+            CompileError::Option(refused) => refused.into(),
+            other => Self::Compile(other),
+        }
+    }
 }
 
 /// A chart's netlist and analysis fail as those of every command.

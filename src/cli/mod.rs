@@ -12,6 +12,7 @@ mod failure;
 mod interrupt;
 mod model;
 mod modes;
+mod options;
 mod output;
 mod path;
 mod plot;

@@ -1,10 +1,11 @@
 //! Options that choose the model: the netlist, its parameters, and how fine the model is.
 
 use super::failure::Failure;
+use super::options::Chosen;
 use super::{interrupt, value};
 use bimorph::compile::{CompileOptions, Compiled, Junctions, compile};
-use bimorph::discretize::Scheme;
 use bimorph::netlist::{Bundle, Setting};
+use bimorph::options::{MODEL, Value};
 use clap::Args;
 use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
@@ -25,47 +26,9 @@ pub(crate) struct ModelArgs {
     #[arg(long, value_name = "DIR")]
     include: Vec<PathBuf>,
 
-    /// Relative error aimed at; smaller means more unknowns and shorter steps [default: 1e-3]
-    #[arg(long, value_parser = value::number, allow_negative_numbers = true)]
-    tol: Option<f64>,
-
-    /// Highest frequency the model must resolve [Hz]: as many segments as the estimated error of every mode below it needs
-    /// to stay within --tol [default: by slenderness]
-    #[arg(long, value_name = "HZ", value_parser = value::number, allow_negative_numbers = true)]
-    band: Option<f64>,
-
-    /// How beams meet. centreline: in points, as in SUGAR; offset: at the edges of rigid junctions; calibrated: with springs
-    /// there, from two-dimensional elasticity [default: calibrated]
-    #[arg(long, value_name = "KIND")]
-    junctions: Option<String>,
-
-    /// Small displacements about the drawn geometry, as SUGAR
-    #[arg(long)]
-    linear: bool,
-
-    /// Leave out gas damping
-    #[arg(long)]
-    undamped: bool,
-
-    /// How beams are cut into bodies and joints: a0, a2, c1, d1, b, e4 or es (docs/theory.md has their errors)
-    #[arg(long, default_value = "e4", value_name = "NAME")]
-    scheme: String,
-
-    /// Segments of every beam [default: by --band and --tol]
-    #[arg(long, value_name = "N")]
-    segments: Option<usize>,
-
-    /// Shear flexibility of beams (Timoshenko, shear coefficient 5/6); SUGAR leaves it out
-    #[arg(long)]
-    shear: bool,
-
-    /// Rotary inertia of the sections of beams; SUGAR leaves it out
-    #[arg(long)]
-    rotary_inertia: bool,
+    #[command(flatten)]
+    chosen: Chosen,
 }
-
-/// Most segments of a beam that may be asked for.
-const MOST_SEGMENTS: usize = 100_000;
 
 impl ModelArgs {
     /// The netlist with everything it uses.
@@ -76,33 +39,7 @@ impl ModelArgs {
 
     /// The options of the compilation, checked.
     pub(crate) fn options(&self) -> Result<CompileOptions, Failure> {
-        let defaults = CompileOptions::default();
-        let tol = self.tol.unwrap_or(defaults.tol);
-        if !(tol > 0.0 && tol < 1.0) {
-            return Err(Failure::bad("--tol", "a relative error between 0 and 1", tol.to_string()));
-        }
-        if let Some(band) = self.band.filter(|band| *band <= 0.0) {
-            return Err(Failure::bad("--band", "a frequency above 0 Hz", band.to_string()));
-        }
-        let junctions = self.junctions.as_deref().map_or(Ok(defaults.junctions), junctions)?;
-        let scheme = Scheme::named(&self.scheme).ok_or_else(|| {
-            Failure::bad("--scheme", format!("one of {}", Scheme::NAMES.join(", ")), format!("\"{}\"", self.scheme))
-        })?;
-        if let Some(n) = self.segments.filter(|n| !(1..=MOST_SEGMENTS).contains(n)) {
-            return Err(Failure::bad("--segments", "1 to 100000", n.to_string()));
-        }
-        Ok(CompileOptions {
-            set: self.set.clone(),
-            band: self.band,
-            tol,
-            linear: self.linear,
-            undamped: self.undamped,
-            junctions,
-            scheme,
-            segments: self.segments,
-            shear: self.shear,
-            rotary_inertia: self.rotary_inertia,
-        })
+        Ok(CompileOptions { set: self.set.clone(), ..self.chosen.options()? })
     }
 
     /// Compiles the netlist and shows its warnings on standard error.
@@ -113,7 +50,7 @@ impl ModelArgs {
     /// The same for a frame of cubic beams, whose centrelines meet in points.
     pub(crate) fn compile_frame(&self) -> Result<Compiled, Failure> {
         let mut options = self.options()?;
-        if self.junctions.is_some() && options.junctions != Junctions::Centreline {
+        if self.chosen.given("junctions") && options.junctions != Junctions::Centreline {
             let got = format!("\"{}\" with --solver frame, which has no other", options.junctions.name());
             return Err(Failure::bad("--junctions", "centreline", got));
         }
@@ -129,18 +66,10 @@ impl ModelArgs {
 
     /// What the model was made from, for JSON.
     pub(crate) fn context<'a>(&'a self, compiled: &'a Compiled) -> Context<'a> {
-        let options = &compiled.options;
         Context {
             file: self.file.display().to_string(),
             parameters: Map(&compiled.parameters),
-            tol: options.tol,
-            band_hz: options.band,
-            junctions: options.junctions,
-            linear: options.linear,
-            undamped: options.undamped,
-            scheme: options.scheme,
-            shear: options.shear,
-            rotary_inertia: options.rotary_inertia,
+            options: Keys(&compiled.options),
             estimated_error: compiled.order.estimated_error,
             warnings: compiled.warnings.items.iter().map(|d| d.message.as_str()).collect(),
         }
@@ -150,13 +79,6 @@ impl ModelArgs {
     pub(crate) fn title(&self) -> String {
         self.file.file_name().map_or_else(|| self.file.display().to_string(), |n| n.to_string_lossy().into_owned())
     }
-}
-
-/// The kind of junctions of that name.
-fn junctions(name: &str) -> Result<Junctions, Failure> {
-    let name = if name == "centerline" { "centreline" } else { name };
-    Junctions::named(name)
-        .ok_or_else(|| Failure::bad("--junctions", "centreline, offset or calibrated", format!("\"{name}\"")))
 }
 
 /// Shows the warnings of a netlist on standard error.
@@ -173,26 +95,34 @@ pub(crate) struct Context<'a> {
     file: String,
     /// Netlist parameters with the values they took, SI.
     parameters: Map<'a, Setting>,
-    /// Relative error aimed at.
-    tol: f64,
-    /// Highest frequency resolved [Hz]; null: by slenderness.
-    band_hz: Option<f64>,
-    /// How beams meet.
-    junctions: Junctions,
-    /// Small displacements.
-    linear: bool,
-    /// Without gas damping.
-    undamped: bool,
-    /// How beams are cut.
-    scheme: Scheme,
-    /// With shear flexibility.
-    shear: bool,
-    /// With rotary inertia of the sections.
-    rotary_inertia: bool,
+    /// Every option, under its name on the wire.
+    #[serde(flatten)]
+    options: Keys<'a>,
     /// Largest estimated relative error of a frequency within the band; null without one.
     estimated_error: Option<f64>,
     /// Warnings of the netlist.
     warnings: Vec<&'a str>,
+}
+
+/// The options of a model as keys of a document, but the number of segments: `check` tells it of each beam.
+#[derive(Debug)]
+struct Keys<'a>(&'a CompileOptions);
+
+impl Serialize for Keys<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(None)?;
+        for option in MODEL.iter().filter(|option| option.about.name != "segments") {
+            let key = option.about.wire;
+            match self.0.value(option) {
+                Value::Unset => map.serialize_entry(key, &())?,
+                Value::Flag(flag) => map.serialize_entry(key, &flag)?,
+                Value::Count(count) => map.serialize_entry(key, &count)?,
+                Value::Number(x) => map.serialize_entry(key, &x)?,
+                Value::Name(name) => map.serialize_entry(key, &name)?,
+            }
+        }
+        map.end()
+    }
 }
 
 /// Named values as a JSON object in their own order.

@@ -75,11 +75,6 @@ pub(crate) struct Tran {
     #[arg(long = "port", short = 'p', value_name = "NAME=VOLTS", value_parser = value::volts)]
     ports: Vec<(String, f64)>,
 
-    /// How bodies become equations: compliant (springs, implicit steps), rcr (the recursion in joint coordinates, beams' joints
-    /// only turn) or rcr-elastic (the same, every elastic direction a coordinate)
-    #[arg(long, default_value = "compliant", value_name = "NAME", value_parser = clap::builder::PossibleValuesParser::new(Formulation::NAMES))]
-    formulation: String,
-
     /// What integrates [default: rodas4; in joint coordinates rk45]
     #[arg(long, value_name = "NAME", value_parser = clap::builder::PossibleValuesParser::new(Integrator::NAMES))]
     method: Option<String>,
@@ -116,7 +111,6 @@ struct Document<'a> {
     method: &'a str,
     counters: Counters,
     events: &'a [Event],
-    formulation: &'a str,
     joint_coordinates: Option<JointReport>,
     unknowns: usize,
     solver: SolverChoice,
@@ -141,7 +135,7 @@ impl Tran {
         if !(2..=10_000_000).contains(&self.points) {
             return Err(Failure::bad("--points", "2 to 10000000 output times", self.points.to_string()));
         }
-        let formulation = self.formulation()?;
+        let formulation = self.model.options()?.formulation;
         let method = self.integrator(formulation)?;
         let initial = match self.solver {
             SolverChoice::Frame => self.model.compile_frame()?,
@@ -175,7 +169,9 @@ impl Tran {
             (SolverChoice::Frame, _) => {
                 frame(compiled).and_then(|frame| frame_transient(compiled, &frame, &options, watch)).map(|r| (r, None))
             }
-            (_, Formulation::Compliant) => transient(compiled, &options, &mut |_, _| (), watch).map(|r| (r, None)),
+            (_, Formulation::Compliant | Formulation::Auto) => {
+                transient(compiled, &options, &mut |_, _| (), watch).map(|r| (r, None))
+            }
             _ => joint_transient(compiled, formulation, &options, &mut |_, _| (), watch).map(|(r, j)| (r, Some(j))),
         };
         bar.finish_and_clear();
@@ -197,7 +193,6 @@ impl Tran {
             method: method.name(),
             counters: result.counters,
             events: &result.events,
-            formulation: formulation.name(),
             joint_coordinates: joints.clone(),
             unknowns: result.unknowns,
             solver: self.solver,
@@ -214,13 +209,8 @@ impl Tran {
         )
     }
 
-    fn formulation(&self) -> Result<Formulation, Failure> {
-        Formulation::named(&self.formulation)
-            .ok_or_else(|| Failure::bad("--formulation", "the name of a formulation", self.formulation.clone()))
-    }
-
     fn integrator(&self, formulation: Formulation) -> Result<Integrator, Failure> {
-        let implicit = formulation == Formulation::Compliant;
+        let implicit = matches!(formulation, Formulation::Compliant | Formulation::Auto);
         let name = self.method.as_deref().unwrap_or(if implicit { "rodas4" } else { "rk45" });
         let unknown = || Failure::bad("--method", "the name of an integrator", name.to_owned());
         let method = Integrator::named(name).ok_or_else(unknown)?;

@@ -3,13 +3,12 @@
 //! At junctions the ends are [`End`]s: the beam proper, which is cut, runs from one offset to the other, the rods in between
 //! belong to the bodies of the nodes, and the springs' compliance is added to that of the first and the last joint.
 
-use super::DiscretizeOptions;
-use super::junction::Junctions;
 use super::junction_springs::End;
 use super::rigid::{Assembly, Lump};
-use super::scheme::{Bar, Cut, Scheme};
+use super::scheme::{Bar, Cut};
 use crate::gaps::Point;
 use crate::multibody::{BodyName, Coupling, Joint};
+use crate::options::{CompileOptions, Junctions, Scheme};
 use crate::structure::Beam;
 use nalgebra::{Matrix3, Vector2};
 use std::sync::Arc;
@@ -54,7 +53,7 @@ pub fn lay(
     beam: &Beam,
     segments: usize,
     heater: Option<usize>,
-    options: &DiscretizeOptions,
+    options: &CompileOptions,
     ends: &[End; 2],
     rigid: &mut Assembly,
     out: &mut Joints,

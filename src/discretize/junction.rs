@@ -20,42 +20,9 @@ use super::junction_table as table;
 use super::overlap::{self, IN_LINE, Strip, turn};
 use super::rigid::Assembly;
 use crate::multibody::BodyId;
+use crate::options::Junctions;
 use crate::structure::{Beam, Structure};
-use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
-
-/// How beams meet.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Junctions {
-    /// Centrelines meet in points, as in SUGAR.
-    Centreline,
-    /// Beams end at the edge of the junction, which is rigid, and mass that is drawn twice counts once.
-    Offset,
-    /// The same with springs at the edge, calibrated on plane stress; beams also give way to shear, and next to junctions
-    /// their sections have rotary inertia.
-    #[default]
-    Calibrated,
-}
-
-impl Junctions {
-    /// Every kind.
-    pub const ALL: [Self; 3] = [Self::Centreline, Self::Offset, Self::Calibrated];
-
-    /// The kind of that name.
-    pub fn named(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|kind| kind.name() == name)
-    }
-
-    /// The name that stands for it in options and outputs.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Centreline => "centreline",
-            Self::Offset => "offset",
-            Self::Calibrated => "calibrated",
-        }
-    }
-}
 
 /// Share of a beam that its two offsets may take together.
 const MOST: f64 = 0.9;

@@ -35,54 +35,17 @@ pub mod ports;
 pub mod rigid;
 pub mod scheme;
 
-pub use scheme::Scheme;
+pub use crate::options::{Junctions, Scheme};
 
 use crate::gaps::{Load, Point, System};
 use crate::multibody::{BodyId, Coupling, Damper, Joint, Model};
+use crate::options::CompileOptions;
 use crate::structure::Structure;
 use nalgebra::{Matrix2, Matrix3, Vector2};
 use thiserror::Error;
 
-pub use junction::Junctions;
-
-/// How a drawing is to be discretized. `Default` is the only place where the numbers stand.
-#[derive(Debug, Clone, PartialEq)]
-pub struct DiscretizeOptions {
-    /// Highest frequency the model must resolve [Hz]; none: by slenderness alone.
-    pub band: Option<f64>,
-    /// Relative frequency error aimed at [1], default 1e-3.
-    pub tol: f64,
-    /// Small displacements about the drawn geometry.
-    pub linear: bool,
-    /// Leave out gas damping.
-    pub undamped: bool,
-    /// How beams meet.
-    pub junctions: Junctions,
-    /// How beams are cut.
-    pub scheme: Scheme,
-    /// Segments of every beam; none: by band or slenderness.
-    pub segments: Option<usize>,
-    /// Shear flexibility of beams (Timoshenko). SUGAR leaves it out.
-    pub shear: bool,
-    /// Rotary inertia of the sections of beams. SUGAR leaves it out.
-    pub rotary_inertia: bool,
-}
-
-impl Default for DiscretizeOptions {
-    fn default() -> Self {
-        Self {
-            band: None,
-            tol: 1e-3,
-            linear: false,
-            undamped: false,
-            junctions: Junctions::default(),
-            scheme: Scheme::E4,
-            segments: None,
-            shear: false,
-            rotary_inertia: false,
-        }
-    }
-}
+/// Most segments of all beams together: with bodies, joints and their factors each takes about a kilobyte.
+pub const MOST_SEGMENTS: usize = 2_000_000;
 
 /// A system, and where the drawing's parts went.
 #[derive(Debug, Clone)]
@@ -127,6 +90,12 @@ pub enum DiscretizeError {
         /// Name of a beam in that part.
         beam: String,
     },
+    /// More segments than can be laid out.
+    #[error("{segments} segments in all, at most {MOST_SEGMENTS}; take a lower band, a larger tol, or fewer segments")]
+    TooFine {
+        /// Segments of all beams together.
+        segments: usize,
+    },
     /// Everything is ground.
     #[error("nothing can move: every node is anchored")]
     NothingMoves,
@@ -136,7 +105,7 @@ pub enum DiscretizeError {
 ///
 /// # Errors
 /// See [`DiscretizeError`].
-pub fn discretize(structure: &Structure, options: &DiscretizeOptions) -> Result<Discretized, DiscretizeError> {
+pub fn discretize(structure: &Structure, options: &CompileOptions) -> Result<Discretized, DiscretizeError> {
     discretize_with(structure, options, &order::a_priori(structure, options)?)
 }
 
@@ -146,9 +115,13 @@ pub fn discretize(structure: &Structure, options: &DiscretizeOptions) -> Result<
 /// See [`DiscretizeError`].
 pub fn discretize_with(
     structure: &Structure,
-    options: &DiscretizeOptions,
+    options: &CompileOptions,
     segments: &[usize],
 ) -> Result<Discretized, DiscretizeError> {
+    let total = segments.iter().fold(0, |sum: usize, n| sum.saturating_add(*n));
+    if total > MOST_SEGMENTS {
+        return Err(DiscretizeError::TooFine { segments: total });
+    }
     let stiff: Vec<bool> = segments.iter().map(|n| *n == 0).collect();
     let mut rigid = rigid::Assembly::new(structure, &stiff);
     let mut laid = beam::Joints::default();

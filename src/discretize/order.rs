@@ -9,7 +9,8 @@
 //!
 //! With a band this is where [`model_order`](crate::refine::model_order) starts from.
 
-use super::{DiscretizeError, DiscretizeOptions};
+use super::{DiscretizeError, MOST_SEGMENTS};
+use crate::options::CompileOptions;
 use crate::structure::{Beam, Structure};
 
 /// Length over width above which a beam counts as slender.
@@ -39,7 +40,7 @@ pub fn check(beam: &Beam) -> Result<(), DiscretizeError> {
 ///
 /// # Errors
 /// See [`check`].
-pub fn a_priori(structure: &Structure, options: &DiscretizeOptions) -> Result<Vec<usize>, DiscretizeError> {
+pub fn a_priori(structure: &Structure, options: &CompileOptions) -> Result<Vec<usize>, DiscretizeError> {
     let count = |beam: &Beam| {
         check(beam)?;
         let count = options.segments.unwrap_or_else(|| segments(beam, options.band, options.tol));
@@ -62,6 +63,7 @@ pub fn segments(beam: &Beam, band: Option<f64>, tol: f64) -> usize {
         return if beam.length / beam.width > SLENDER { STATIC_SEGMENTS } else { 1 };
     };
     let kl = waves(beam, band);
-    let count = (kl / (1440.0 * tol).powf(0.25)).ceil().max(1.0) as usize;
+    // one beam beyond the limit of all is enough to be refused
+    let count = (kl / (1440.0 * tol).powf(0.25)).ceil().clamp(1.0, MOST_SEGMENTS as f64 + 1.0) as usize;
     if kl > 3.0 { count.max(2) } else { count }
 }

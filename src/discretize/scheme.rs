@@ -20,33 +20,12 @@
 //! Reference: D. O. Popa et al., "Computationally efficient dynamic modeling of MEMS" (2004), for A0 and the joint types;
 //! the end corrections of C1, E4 and Es are those of the Euler–Maclaurin sum for the strain and the kinetic energy.
 
+use crate::options::Scheme;
 use nalgebra::{DMatrix, Matrix2, Matrix3, Vector2};
-use serde::{Deserialize, Serialize};
 
 /// Stiffness of a locked direction over EA/h. The beam's own stretch is then wrong by 1e-4 of itself, which a model without
 /// stretch leaves out anyway, while bending keeps ten digits of a beam a hundred times as long as wide.
 pub const PENALTY: f64 = 1e4;
-
-/// How a beam is cut. The module has the table.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Scheme {
-    /// The paper's first rule.
-    A0,
-    /// Rotation at the middle of the segments.
-    A2,
-    /// A2 with coupled joints at the ends.
-    C1,
-    /// Rotation at Gauss points.
-    D1,
-    /// Exact joints, natural rods.
-    B,
-    /// Exact joints, masses of fourth order.
-    #[default]
-    E4,
-    /// Tuned pair of shear flexibility and rotary inertia.
-    Es,
-}
 
 /// What a scheme needs to know of a beam.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -107,21 +86,6 @@ pub struct Cut {
 }
 
 impl Scheme {
-    /// All of them.
-    pub const ALL: [Self; 7] = [Self::A0, Self::A2, Self::C1, Self::D1, Self::B, Self::E4, Self::Es];
-    /// Their names.
-    pub const NAMES: [&str; 7] = ["a0", "a2", "c1", "d1", "b", "e4", "es"];
-
-    /// The name on the command line and in files.
-    pub fn name(self) -> &'static str {
-        Self::NAMES[Self::ALL.iter().position(|s| *s == self).unwrap_or(0)]
-    }
-
-    /// The scheme of that name.
-    pub fn named(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|s| s.name() == name)
-    }
-
     /// Order of the frequency error in h.
     pub fn order(self) -> i32 {
         match self {

@@ -22,10 +22,11 @@
 //! refinement led by an estimate.
 
 use super::order_error::{OrderError, of_modes, relative, strain_shares};
-use crate::discretize::{DiscretizeError, DiscretizeOptions, Discretized, discretize_with, order};
+use crate::discretize::{DiscretizeError, Discretized, discretize_with, order};
 use crate::gaps::Point;
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, BodyId, Model};
+use crate::options::CompileOptions;
 use crate::solve::subspace;
 use crate::structure::{Beam, NodeId, Structure};
 use serde::Serialize;
@@ -60,7 +61,7 @@ pub struct ModelOrder {
 ///
 /// # Errors
 /// See [`DiscretizeError`].
-pub fn choose(structure: &Structure, options: &DiscretizeOptions, band: f64) -> Result<ModelOrder, DiscretizeError> {
+pub fn choose(structure: &Structure, options: &CompileOptions, band: f64) -> Result<ModelOrder, DiscretizeError> {
     let bare = mechanics(structure);
     let groups = Groups::new(&bare.beams);
     let floor: Vec<usize> = (bare.beams.iter())
@@ -122,7 +123,7 @@ pub fn choose(structure: &Structure, options: &DiscretizeOptions, band: f64) -> 
 fn stiffen(
     structure: &Structure,
     bare: &Structure,
-    options: &DiscretizeOptions,
+    options: &CompileOptions,
     band: f64,
     groups: &Groups,
     elastic: &Seen,
@@ -276,7 +277,7 @@ fn mechanics(structure: &Structure) -> Structure {
 /// Modes within the band and their errors; starts from the shapes of a model with other segments.
 fn look(
     structure: &Structure,
-    options: &DiscretizeOptions,
+    options: &CompileOptions,
     band: f64,
     segments: &[usize],
     before: Option<&Seen>,
@@ -290,7 +291,7 @@ type Found = (usize, Vec<f64>, Vec<Vec<Pose>>, Option<OrderError>);
 
 fn modes_in_band(
     structure: &Structure,
-    options: &DiscretizeOptions,
+    options: &CompileOptions,
     band: f64,
     parts: &Discretized,
     before: Option<&Seen>,
@@ -401,7 +402,7 @@ impl Groups {
     /// The fewest segments for which every mode is predicted to hold.
     fn fewest(
         &self,
-        options: &DiscretizeOptions,
+        options: &CompileOptions,
         error: &OrderError,
         modes: usize,
         segments: &[usize],

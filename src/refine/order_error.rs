@@ -28,11 +28,12 @@
 use crate::discretize::beam::bar;
 use crate::discretize::frame::{Elements, Frame, FrameOptions, assemble};
 use crate::discretize::scheme::{Bar, Part};
-use crate::discretize::{DiscretizeOptions, Discretized, Scheme, cubic, order};
+use crate::discretize::{Discretized, cubic, order};
 use crate::gaps::Point;
 use crate::multibody::linear_system::LinearSystem;
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, BodyId, Model, Pattern};
+use crate::options::{CompileOptions, Scheme};
 use crate::solve::subspace::{columns, ritz};
 use crate::structure::Structure;
 use nalgebra::{Matrix6, Vector2, Vector3, Vector6};
@@ -52,7 +53,7 @@ pub struct OrderError {
 /// it, relatively.
 pub fn strain_shares(
     structure: &Structure,
-    options: &DiscretizeOptions,
+    options: &CompileOptions,
     parts: &Discretized,
     lambda: &[f64],
     shapes: &[Vec<Pose>],
@@ -142,7 +143,7 @@ struct Pencil<'a> {
 
 /// True where the model's tangent is that of the cubic frame: schemes E4 and B without rigid beams. Only then is the
 /// estimate that of a loaded equilibrium too.
-pub fn own_stiffness(options: &DiscretizeOptions, parts: &Discretized) -> bool {
+pub fn own_stiffness(options: &CompileOptions, parts: &Discretized) -> bool {
     let exact = matches!(options.scheme, Scheme::E4 | Scheme::B);
     exact && parts.beams.iter().all(|points| points.len() > 2 || points[0].body != points[1].body)
 }
@@ -150,7 +151,7 @@ pub fn own_stiffness(options: &DiscretizeOptions, parts: &Discretized) -> bool {
 /// Errors of modes of a model. `factor` is that of K − `shift`·M at the operating point.
 pub fn of_modes(
     structure: &Structure,
-    options: &DiscretizeOptions,
+    options: &CompileOptions,
     parts: &Discretized,
     (factor, shift): (&BlockMatrix<f64, 3>, f64),
     lambda: &[f64],
@@ -191,7 +192,7 @@ pub fn relative(lambda: &[f64], reference: &[f64]) -> Vec<f64> {
 /// Every beam over its `points`, less the offsets at both ends.
 fn spans(
     structure: &Structure,
-    options: &DiscretizeOptions,
+    options: &CompileOptions,
     (beams, offsets): (&[Vec<Point>], &[[f64; 2]]),
     lumped: bool,
 ) -> Vec<Span> {
@@ -270,7 +271,7 @@ fn dot(a: &[Pose], b: &[Pose]) -> f64 {
 /// Errors against a cubic frame on the same mesh, about the drawn geometry.
 fn by_frame(
     structure: &Structure,
-    options: &DiscretizeOptions,
+    options: &CompileOptions,
     parts: &Discretized,
     lambda: &[f64],
     shapes: &[Vec<Pose>],

@@ -1,7 +1,9 @@
 //! The calls of `service.proto`: check, look up, compute, convert.
 
 use super::chunks::{HEARTBEAT, Outlet, send_table, send_transient};
-use super::convert::{self, Violation, analysis as results, model as text, sweep as sweeps_wire};
+use super::convert::{
+    self, Violation, analysis as results, model as text, options as options_wire, sweep as sweeps_wire,
+};
 use super::limits::Limits;
 use super::models::{Model, Models, check_size};
 use super::server::MakeDevice;
@@ -59,7 +61,7 @@ impl Calls {
     ) -> Result<(Bundle, CompileOptions), Status> {
         let bundle = text::bundle_from_wire(bundle).map_err(status::violation)?;
         check_size(&bundle, &self.0.limits)?;
-        Ok((bundle, text::options_from_wire(options).map_err(status::violation)?))
+        Ok((bundle, options_wire::options_from_wire(options).map_err(status::violation)?))
     }
 
     /// Looks up a model, then computes on it.

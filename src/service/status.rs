@@ -3,7 +3,7 @@
 //! A status travels in HTTP trailers, and clients refuse large ones (8 KiB is a common default), so text and
 //! violations are cut to what fits; the call `Check` has all of it.
 
-use super::convert::Violation;
+use super::convert::{Violation, options};
 use crate::analysis::AnalysisError;
 use crate::compile::CompileError;
 use crate::device::DeviceError;
@@ -46,6 +46,7 @@ pub(super) fn bad_request(message: &str, violations: impl IntoIterator<Item = Vi
 pub(super) fn compile(error: &CompileError) -> Status {
     match error {
         CompileError::Netlist(diagnostics) => netlist(diagnostics),
+        CompileError::Option(refused) => violation(options::refused(refused.clone())),
         other => violation(Violation::new("bundle", other.to_string())),
     }
 }

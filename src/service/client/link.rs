@@ -3,7 +3,8 @@
 use crate::compile::CompileOptions;
 use crate::netlist::Bundle;
 use crate::service::address::Address;
-use crate::service::convert::model::{bundle_to_wire, options_to_wire};
+use crate::service::convert::model::bundle_to_wire;
+use crate::service::convert::options::options_to_wire;
 use crate::service::proto::{self, bimorph_client::BimorphClient};
 use std::future::Future;
 use std::time::Duration;

@@ -6,6 +6,7 @@
 pub mod analysis;
 pub mod device;
 pub mod model;
+pub mod options;
 pub mod sweep;
 
 use super::proto;

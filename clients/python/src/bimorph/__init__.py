@@ -19,6 +19,7 @@ from .errors import (
     Violation,
 )
 from .netlist import Netlist
+from .options import Options
 from .results import (
     ModesResult,
     NodeMotion,
@@ -45,6 +46,7 @@ __all__ = [
     "NoResult",
     "NodeMotion",
     "NotFound",
+    "Options",
     "PullIn",
     "PullInResult",
     "Row",

@@ -6,15 +6,19 @@ import math
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import TracebackType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from . import sweep as sweeps
 from .channel import Channel
 from .errors import Diagnostic, InvalidRequest, NetlistError, Unavailable
 from .netlist import Netlist
+from .options import WIRE, Options
 from .results import ModesResult, NodeMotion, PullInResult, StaticResult, TransientResult
 from .session import Session
 from .v1 import analysis_pb2, model_pb2, sweep_pb2
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 Voltages = Mapping[str, float]
 """Port voltages by name [V]; ports not named are at 0 V."""
@@ -44,37 +48,24 @@ class Client:
         netlist: str | os.PathLike[str] | Netlist,
         *,
         set: Mapping[str, float | str] | None = None,
-        band: float | None = None,
-        tol: float | None = None,
-        linear: bool = False,
-        undamped: bool = False,
-        junctions: str = "",
-        scheme: str = "",
-        segments: int | None = None,
-        shear: bool = False,
-        rotary_inertia: bool = False,
         include: Iterable[str | os.PathLike[str]] = (),
+        **options: Unpack[Options],
     ) -> Model:
         """Compiles a netlist (a path, or a :class:`Netlist`).
 
-        ``set`` overrides netlist parameters [SI]. ``band`` is the highest frequency to resolve [Hz], ``tol`` the relative
-        error aimed at [1], ``linear`` small displacements about the drawn geometry, ``undamped`` leaves out gas damping,
-        ``junctions`` how beams meet: "centreline", "offset" or "calibrated" (the default).
-        ``scheme`` names how beams are cut ("a0" … "es"), ``segments`` fixes the number of segments of every beam, ``shear``
-        and ``rotary_inertia`` make beams thick.
+        ``set`` overrides netlist parameters [SI]. The other keywords are the :class:`Options` of a model, such as ``tol``
+        and ``band``; the server refuses a value beyond its range.
 
         Raises :class:`NetlistError` with all diagnostics.
         """
         bundle = _bundle(netlist, include)
-        options = _options(
-            set or {}, band, tol, linear, undamped, junctions, scheme, segments, shear, rotary_inertia
-        )
-        request = model_pb2.CompileRequest(bundle=bundle, options=options)
+        wire = _options(set or {}, options)
+        request = model_pb2.CompileRequest(bundle=bundle, options=wire)
         try:
             answer = self._channel.call("Compile", request)
         except InvalidRequest as error:
             # A status has no room for many diagnostics; Check gives all of them, as data.
-            checked = self._channel.call("Check", model_pb2.CheckRequest(bundle=bundle, options=options))
+            checked = self._channel.call("Check", model_pb2.CheckRequest(bundle=bundle, options=wire))
             if checked.ok:
                 raise
             diagnostics = [_diagnostic(d) for d in checked.diagnostics]
@@ -88,18 +79,10 @@ class Client:
         analysis: sweeps.Analysis,
         *,
         set: Mapping[str, float | str] | None = None,
-        band: float | None = None,
-        tol: float | None = None,
-        linear: bool = False,
-        undamped: bool = False,
-        junctions: str = "",
-        scheme: str = "",
-        segments: int | None = None,
-        shear: bool = False,
-        rotary_inertia: bool = False,
         include: Iterable[str | os.PathLike[str]] = (),
         shard: tuple[int, int] = (0, 1),
         progress: Callable[[int, int], object] | None = None,
+        **options: Unpack[Options],
     ) -> sweeps.Table:
         """Runs ``analysis`` on the full grid of ``parameters`` (netlist parameters [SI]), on all cores of the server.
 
@@ -107,9 +90,7 @@ class Client:
         """
         request = sweep_pb2.SubmitSweepRequest(
             bundle=_bundle(netlist, include),
-            options=_options(
-                set or {}, band, tol, linear, undamped, junctions, scheme, segments, shear, rotary_inertia
-            ),
+            options=_options(set or {}, options),
             spec=sweeps.to_wire(parameters, analysis, shard),
         )
         return sweeps.run(self._channel, request, progress)
@@ -249,29 +230,13 @@ def _bundle(netlist: str | os.PathLike[str] | Netlist, include: Iterable[str | o
     return model_pb2.Bundle(root=read.root, files=dict(read.files))
 
 
-def _options(
-    settings: Mapping[str, float | str],
-    band: float | None,
-    tol: float | None,
-    linear: bool,
-    undamped: bool,
-    junctions: str,
-    scheme: str,
-    segments: int | None,
-    shear: bool,
-    rotary_inertia: bool,
-) -> Any:
+def _options(settings: Mapping[str, float | str], options: Mapping[str, Any]) -> Any:
+    unknown = [name for name in options if name not in WIRE]
+    if unknown:
+        raise TypeError(f"no option {unknown[0]!r}; there are {', '.join(WIRE)}")
+    given = {WIRE[name]: value for name, value in options.items() if value is not None}
     return model_pb2.CompileOptions(
-        set=[sweeps.setting(name, value) for name, value in settings.items()],
-        band_hz=band,
-        tol=tol,
-        linear=linear,
-        undamped=undamped,
-        junctions=junctions,
-        scheme=scheme,
-        segments=segments,
-        shear=shear,
-        rotary_inertia=rotary_inertia,
+        set=[sweeps.setting(name, value) for name, value in settings.items()], **given
     )
 
 

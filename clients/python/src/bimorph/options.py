@@ -1,0 +1,60 @@
+"""Options of a model. Written from the table in src/options/model.rs by ``BIMORPH_WRITE=1 cargo test --test options``."""
+
+from __future__ import annotations
+
+from typing import Literal, TypedDict
+
+
+class Options(TypedDict, total=False):
+    """Keywords of ``compile`` and ``sweep``; those left out, or None, have their defaults."""
+
+    tol: float | None
+    """Relative error aimed at. Smaller: more unknowns and shorter steps. Range: above 0, below 1; default: 1e-3."""
+
+    band: float | None
+    """Highest frequency the model must resolve: as many segments as the estimated error of every mode below it
+    needs to stay within tol [Hz]. Range: above 0, at most 1e12; default: by the slenderness of the beams."""
+
+    junctions: Literal["centreline", "offset", "calibrated"] | None
+    """How beams meet. centreline: in points, as in SUGAR; offset: at the edges of rigid junctions; calibrated:
+    with springs there, from two-dimensional elasticity (docs/junctions.md). One of centreline, offset or
+    calibrated; default: calibrated."""
+
+    linear: bool | None
+    """Small displacements about the drawn geometry, as SUGAR."""
+
+    undamped: bool | None
+    """Leave out gas damping."""
+
+    scheme: Literal["a0", "a2", "c1", "d1", "b", "e4", "es"] | None
+    """How beams are cut into bodies and joints (docs/theory.md has their errors). One of a0, a2, c1, d1, b, e4,
+    es; default: e4."""
+
+    segments: int | None
+    """Segments of every beam, whatever band and tol say. Range: 1 to 100000; default: by band and tol."""
+
+    shear: bool | None
+    """Shear flexibility of beams (Timoshenko, shear coefficient 5/6); SUGAR leaves it out."""
+
+    rotary_inertia: bool | None
+    """Rotary inertia of the sections of beams; SUGAR leaves it out."""
+
+    formulation: Literal["auto", "compliant", "rcr", "rcr-elastic"] | None
+    """How bodies become equations. compliant: springs, implicit steps; rcr: the recursion in joint coordinates,
+    beams' joints only turn; rcr-elastic: the same, every elastic direction a coordinate; auto: what suits. One
+    of auto, compliant, rcr, rcr-elastic; default: compliant."""
+
+
+WIRE = {
+    "tol": "tol",
+    "band": "band_hz",
+    "junctions": "junctions",
+    "linear": "linear",
+    "undamped": "undamped",
+    "scheme": "scheme",
+    "segments": "segments",
+    "shear": "shear",
+    "rotary_inertia": "rotary_inertia",
+    "formulation": "formulation",
+}
+"""Field on the wire of each option."""

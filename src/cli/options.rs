@@ -1,0 +1,93 @@
+//! The options of a model as arguments: each line of the table is one.
+
+use super::failure::Failure;
+use super::value;
+use bimorph::options::{CompileOptions, Described, MODEL, Range, Value};
+use clap::{Arg, ArgAction, ArgMatches, Args, Command, Error, FromArgMatches};
+use std::sync::LazyLock;
+
+/// The options that were given, as they were written.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Chosen(Vec<(usize, Value)>);
+
+impl Chosen {
+    /// The options of a compilation, each within its range.
+    pub(crate) fn options(&self) -> Result<CompileOptions, Failure> {
+        let mut options = CompileOptions::default();
+        for (k, value) in &self.0 {
+            options.choose(&MODEL[*k], value.clone())?;
+        }
+        Ok(options)
+    }
+
+    /// Whether an option was given.
+    pub(crate) fn given(&self, name: &str) -> bool {
+        self.0.iter().any(|(k, _)| MODEL[*k].about.name == name)
+    }
+}
+
+/// The arguments' names, which live as long as the program.
+static FLAGS: LazyLock<Vec<String>> = LazyLock::new(|| MODEL.iter().map(|option| option.about.flag()).collect());
+
+/// What the command shows of an option: other options named as the command writes them.
+fn help(about: &Described) -> String {
+    let mut text = about.about();
+    if let Range::Names(names) = about.range
+        && names.iter().any(|name| !text.contains(name))
+    {
+        text += &format!(": {}", about.range);
+    }
+    if !matches!(about.unit, "" | "1") {
+        text += &format!(" [{}]", about.unit);
+    }
+    if about.range != Range::Flag {
+        text += &format!(" [default: {}]", about.by_default());
+    }
+    text
+}
+
+fn arg(about: &Described, flag: &'static str) -> Arg {
+    let arg = Arg::new(about.name).long(flag).help(help(about));
+    match about.range {
+        Range::Flag => arg.action(ArgAction::SetTrue),
+        Range::Count(..) => arg.value_name("N").value_parser(clap::value_parser!(usize)),
+        Range::Above(..) | Range::Within(..) => {
+            let arg = arg.value_name(if about.unit == "Hz" { "HZ" } else { "NUMBER" });
+            arg.value_parser(value::number).allow_negative_numbers(true)
+        }
+        Range::Names(_) => arg.value_name("NAME"),
+    }
+}
+
+fn found(matches: &ArgMatches, about: &Described) -> Option<Value> {
+    match about.range {
+        Range::Flag => matches.get_flag(about.name).then_some(Value::Flag(true)),
+        Range::Count(..) => matches.get_one(about.name).copied().map(Value::Count),
+        Range::Above(..) | Range::Within(..) => matches.get_one(about.name).copied().map(Value::Number),
+        Range::Names(_) => matches.get_one(about.name).cloned().map(Value::Name),
+    }
+}
+
+impl FromArgMatches for Chosen {
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, Error> {
+        let mut chosen = Self::default();
+        chosen.update_from_arg_matches(matches)?;
+        Ok(chosen)
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), Error> {
+        let given = MODEL.iter().enumerate().filter_map(|(k, option)| Some((k, found(matches, &option.about)?)));
+        self.0.extend(given);
+        Ok(())
+    }
+}
+
+impl Args for Chosen {
+    fn augment_args(command: Command) -> Command {
+        command.args(MODEL.iter().zip(FLAGS.iter()).map(|(option, flag)| arg(&option.about, flag)))
+    }
+
+    fn augment_args_for_update(command: Command) -> Command {
+        Self::augment_args(command)
+    }
+}

@@ -1,0 +1,15 @@
+//! Options, said once: names, units, defaults, ranges and help for the command, the wire, decks, sweeps, Python and docs/.
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | [`model`] | the table of the options of a model |
+//! | [`table`] | what an option is, and the check of a value |
+//! | [`choices`] | the names that some options take |
+
+pub mod choices;
+pub mod model;
+pub mod table;
+
+pub use choices::{Formulation, Junctions, Scheme};
+pub use model::{CompileOptions, MODEL, ModelOption};
+pub use table::{Described, Range, Refused, Value};

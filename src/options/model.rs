@@ -1,0 +1,161 @@
+//! The options of a model, one table: a line here is all that an option needs to be accepted everywhere.
+//!
+//! From it come the struct and its defaults, `--help` and the parsing of the command, the fields on the wire, the parameters of
+//! an ngspice `.model` line, the keywords of the Python client, the keys of JSON documents, and the table in docs/options.md.
+//! After a change, `BIMORPH_WRITE=1 cargo test --test options` writes what is generated from it.
+
+use super::choices::{Formulation, Junctions, Scheme};
+use super::table::{Described, Field, Range, Refused, Value};
+use crate::netlist::Setting;
+use std::sync::LazyLock;
+
+/// An option of a model: what it is, and its field.
+pub struct ModelOption {
+    /// Name, unit, default, range, meaning.
+    pub about: Described,
+    /// Number of its field on the wire.
+    pub number: u32,
+    get: fn(&CompileOptions) -> Value,
+    set: fn(&mut CompileOptions, Value),
+}
+
+macro_rules! options {
+    ($($(#[doc = $help:literal])+
+       $field:ident: $kind:ty = $default:expr, $wire:literal = $number:literal, [$unit:literal], $range:expr, $unset:literal;)+
+    ) => {
+        /// What a compilation may be told. `Default` is the only place where the numbers stand.
+        #[derive(Debug, Clone, PartialEq)]
+        pub struct CompileOptions {
+            /// Netlist parameters set from outside.
+            pub set: Vec<(String, Setting)>,
+            $($(#[doc = $help])+ pub $field: $kind,)+
+        }
+
+        impl Default for CompileOptions {
+            fn default() -> Self {
+                Self { set: Vec::new(), $($field: $default,)+ }
+            }
+        }
+
+        /// Every option of a model, in the order of the documentation.
+        pub static MODEL: LazyLock<Vec<ModelOption>> = LazyLock::new(|| vec![$(ModelOption {
+            about: Described {
+                name: stringify!($field),
+                wire: $wire,
+                unit: $unit,
+                range: $range,
+                default: <$kind as Field>::value(&$default),
+                unset: $unset,
+                help: concat!($($help, "\n"),+),
+            },
+            number: $number,
+            get: |options| options.$field.value(),
+            set: |options, value| {
+                if let Some(value) = Field::from_value(value) {
+                    options.$field = value;
+                }
+            },
+        }),+]);
+    };
+}
+
+// field: type = default, name on the wire = its number there, [unit], range, what decides where it is left out
+options! {
+    /// Relative error aimed at. Smaller: more unknowns and shorter steps.
+    tol: f64 = 1e-3, "tol" = 3, ["1"], Range::Above(0.0, 1.0), "";
+
+    /// Highest frequency the model must resolve: as many segments as the estimated error of every mode below it needs to stay
+    /// within tol.
+    band: Option<f64> = None, "band_hz" = 2, ["Hz"], Range::Above(0.0, 1e12), "by the slenderness of the beams";
+
+    /// How beams meet. centreline: in points, as in SUGAR; offset: at the edges of rigid junctions; calibrated: with springs
+    /// there, from two-dimensional elasticity (docs/junctions.md).
+    junctions: Junctions = Junctions::Calibrated, "junctions" = 6, [""], Range::Names(&Junctions::NAMES), "";
+
+    /// Small displacements about the drawn geometry, as SUGAR.
+    linear: bool = false, "linear" = 4, [""], Range::Flag, "";
+
+    /// Leave out gas damping.
+    undamped: bool = false, "undamped" = 5, [""], Range::Flag, "";
+
+    /// How beams are cut into bodies and joints (docs/theory.md has their errors).
+    scheme: Scheme = Scheme::E4, "scheme" = 7, [""], Range::Names(&Scheme::NAMES), "";
+
+    /// Segments of every beam, whatever band and tol say.
+    segments: Option<usize> = None, "segments" = 8, [""], Range::Count(1, 100_000), "by band and tol";
+
+    /// Shear flexibility of beams (Timoshenko, shear coefficient 5/6); SUGAR leaves it out.
+    shear: bool = false, "shear" = 9, [""], Range::Flag, "";
+
+    /// Rotary inertia of the sections of beams; SUGAR leaves it out.
+    rotary_inertia: bool = false, "rotary_inertia" = 10, [""], Range::Flag, "";
+
+    /// How bodies become equations. compliant: springs, implicit steps; rcr: the recursion in joint coordinates, beams' joints
+    /// only turn; rcr-elastic: the same, every elastic direction a coordinate; auto: what suits.
+    formulation: Formulation = Formulation::Compliant, "formulation" = 11, [""], Range::Names(&Formulation::NAMES), "";
+}
+
+impl CompileOptions {
+    /// The value of an option.
+    pub fn value(&self, option: &ModelOption) -> Value {
+        (option.get)(self)
+    }
+
+    /// Gives an option a value, if it can have it.
+    ///
+    /// # Errors
+    /// [`Refused`]: the option is as before.
+    pub fn choose(&mut self, option: &ModelOption, value: Value) -> Result<(), Refused> {
+        let value = match value {
+            // the American spelling means the same, wherever it is written
+            Value::Name(name) if name == "centerline" => Value::Name(Junctions::Centreline.name().to_owned()),
+            other => other,
+        };
+        option.about.check(&value)?;
+        (option.set)(self, value);
+        Ok(())
+    }
+
+    /// Whether every option is within its range: asked before anything is laid out.
+    ///
+    /// # Errors
+    /// [`Refused`]: the first that is not.
+    pub fn check(&self) -> Result<(), Refused> {
+        MODEL.iter().try_for_each(|option| option.about.check(&self.value(option)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! What the table says of an option is what its field holds and takes.
+    use super::*;
+
+    #[test]
+    fn defaults_are_within_their_ranges() {
+        let defaults = CompileOptions::default();
+        assert_eq!(defaults.check(), Ok(()));
+        for option in MODEL.iter() {
+            assert_eq!(defaults.value(option), option.about.default, "{}", option.about.name);
+            assert_eq!(option.about.default == Value::Unset, !option.about.unset.is_empty(), "{}", option.about.name);
+        }
+    }
+
+    #[test]
+    fn a_value_beyond_its_range_is_refused_and_changes_nothing() {
+        for option in MODEL.iter() {
+            let (good, bad) = match option.about.range {
+                Range::Flag => (Value::Flag(true), Value::Number(1.0)),
+                Range::Count(low, high) => (Value::Count(high), Value::Count(if low > 0 { low - 1 } else { high + 1 })),
+                Range::Above(low, high) => (Value::Number(0.5 * high), Value::Number(low)),
+                Range::Within(low, high) => (Value::Number(high), Value::Number(low - high)),
+                Range::Names(names) => (Value::Name(names[0].to_owned()), Value::Name("nosuch".to_owned())),
+            };
+            let mut options = CompileOptions::default();
+            let refused = options.choose(option, bad).expect_err(option.about.name);
+            assert_eq!((refused.option, &options), (option.about.name, &CompileOptions::default()));
+            assert!(options.choose(option, Value::Number(f64::NAN)).is_err(), "{}", option.about.name);
+            options.choose(option, good.clone()).unwrap_or_else(|e| panic!("{e}"));
+            assert_eq!(options.value(option), good);
+        }
+    }
+}
