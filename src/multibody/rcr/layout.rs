@@ -1,7 +1,7 @@
 //! How equal subtrees are laid into packs, once for a mechanism.
 
 use super::linkage::{Closure, Link, Linkage, Parent};
-use super::packs::{First, Hand, Item, Pack, Packs, WIDTH, Wide};
+use super::packs::{First, Hand, Item, Pack, Packs, WIDTH, Wide, vectors};
 use super::real::Real;
 use super::reduce::Reduction;
 use super::schedule::{NONE, Schedule};
@@ -10,9 +10,10 @@ use crate::multibody::{BodyId, Pattern};
 use std::ops::Range;
 
 impl Packs {
-    /// The packs of a mechanism; none where it has no equal subtrees, or more constraints than coordinates in some loop.
+    /// The packs of a mechanism; none where it has no equal subtrees, or more constraints than coordinates in some loop, or the
+    /// processor no lanes.
     pub(super) fn new(linkage: &Linkage, schedule: &Schedule) -> Option<Box<Self>> {
-        if schedule.redundant > 0 {
+        if schedule.redundant > 0 || !vectors() {
             return None;
         }
         let groups = equal(linkage, schedule, WIDTH);

@@ -176,27 +176,47 @@ fn gather<T: Real>(to: &mut [Wide], from: &[T], starts: [usize; WIDTH]) {
     }
 }
 
+/// Whether the processor has vector instructions. Without them eight lanes are eight times the work, and nothing is packed.
+pub(super) fn vectors() -> bool {
+    !matches!(Arch::new(), Arch::Scalar)
+}
+
+/// Runs `work` in the widest instructions. It is not compiled for a processor without any: that copy would be the largest, and
+/// never run.
+#[inline(always)]
+fn wide<W: WithSimd<Output: Default>>(work: W) -> W::Output {
+    match Arch::new() {
+        #[cfg(target_arch = "x86_64")]
+        Arch::V4(simd) => Simd::vectorize(simd, work),
+        #[cfg(target_arch = "x86_64")]
+        Arch::V3(simd) => Simd::vectorize(simd, work),
+        #[cfg(target_arch = "aarch64")]
+        Arch::Neon(simd) => Simd::vectorize(simd, work),
+        _ => W::Output::default(),
+    }
+}
+
 // compiled once, whoever calls
 impl Packs {
     #[inline(never)]
     fn place_lanes(&mut self) {
-        Arch::new().dispatch(Place(self));
+        wide(Place(self));
     }
 
     #[inline(never)]
     fn inward_lanes(&mut self, task: Task) {
-        Arch::new().dispatch(Inward(self, task));
+        wide(Inward(self, task));
     }
 
     #[inline(never)]
     fn outward_lanes(&mut self, task: Task) {
-        Arch::new().dispatch(Outward(self, task));
+        wide(Outward(self, task));
     }
 
     /// Writes the rows of the subtrees' closures for `task`. Returns the largest residual.
     #[inline(never)]
     pub(super) fn rows(&mut self, task: Task) -> f64 {
-        if self.lanes.closures.is_empty() { 0.0 } else { Arch::new().dispatch(Rows(self, task)) }
+        if self.lanes.closures.is_empty() { 0.0 } else { wide(Rows(self, task)) }
     }
 }
 
