@@ -1,6 +1,6 @@
 //! Joint coordinates of given poses.
 
-use super::linkage::{Linkage, Parent};
+use super::tree::{Linkage, Parent};
 use crate::multibody::planar::{JointFrame, Pose};
 
 impl Linkage {

@@ -14,7 +14,7 @@
 //! not at all. The smallest pivot against the joint's lever is the caller's measure of how near a loop is to a singular
 //! configuration.
 
-use super::real::Real;
+use super::scalar::Real;
 
 /// One front, in row-major order: M is k × k (lower triangle), rows are h × (k + 1) with γ last.
 #[derive(Debug)]

@@ -1,14 +1,14 @@
 //! The turn of any body: several coordinates, fronts of any width, any number of rows.
 //!
 //! The front is assembled from the body's inertia, its couplings and the rows that reach it, [`super::front`] takes its
-//! coordinates out, and what is left goes to the bodies of the front. [`super::kernels`] does the same for small fronts.
+//! coordinates out, and what is left goes to the bodies of the front. [`super::fast::kernels`] does the same for small fronts.
 
 use super::front::Front;
-use super::implicit::Added;
-use super::linkage::{Linkage, Parent};
-use super::real::Real;
-use super::reduce::{Reduction, Scratch, Task};
+use super::reduction::{Reduction, Scratch, Task};
+use super::scalar::Real;
 use super::schedule::{NONE, Turn};
+use super::stages::Added;
+use super::tree::{Linkage, Parent};
 
 impl<T: Real> Reduction<T> {
     #[inline(never)]

@@ -7,10 +7,13 @@
 //!
 //! It is read at every reduction, so its indices are 32 bits wide (`turn`).
 
-use super::linkage::{Closure, Linkage, Parent};
-use super::slots::Slots;
-pub(super) use super::turn::Turn;
-use super::turn::{Packed, narrow, wide};
+use super::tree::{Closure, Linkage, Parent};
+use slots::Slots;
+pub(super) use turn::Turn;
+use turn::{Packed, narrow, wide};
+mod slots;
+mod turn;
+
 use crate::multibody::BodyId;
 
 /// No place.

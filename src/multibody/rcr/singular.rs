@@ -20,8 +20,8 @@
 //! it loses nothing.
 
 use super::Linkage;
-use super::linkage::Parent;
-use super::reduce::{Reduction, Task};
+use super::reduction::{Reduction, Task};
+use super::tree::Parent;
 
 /// Ratio up to which a row is squared into the inertia: its square times the rounding unit is lost.
 const LIGHT: f64 = 30.0;

@@ -1,13 +1,13 @@
 //! The storage of a reduction: everything is laid out once, in elimination order.
 
-use super::closure::ClosureData;
-use super::linkage::Linkage;
-use super::motion::{Arms, Hanging, JointData, LinkData, Placed, lane};
-use super::packs::Packs;
-use super::real::Real;
-use super::reduce::{Node, Reduction, Scratch};
+use super::closures::ClosureData;
+use super::fast::packs::Packs;
+use super::kinematics::{Arms, Hanging, JointData, LinkData, Placed, lane};
+use super::reduction::{Node, Reduction, Scratch};
+use super::scalar::Real;
 use super::schedule::Schedule;
-use super::turn::Turn;
+use super::schedule::Turn;
+use super::tree::Linkage;
 
 impl<T: Real> Reduction<T> {
     /// Storage for one variant per lane; all must have the same tree and loops (fewer variants are repeated). Over one

@@ -1,14 +1,14 @@
 //! Turns of bodies with one coordinate and a front of one or two bodies, with the rows of loops, in closed form. They do what
-//! [`super::front`] does, with nothing left to decide while running.
+//! [`crate::multibody::rcr::front`] does, with nothing left to decide while running.
 
-use super::real::Real;
-use super::reduce::{Reduction, Task};
-use super::schedule::NONE;
+use crate::multibody::rcr::reduction::{Reduction, Task};
+use crate::multibody::rcr::scalar::Real;
+use crate::multibody::rcr::schedule::NONE;
 
 impl<T: Real> Reduction<T> {
     /// A body with one coordinate, a front of `W` bodies and `H` constraint rows.
     #[inline(always)]
-    pub(super) fn one_inward<const W: usize, const H: usize>(&mut self, task: Task, body: usize) {
+    pub(in crate::multibody::rcr) fn one_inward<const W: usize, const H: usize>(&mut self, task: Task, body: usize) {
         let turn = self.schedule.turn(body);
         let inertia = self.take_inertia(body);
         let mut force = self.take_force(task, body);
@@ -221,7 +221,7 @@ impl<T: Real> Reduction<T> {
 
     /// Acceleration of a body with one coordinate and a front of `W` bodies.
     #[inline(always)]
-    pub(super) fn one_outward<const W: usize>(&mut self, task: Task, body: usize, out: &mut [T]) {
+    pub(in crate::multibody::rcr) fn one_outward<const W: usize>(&mut self, task: Task, body: usize, out: &mut [T]) {
         let step = self.schedule.steps[body];
         let turn = self.schedule.turn(body);
         let first = step.first as usize;

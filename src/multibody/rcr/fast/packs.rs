@@ -12,11 +12,11 @@
 //!
 //! Poses and rates stay in the lanes until someone asks for them. A pack that is not full repeats its last subtree.
 
-use super::closure::ClosureData;
-use super::linkage::Linkage;
-use super::motion::{Hanging, JointData, Placed};
-use super::real::{Lanes, Real};
-use super::reduce::{Reduction, Task};
+use crate::multibody::rcr::closures::ClosureData;
+use crate::multibody::rcr::kinematics::{Hanging, JointData, Placed};
+use crate::multibody::rcr::reduction::{Reduction, Task};
+use crate::multibody::rcr::tree::Linkage;
+use crate::multibody::rcr::{Lanes, Real};
 use pulp::{Arch, Simd, WithSimd};
 use std::ops::Range;
 

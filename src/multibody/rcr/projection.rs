@@ -6,7 +6,7 @@
 //!
 //! Reference: E. Hairer, G. Wanner, "Solving Ordinary Differential Equations II" (1996), §VII.2 (projection methods).
 
-use super::reduce::{Reduction, Task};
+use super::reduction::{Reduction, Task};
 use super::singular::Singularity;
 use super::{Linkage, Real};
 

@@ -10,9 +10,9 @@
 //! S are the columns ∂(x, y, θ)/∂(e_u, g, p) of the directions that move, and c gathers the centripetal and Coriolis parts,
 //! the acceleration when q̈ = 0 and the parent's is zero.
 
-use super::linkage::{Link, Linkage, Parent};
-use super::real::Real;
+use super::scalar::Real;
 use super::schedule::Step;
+use super::tree::{Link, Linkage, Parent};
 use std::ops::Range;
 
 /// Two components.

@@ -14,8 +14,8 @@
 //! Reference: R. Featherstone, "Rigid Body Dynamics Algorithms" (2008), chapter 7, for the articulated inertia; the choice
 //! of the pin as its point of reference is ours.
 
-use super::real::Real;
-use super::reduce::{Node, Reduction};
+use crate::multibody::rcr::reduction::{Node, Reduction};
+use crate::multibody::rcr::scalar::Real;
 use std::ops::Range;
 
 /// What one pin's body hands to the next inward, about the pin between them.
@@ -39,7 +39,7 @@ impl<T: Real> Reduction<T> {
     /// Takes the coordinates of a run of pins out, from body `first` on and not beyond `end`. Returns the body after the
     /// run. `FORCED`: with forces and velocity parts.
     #[inline(always)]
-    pub(super) fn pins_inward<const FORCED: bool>(&mut self, first: usize, end: usize) -> usize {
+    pub(in crate::multibody::rcr) fn pins_inward<const FORCED: bool>(&mut self, first: usize, end: usize) -> usize {
         let (mut run, mut handed) = (self.schedule.run(first, end), Handed::NOTHING);
         while !run.is_empty() {
             handed = self.some_pins_inward::<FORCED>(run.clone(), handed);
@@ -128,7 +128,11 @@ impl<T: Real> Reduction<T> {
     /// Accelerations of the bodies of a run of pins that ends with `range`, root → leaf. Returns its first body, which lies
     /// in `range`.
     #[inline(always)]
-    pub(super) fn pins_outward<const FORCED: bool>(&mut self, range: Range<usize>, out: &mut [T]) -> usize {
+    pub(in crate::multibody::rcr) fn pins_outward<const FORCED: bool>(
+        &mut self,
+        range: Range<usize>,
+        out: &mut [T],
+    ) -> usize {
         // of the body after, which is the parent along a chain
         let (mut run, mut after) = (self.schedule.run_before(range.clone()), [T::ZERO; 3]);
         while !run.is_empty() {

@@ -10,13 +10,13 @@
 //! Reference: K. S. Anderson, J. H. Critchley, "Improved 'order-N' performance algorithm for the simulation of constrained
 //! multi-rigid-body dynamic systems", Multibody System Dynamics 9 (2003) 185–212.
 
-use super::closure::ClosureData;
-use super::implicit::Added;
-use super::linkage::Linkage;
-use super::motion::{Arms, Hanging, JointData, LinkData, Placed, place_all};
-use super::packs::{Item, Packs};
-use super::real::Real;
+use super::closures::ClosureData;
+use super::fast::packs::{Item, Packs};
+use super::kinematics::{Arms, Hanging, JointData, LinkData, Placed, place_all};
+use super::scalar::Real;
 use super::schedule::{Kind, NONE, Schedule};
+use super::stages::Added;
+use super::tree::Linkage;
 use std::ops::Range;
 use std::slice::from_ref;
 
@@ -74,7 +74,7 @@ pub struct Reduction<T> {
     /// Acceleration of each body.
     pub accelerations: Vec<[T; 3]>,
     pub(super) front: Scratch<T>,
-    /// What an implicit step adds to each body, see [`super::implicit`]; empty otherwise.
+    /// What an implicit step adds to each body, see [`super::stages`]; empty otherwise.
     pub(super) added: Vec<Added<T>>,
     /// The same to each coupling, in the order of the pattern.
     pub(super) added_coupling: Vec<[T; 9]>,

@@ -4,9 +4,9 @@
 //! e = (u + [g p]Q[g p]ᵀ, g, p), and their second derivative is A·a + b(v): the rows A and the part b of the velocities are
 //! formed here. A rotation is multiplied by the lever of its body, so that rows of one closure have one unit.
 
-use super::linkage::Closure;
-use super::motion::{Pair, Placed, minus, plus, turn};
-use super::real::Real;
+use super::kinematics::{Pair, Placed, minus, plus, turn};
+use super::scalar::Real;
+use super::tree::Closure;
 
 /// Geometry of a closure over lanes.
 #[derive(Debug, Clone)]

@@ -3,10 +3,10 @@
 //! The coordinates of the tree are the strains of its joints, so their forces are −K·(e − e₀) as they stand. An elastic
 //! direction of a closure acts on its two bodies through its rows.
 
-use super::implicit::AddedInertia;
-use super::linkage::{Closure, Linkage};
-use super::motion::Placed;
-use super::reduce::Reduction;
+use super::kinematics::Placed;
+use super::reduction::Reduction;
+use super::stages::AddedInertia;
+use super::tree::{Closure, Linkage};
 use crate::multibody::BodyId;
 use crate::multibody::forces::RestStrain;
 use nalgebra::{Matrix3, Vector3};

@@ -8,8 +8,8 @@
 //! fronts, counted from the subtree; only geometry, masses and stiffnesses may differ. Bodies are numbered by what they are
 //! and by what hangs in them, leaf → root, so a mechanism is compared in one sweep.
 
-use super::linkage::{Closure, Linkage, Parent};
-use super::schedule::{Entry, NONE, Schedule};
+use crate::multibody::rcr::schedule::{Entry, NONE, Schedule};
+use crate::multibody::rcr::tree::{Closure, Linkage, Parent};
 use std::collections::HashMap;
 use std::ops::Range;
 
@@ -17,11 +17,11 @@ use std::ops::Range;
 const FEWEST: usize = 5;
 
 /// Equal subtrees, each the range of its bodies in elimination order.
-pub(super) type Equal = Vec<Range<usize>>;
+pub(in crate::multibody::rcr) type Equal = Vec<Range<usize>>;
 
 /// The groups of at least [`FEWEST`] equal subtrees of a mechanism, the largest subtrees there are, disjoint. What is left
 /// over of a group when packs of `width` are full, and is fewer than `FEWEST`, is left out.
-pub(super) fn equal(linkage: &Linkage, schedule: &Schedule, width: usize) -> Vec<Equal> {
+pub(in crate::multibody::rcr) fn equal(linkage: &Linkage, schedule: &Schedule, width: usize) -> Vec<Equal> {
     let mut groups = Shapes::new(linkage, schedule).choose();
     for group in &mut groups {
         let left = group.len() % width;

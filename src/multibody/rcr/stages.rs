@@ -13,10 +13,10 @@
 //! Coriolis terms) for zero, so that the iteration converges linearly, at the rate of what is left out over W. What it
 //! converges to does not depend on W.
 
-use super::linkage::Linkage;
-use super::reduce::{Reduction, Task};
+use super::reduction::{Reduction, Task};
 use super::schedule::Schedule;
 use super::singular::Singularity;
+use super::tree::Linkage;
 use crate::multibody::BlockMatrix;
 use nalgebra::Matrix3;
 

@@ -1,11 +1,11 @@
 //! How equal subtrees are laid into packs, once for a mechanism.
 
-use super::linkage::{Closure, Link, Linkage, Parent};
 use super::packs::{First, Hand, Item, Pack, Packs, WIDTH, Wide, vectors};
-use super::real::Real;
-use super::reduce::Reduction;
-use super::schedule::{NONE, Schedule};
 use super::subtrees::equal;
+use crate::multibody::rcr::reduction::Reduction;
+use crate::multibody::rcr::scalar::Real;
+use crate::multibody::rcr::schedule::{NONE, Schedule};
+use crate::multibody::rcr::tree::{Closure, Link, Linkage, Parent};
 use crate::multibody::{BodyId, Pattern};
 use std::ops::Range;
 

@@ -1,11 +1,11 @@
 //! The recursion in the widest instructions of the processor at hand, for one mechanism or for lanes of variants.
 //!
-//! The code is one and the same over either number ([`super::real`]). It is compiled for each instruction set and chosen
+//! The code is one and the same over either number ([`crate::multibody::rcr::scalar`]). It is compiled for each instruction set and chosen
 //! at run time (AVX-512, AVX2, NEON or the base set); as nothing is fused, the bits do not depend on the choice.
 
-use super::linkage::Linkage;
-use super::real::Real;
-use super::reduce::{Reduction, Task};
+use crate::multibody::rcr::reduction::{Reduction, Task};
+use crate::multibody::rcr::scalar::Real;
+use crate::multibody::rcr::tree::Linkage;
 use pulp::{Arch, Simd, WithSimd};
 
 /// One evaluation, for [`Arch::dispatch`].
