@@ -5,7 +5,7 @@ mod topologies;
 
 use bimorph::gaps::System;
 use bimorph::gaps::drive::Electrics;
-use bimorph::multibody::rcr::Linkage;
+use bimorph::multibody::rcr::{Linkage, Reduction, Task};
 use bimorph::solve::dormand_prince::Pair;
 use bimorph::solve::joint_dirk::{JointMethod, Rule};
 use bimorph::solve::joint_stage::ImplicitMotion;
@@ -63,27 +63,56 @@ fn a_million_bodies_take_less_than_a_gigabyte() {
     }
 }
 
-/// An implicit step in joint coordinates away from singular configurations, with its projection onto the loops, allocates
-/// nothing: stages, factors and the
-/// history of the iteration are laid out once.
+/// An implicit step in joint coordinates, with its projection onto the loops, allocates nothing: stages, factors and the
+/// history of the iteration are laid out once. Neither does it where loops are singular, as straight arms are when drawn.
 #[test]
 fn an_implicit_step_in_joint_coordinates_allocates_nothing() {
     let _alone = alone();
-    for name in ["chain", "arms"] {
+    for (name, bend) in [("chain", 1e-2), ("arms", 1e-2), ("arms", 0.0)] {
         let linkage = Linkage::new(&topologies::sized(name, 300).pinned());
         let n = linkage.coordinates;
         let mut motion = ImplicitMotion::new(&linkage, topologies::Springs(&linkage), &vec![1.0; n]);
         let mut method = JointMethod::new(Rule::TrBdf2, n);
-        // bent: straight as drawn, loops are singular, and the path for those allocates
-        let mut now = Pair { q: (0..n).map(|k| 1e-2 * (k as f64 * 0.7).sin()).collect(), v: vec![0.0; n] };
-        motion.project(0.0, &mut now.q, &mut now.v);
+        let mut now = Pair { q: (0..n).map(|k| bend * (k as f64 * 0.7).sin()).collect(), v: vec![0.0; n] };
+        if bend > 0.0 {
+            motion.project(0.0, &mut now.q, &mut now.v);
+        }
         let (mut end, mut error) = (Pair::zeros(n), Pair::zeros(n));
         let profiler = dhat::Profiler::builder().testing().build();
         method.step(&mut motion, (0.0, 1e-9), 1e-12, &now, &mut end, &mut error).unwrap();
         motion.project(0.0, &mut end.q, &mut end.v);
         let blocks = dhat::HeapStats::get().total_blocks;
         drop(profiler);
-        assert_eq!((motion.singular, blocks), (0, 0), "{name}");
+        assert_eq!((motion.singular > 0, blocks), (bend == 0.0, 0), "{name}, bent by {bend}");
         assert!(motion.work.iterations > 2, "{name}");
+    }
+}
+
+/// The recursion allocates nothing in any configuration and for any task, with equal subtrees side by side or without.
+#[test]
+fn the_recursion_allocates_nothing() {
+    let _alone = alone();
+    for (name, bend) in [("ladder", 0.1), ("bank", 0.1), ("bank", 0.0), ("arms", 0.0), ("quarter", 0.0)] {
+        for model in [topologies::sized(name, 300).pinned(), topologies::sized(name, 300).model()] {
+            let linkage = Linkage::new(&model);
+            let n = linkage.coordinates;
+            let mut q: Vec<f64> = (0..n).map(|k| bend * (k as f64 * 0.7).sin()).collect();
+            let (mut v, mut out) = (vec![0.0; n], vec![0.0; n]);
+            let mut singular = 0;
+            for mut r in [Reduction::new(&[&linkage]), Reduction::plain(&[&linkage])] {
+                let profiler = dhat::Profiler::builder().testing().build();
+                for task in [Task::Accelerations, Task::Rates, Task::Positions] {
+                    r.place(&linkage, &q, &v);
+                    singular += usize::from(r.solve(&linkage, task, &mut out).is_some());
+                    r.reduce_singular(&linkage, task, &mut out);
+                }
+                r.project_positions(&linkage, &mut q, &v, &mut out);
+                r.project_rates(&linkage, &q, &mut v, &mut out);
+                let blocks = dhat::HeapStats::get().total_blocks;
+                drop(profiler);
+                assert_eq!(blocks, 0, "{name}, bent by {bend}");
+            }
+            assert!(bend > 0.0 || linkage.constraints == 0 || singular > 0, "{name}");
+        }
     }
 }

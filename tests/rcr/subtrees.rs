@@ -1,4 +1,5 @@
-//! Equal subtrees side by side against the recursion with every body on its own.
+//! What is there for speed alone (runs of pins, small fronts in closed form, equal subtrees side by side) against the plain
+//! recursion, body by body.
 
 #[path = "../topologies/mod.rs"]
 mod topologies;
@@ -17,49 +18,60 @@ fn shown(r: &Reduction<f64>, count: usize) -> Vec<u64> {
     bodies.flatten().chain([r.nearness]).map(f64::to_bits).collect()
 }
 
-/// Compares both recursions at a random configuration, rates, forces and torques; `size` of the coordinates. Returns how many
-/// bodies go side by side.
+/// Compares the recursion with packs, with every body on its own, and without anything that is there for speed alone, at a
+/// random configuration, rates, forces and torques; `size` of the coordinates. Returns how many bodies go side by side.
 fn same_bits(model: &Model, seed: u64, size: f64) -> usize {
     let linkage = &Linkage::new(model);
     let (n, count) = (linkage.coordinates, linkage.links.len());
     let mut s = Stream(seed);
     let mut random = |scale: f64| (0..n).map(|_| scale * s.next()).collect::<Vec<f64>>();
     let (q, v, torque) = (random(size), random(1.0), random(1.0));
-    let mut packed = Reduction::<f64>::new(&[linkage]);
-    let mut single = Reduction::<f64>::without_packs(&[linkage]);
     let force: Vec<[f64; 3]> = (0..count).map(|_| [s.next(), s.next(), s.next()]).collect();
-    for r in [&mut packed, &mut single] {
-        r.force.copy_from_slice(&force);
-        r.torque.copy_from_slice(&torque);
-    }
-    let (mut a, mut b) = (vec![0.0; n], vec![0.0; n]);
-    for task in [Task::Accelerations, Task::Rates, Task::Positions, Task::Accelerations] {
-        for (r, out) in [(&mut packed, &mut a), (&mut single, &mut b)] {
-            r.place(linkage, &q, &v);
-            r.reduce(linkage, task, out);
+    let ways = [Reduction::<f64>::new(&[linkage]), Reduction::without_packs(&[linkage]), Reduction::plain(&[linkage])];
+    let packed = ways[0].side_by_side();
+    assert_eq!([ways[1].side_by_side(), ways[2].side_by_side()], [0, 0]);
+    let [first, others @ ..] = ways.map(|r| seen(r, linkage, (&q, &v), (&force, &torque)));
+    for (which, other) in others.into_iter().enumerate() {
+        assert_eq!(first.len(), other.len());
+        for (a, b) in first.iter().zip(&other) {
+            assert_eq!(a, b, "{}", ["without packs", "plain"][which]);
         }
-        assert_eq!(bits(&a), bits(&b), "{task:?}");
-        assert_eq!(shown(&packed, count), shown(&single, count), "{task:?}");
-        assert_eq!(packed.largest(task).to_bits(), single.largest(task).to_bits());
-        assert_eq!(packed.solve(linkage, task, &mut a), single.solve(linkage, task, &mut b));
-        assert_eq!(bits(&a), bits(&b), "{task:?}");
-        assert_eq!(packed.reduce_singular(linkage, task, &mut a), single.reduce_singular(linkage, task, &mut b));
-        assert_eq!(bits(&a), bits(&b), "singular {task:?}");
-        assert_eq!(packed.kinetic_energy(linkage).to_bits(), single.kinetic_energy(linkage).to_bits());
     }
-    packed.accelerate(linkage, &q, &v, &mut a);
-    single.accelerate(linkage, &q, &v, &mut b);
-    assert_eq!(bits(&a), bits(&b));
-    let mut moved = [(q.clone(), v.clone()), (q, v)];
-    let mut gaps = [0.0; 2];
-    for ((r, (q, v)), gap) in [&mut packed, &mut single].into_iter().zip(&mut moved).zip(&mut gaps) {
-        *gap = r.project_positions(linkage, q, v, &mut a);
-        r.project_rates(linkage, q, v, &mut a);
+    packed
+}
+
+/// All that a reduction finds, in bits, each with what it is.
+fn seen(
+    mut r: Reduction<f64>,
+    linkage: &Linkage,
+    (q, v): (&[f64], &[f64]),
+    (force, torque): (&[[f64; 3]], &[f64]),
+) -> Vec<(String, Vec<u64>)> {
+    let (n, count) = (linkage.coordinates, linkage.links.len());
+    let mut seen = Vec::new();
+    let mut out = vec![0.0; n];
+    r.force.copy_from_slice(force);
+    r.torque.copy_from_slice(torque);
+    for task in [Task::Accelerations, Task::Rates, Task::Positions, Task::Accelerations] {
+        let mut keep = |what: &str, bits: Vec<u64>| seen.push((format!("{what} {task:?}"), bits));
+        r.place(linkage, q, v);
+        r.reduce(linkage, task, &mut out);
+        keep("coordinates", bits(&out));
+        keep("bodies", shown(&r, count));
+        keep("largest", bits(&[r.largest(task), r.kinetic_energy(linkage)]));
+        let met = r.solve(linkage, task, &mut out);
+        keep(&format!("{met:?} solve"), bits(&out));
+        let met = r.reduce_singular(linkage, task, &mut out);
+        keep(&format!("{met:?} singular"), bits(&out));
+        keep("singular bodies", shown(&r, count));
     }
-    assert_eq!(gaps[0].to_bits(), gaps[1].to_bits());
-    assert_eq!((bits(&moved[0].0), bits(&moved[0].1)), (bits(&moved[1].0), bits(&moved[1].1)));
-    assert_eq!(shown(&packed, count), shown(&single, count));
-    packed.side_by_side()
+    r.accelerate(linkage, q, v, &mut out);
+    seen.push(("at one go".into(), bits(&out)));
+    let (mut q, mut v) = (q.to_vec(), v.to_vec());
+    let gap = r.project_positions(linkage, &mut q, &v, &mut out);
+    r.project_rates(linkage, &q, &mut v, &mut out);
+    seen.push(("projection".into(), [bits(&q), bits(&v), bits(&[gap]), shown(&r, count)].concat()));
+    seen
 }
 
 /// A hub on 3 to 20 arms: every arm but the one that carries the hub goes side by side, less what does not fill a pack.

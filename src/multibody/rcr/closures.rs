@@ -5,17 +5,19 @@
 //! formed here. A rotation is multiplied by the lever of its body, so that rows of one closure have one unit.
 
 use super::kinematics::{Pair, Placed, minus, plus, turn};
+use super::reduction::{Given, Task, Workspace};
 use super::scalar::Real;
+use super::schedule::NONE;
 use super::tree::Closure;
+use std::ops::Range;
 
 /// Geometry of a closure over lanes.
 #[derive(Debug, Clone)]
-pub(super) struct ClosureData<T> {
+pub(super) struct ClosureShape<T> {
     arm_a: Pair<T>,
     arm_b: Pair<T>,
     axis: Pair<T>,
     second: [T; 3],
-    pub(super) rest: T,
     lever: T,
     held: Vec<[T; 3]>,
     pub(super) locked: [bool; 3],
@@ -33,7 +35,7 @@ pub(super) struct Strain<T> {
     pub(super) bias: T,
 }
 
-impl<T: Real> ClosureData<T> {
+impl<T: Real> ClosureShape<T> {
     pub(super) fn new(of: &[(&Closure, f64)]) -> Self {
         let lane = |f: &dyn Fn(&Closure, f64) -> f64| {
             let mut out = T::ZERO;
@@ -70,7 +72,6 @@ impl<T: Real> ClosureData<T> {
             arm_b: [joint(&|j| j.frame.arm_b.x), joint(&|j| j.frame.arm_b.y)],
             axis: [joint(&|j| j.frame.axis.x), joint(&|j| j.frame.axis.y)],
             second: [joint(&|j| j.second[(0, 0)]), joint(&|j| j.second[(0, 1)]), joint(&|j| j.second[(1, 1)])],
-            rest: joint(&|j| j.rest),
             lever: lane(&|_, lever| lever),
             held,
             locked,
@@ -78,9 +79,10 @@ impl<T: Real> ClosureData<T> {
         }
     }
 
-    /// The constraints of the closure at two placed bodies; those beyond their number are not filled.
+    /// The constraints of the closure at two placed bodies, its axial offset being `rest`; those beyond their number are not
+    /// filled.
     #[inline(always)]
-    pub(super) fn constraints(&self, a: &Placed<T>, b: &Placed<T>) -> [Strain<T>; 3] {
+    fn constraints(&self, rest: T, a: &Placed<T>, b: &Placed<T>) -> [Strain<T>; 3] {
         let mut out = [Strain::NONE; 3];
         if self.pin {
             [out[0], out[1]] = self.pin_constraints(a, b);
@@ -92,7 +94,7 @@ impl<T: Real> ClosureData<T> {
         }
         if self.held.is_empty() {
             let [mut axial, shear, rotation] = self.strains(a, b);
-            axial.value -= self.rest;
+            axial.value -= rest;
             let mut count = 0;
             for (strain, locked) in [axial, shear, rotation.scaled(self.lever)].into_iter().zip(self.locked) {
                 if locked {
@@ -183,6 +185,42 @@ impl<T: Real> ClosureData<T> {
             bias: mix(axial.bias, shear.bias, T::ZERO) + two * (bent_rate[0] * rates[0] + bent_rate[1] * rates[1]),
         };
         [second, shear, rotation]
+    }
+}
+
+impl<T: Real> Workspace<T> {
+    /// Writes the constraint rows of the closures of `range`. Returns the largest residual of a row.
+    #[inline(always)]
+    pub(super) fn write_rows(&mut self, given: Given<'_, T>, range: Range<usize>) -> T {
+        let Given { task, mechanism, offsets, placement, .. } = given;
+        let schedule = &mechanism.schedule;
+        let mut largest = T::ZERO;
+        let ground = Placed::REST;
+        let of = mechanism.closures[range.clone()].iter().zip(&offsets.closures[range.clone()]);
+        for ((closure, offset), entry) in of.zip(&schedule.entries[range]) {
+            let turn = schedule.turn(entry.body);
+            let width = 3 + 3 * turn.front + 1;
+            let [a, b] = entry.ends.map(|end| end.map_or(&ground, |body| &placement.placed[body as usize]));
+            let first_is_a = entry.ends[0] == Some(entry.body as u32);
+            for (k, strain) in closure.constraints(*offset, a, b).iter().enumerate().take(entry.count) {
+                let start = turn.row_start + (entry.row + k) * width;
+                let row = &mut self.rows[start..start + width];
+                row.fill(T::ZERO);
+                let (own, other) = if first_is_a { (&strain.a, &strain.b) } else { (&strain.b, &strain.a) };
+                row[..3].copy_from_slice(own);
+                if entry.other != NONE {
+                    let at = 3 + 3 * entry.other;
+                    row[at..at + 3].copy_from_slice(other);
+                }
+                row[width - 1] = -match task {
+                    Task::Accelerations => strain.bias,
+                    Task::Rates => strain.rate,
+                    Task::Positions => strain.value,
+                };
+                largest = largest.max(row[width - 1].abs());
+            }
+        }
+        largest
     }
 }
 

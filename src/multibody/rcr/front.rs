@@ -30,10 +30,10 @@ pub(super) struct Front<'a, T> {
 }
 
 impl<T: Real> Front<'_, T> {
-    /// Takes out the coordinates. `coefficients` is freedom × k, `base` and (for several coordinates) `turned`, the
+    /// Takes out the coordinates. `coefficients` is freedom × k, `base` and (for several coordinates) `combined`, the
     /// orthogonal combination of them that was taken out, belong to the outward pass. Returns the worst of unit/pivot.
     #[inline(always)]
-    pub(super) fn eliminate(&mut self, coefficients: &mut [T], base: &mut [T], turned: &mut [[T; 3]; 3]) -> T {
+    pub(super) fn eliminate(&mut self, coefficients: &mut [T], base: &mut [T], combined: &mut [[T; 3]; 3]) -> T {
         let (nd, k, h) = (self.freedom, self.size, self.rows);
         let width = k + 1;
         let dependent = if nd < h { nd } else { h };
@@ -42,7 +42,7 @@ impl<T: Real> Front<'_, T> {
             if nd == 1 {
                 self.reflect_rows(e);
             } else {
-                self.reflect_coordinates(e, turned);
+                self.reflect_coordinates(e, combined);
             }
             let pivot = self.r[e * width + e];
             let inverse = T::ONE / pivot;
@@ -132,7 +132,7 @@ impl<T: Real> Front<'_, T> {
 
     /// Combines coordinates e.. so that row e meets only the first of them.
     #[inline(always)]
-    fn reflect_coordinates(&mut self, e: usize, turned: &mut [[T; 3]; 3]) {
+    fn reflect_coordinates(&mut self, e: usize, combined: &mut [[T; 3]; 3]) {
         let (nd, k, width) = (self.freedom, self.size, self.size + 1);
         if nd - e < 2 {
             return;
@@ -191,7 +191,7 @@ impl<T: Real> Front<'_, T> {
                 self.m[i * k + j] = full[i][j];
             }
         }
-        reflect(turned, &v, beta, nd);
+        reflect(combined, &v, beta, nd);
     }
 }
 

@@ -4,45 +4,46 @@
 //! coordinates out, and what is left goes to the bodies of the front. [`super::fast::kernels`] does the same for small fronts.
 
 use super::front::Front;
-use super::reduction::{Reduction, Scratch, Task};
+use super::mechanism::Mechanism;
+use super::reduction::{Given, Scratch, Task, Workspace};
 use super::scalar::Real;
 use super::schedule::{NONE, Turn};
 use super::stages::Added;
-use super::tree::{Linkage, Parent};
 
-impl<T: Real> Reduction<T> {
+impl<T: Real> Workspace<T> {
+    /// Assembles a body's front, takes its coordinates out, and hands the rest on.
     #[inline(never)]
-    pub(super) fn any_inward(&mut self, task: Task, body: usize) {
+    pub(super) fn any_inward(&mut self, given: Given<'_, T>, body: usize) {
         let mut scratch = Scratch {
             m: std::mem::take(&mut self.front.m),
             g: std::mem::take(&mut self.front.g),
             r: std::mem::take(&mut self.front.r),
         };
-        self.take_turn(task, body, &mut scratch.m, &mut scratch.g, &mut scratch.r);
+        self.take_out(given, body, &mut scratch);
         self.front = scratch;
     }
 
-    /// Assembles a body's front, takes its coordinates out, and hands the rest on.
     #[inline(always)]
-    #[allow(clippy::too_many_arguments)]
-    fn take_turn(&mut self, task: Task, body: usize, m: &mut [T], g: &mut [T], r: &mut [T]) {
-        let turn = self.schedule.turn(body);
+    fn take_out(&mut self, given: Given<'_, T>, body: usize, Scratch { m, g, r }: &mut Scratch<T>) {
+        let Given { task, mechanism, placement, .. } = given;
+        let turn = mechanism.schedule.turn(body);
         let (nd, w, h) = (turn.freedom, turn.front, turn.rows);
         let k = nd + 3 * w;
         // several coordinates are combined, so they get one unit first
         let (mut s, mut torque, mut unit) = ([[T::ZERO; 3]; 3], [T::ZERO; 3], [T::ONE; 3]);
         for q in 0..nd {
-            let (axis, lever) = (self.axis(body, turn.first + q), self.units[turn.first + q]);
-            (s[q], torque[q], unit[q]) = (axis, self.torque[turn.first + q], lever);
+            let at = turn.first + q;
+            let (axis, lever) = (placement.axis(mechanism, body, at), mechanism.units[at]);
+            (s[q], torque[q], unit[q]) = (axis, given.torque[at], lever);
             if nd > 1 {
                 let inverse = T::ONE / lever;
                 (s[q], torque[q], unit[q]) = (axis.map(|x| x * inverse), torque[q] * inverse, T::ONE);
             }
         }
-        self.assemble(task, body, turn, &s, &torque, m, g);
-        self.add_joint_inertia(body, turn, nd > 1, m);
-        let [dx, dy] = self.hanging[body].shift();
-        let bias = if task == Task::Accelerations { self.hanging[body].bias } else { [T::ZERO; 2] };
+        self.assemble(given, body, (&s, &torque), m, g);
+        self.add_joint_inertia(mechanism, body, nd > 1, m);
+        let [dx, dy] = placement.hanging[body].shift();
+        let bias = if task == Task::Accelerations { placement.hanging[body].bias } else { [T::ZERO; 2] };
         let source = 3 + 3 * w + 1;
         for l in 0..h {
             let row = &self.rows[turn.row_start + l * source..turn.row_start + (l + 1) * source];
@@ -59,26 +60,26 @@ impl<T: Real> Reduction<T> {
             }
             r[l * (k + 1) + k] = row[source - 1] - (own[0] * bias[0] + own[1] * bias[1]);
         }
-        let mut turned = [[T::ONE, T::ZERO, T::ZERO], [T::ZERO, T::ONE, T::ZERO], [T::ZERO, T::ZERO, T::ONE]];
+        let mut combined = [[T::ONE, T::ZERO, T::ZERO], [T::ZERO, T::ONE, T::ZERO], [T::ZERO, T::ZERO, T::ONE]];
         let mut front = Front { freedom: nd, size: k, rows: h, m, g, r, unit: &unit };
         let near = front.eliminate(
             &mut self.coefficients[turn.coefficient_start..turn.coefficient_start + nd * k],
             &mut self.base[turn.first..turn.first + nd],
-            &mut turned,
+            &mut combined,
         );
         self.nearness = self.nearness.max(near);
         if nd > 1 {
-            self.turned[body] = turned;
+            self.combined[body] = combined;
         }
-        self.hand_on(turn, m, g);
+        self.hand_on(mechanism, turn, m, g);
         if turn.next != NONE {
-            let next = self.schedule.turn(turn.next);
+            let next = mechanism.schedule.turn(turn.next);
             let width = 3 + 3 * next.front + 1;
             for (l, from) in (nd.min(h)..h).enumerate() {
                 let to = next.row_start + (turn.next_row + l) * width;
                 self.rows[to..to + width].fill(T::ZERO);
                 for slot in 0..w {
-                    let place = self.schedule.map(turn.map_start + slot);
+                    let place = mechanism.schedule.map(turn.map_start + slot);
                     if place != NONE {
                         for i in 0..3 {
                             self.rows[to + 3 * place + i] = r[from * (k + 1) + nd + 3 * slot + i];
@@ -93,23 +94,22 @@ impl<T: Real> Reduction<T> {
     /// Fills M (lower triangle) and g of a body's front from its inertia, its couplings and its momentum. `s` are the joint
     /// axes and `torque` the forces along them.
     #[inline(always)]
-    #[allow(clippy::too_many_arguments)]
     pub(super) fn assemble(
         &mut self,
-        task: Task,
+        given: Given<'_, T>,
         body: usize,
-        turn: Turn,
-        s: &[[T; 3]],
-        torque: &[T],
+        (s, torque): (&[[T; 3]], &[T]),
         m: &mut [T],
         g: &mut [T],
     ) {
+        let Given { task, mechanism, placement, .. } = given;
+        let turn = mechanism.schedule.turn(body);
         let (nd, w) = (turn.freedom, turn.front);
         let k = nd + 3 * w;
-        let [a, b, c, d, e, f] = self.take_inertia(body);
+        let [a, b, c, d, e, f] = self.take_inertia(mechanism, body);
         let own = [[a, b, d], [b, c, e], [d, e, f]];
-        let mut force = self.take_force(task, body);
-        let hanging = &self.hanging[body];
+        let mut force = self.take_force(given, body);
+        let hanging = &placement.hanging[body];
         let bias = if task == Task::Accelerations { hanging.bias } else { [T::ZERO; 2] };
         for i in 0..3 {
             force[i] -= own[i][0] * bias[0] + own[i][1] * bias[1];
@@ -129,7 +129,7 @@ impl<T: Real> Reduction<T> {
         }
         let [dx, dy] = hanging.shift();
         for slot in 0..w {
-            let block = self.take_coupling(turn.column + slot);
+            let block = self.take_coupling(mechanism, turn.column + slot);
             for i in 0..3 {
                 let row = [block[3 * i], block[3 * i + 1], block[3 * i + 2]];
                 let at = nd + 3 * slot + i;
@@ -184,15 +184,16 @@ impl<T: Real> Reduction<T> {
 
     /// Adds what an implicit step adds to the inertia of a body's joint; `scaled`: to coordinates in units of length.
     #[inline(always)]
-    pub(super) fn add_joint_inertia(&self, body: usize, turn: Turn, scaled: bool, m: &mut [T]) {
+    pub(super) fn add_joint_inertia(&self, mechanism: &Mechanism<T>, body: usize, scaled: bool, m: &mut [T]) {
         let Some(Added { joint: added, .. }) = self.added.get(body) else { return };
+        let turn = mechanism.schedule.turn(body);
         let (nd, k) = (turn.freedom, turn.freedom + 3 * turn.front);
         let mut at = 0;
         for i in 0..nd {
             for j in 0..=i {
                 let mut x = added[at];
                 if scaled {
-                    x = x / (self.units[turn.first + i] * self.units[turn.first + j]);
+                    x = x / (mechanism.units[turn.first + i] * mechanism.units[turn.first + j]);
                 }
                 m[i * k + j] += x;
                 at += 1;
@@ -202,13 +203,13 @@ impl<T: Real> Reduction<T> {
 
     /// Adds what is left of a front to the bodies in it.
     #[inline(always)]
-    pub(super) fn hand_on(&mut self, turn: Turn, m: &[T], g: &[T]) {
+    pub(super) fn hand_on(&mut self, mechanism: &Mechanism<T>, turn: Turn, m: &[T], g: &[T]) {
         let (nd, w) = (turn.freedom, turn.front);
         let k = nd + 3 * w;
-        let mut target = self.schedule.targets[turn.targets..].iter();
+        let mut target = mechanism.schedule.targets[turn.targets..].iter();
         for row in 0..w {
             let at = nd + 3 * row;
-            let to = self.schedule.nodes[turn.column + row] as usize;
+            let to = mechanism.schedule.nodes[turn.column + row] as usize;
             for column in 0..row {
                 let from = nd + 3 * column;
                 if let Some(&block) = target.next() {
@@ -233,57 +234,55 @@ impl<T: Real> Reduction<T> {
         }
     }
 
-    #[inline(never)]
     /// Acceleration of the body, from those of its front.
-    pub(super) fn any_outward(&mut self, linkage: &Linkage, task: Task, body: usize, out: &mut [T]) {
-        {
-            let turn = self.schedule.turn(body);
-            let hanging = &self.hanging[body];
-            let (nd, k) = (turn.freedom, turn.freedom + 3 * turn.front);
-            let start = linkage.pattern.column(body).start;
-            let mut x = [T::ZERO; 3];
-            for e in (0..nd).rev() {
-                let coefficients =
-                    &self.coefficients[turn.coefficient_start + e * k..turn.coefficient_start + (e + 1) * k];
-                let mut value = self.base[turn.first + e];
-                for later in e + 1..nd {
-                    value -= coefficients[later] * x[later];
-                }
-                for slot in 0..turn.front {
-                    let other = &self.accelerations[linkage.pattern.row(start + slot)];
-                    let c = &coefficients[nd + 3 * slot..nd + 3 * slot + 3];
-                    value -= c[0] * other[0] + c[1] * other[1] + c[2] * other[2];
-                }
-                x[e] = value;
+    #[inline(never)]
+    pub(super) fn any_outward(&self, given: Given<'_, T>, body: usize, accelerations: &mut [[T; 3]], out: &mut [T]) {
+        let Given { task, mechanism, placement, .. } = given;
+        let schedule = &mechanism.schedule;
+        let turn = schedule.turn(body);
+        let hanging = &placement.hanging[body];
+        let (nd, k) = (turn.freedom, turn.freedom + 3 * turn.front);
+        let mut x = [T::ZERO; 3];
+        for e in (0..nd).rev() {
+            let coefficients = &self.coefficients[turn.coefficient_start + e * k..turn.coefficient_start + (e + 1) * k];
+            let mut value = self.base[turn.first + e];
+            for later in e + 1..nd {
+                value -= coefficients[later] * x[later];
             }
-            if nd > 1 {
-                let turned = &self.turned[body];
-                let mut y = [T::ZERO; 3];
-                for (i, y) in y.iter_mut().enumerate().take(nd) {
-                    for (j, &x) in x.iter().enumerate().take(nd) {
-                        *y += turned[i][j] * x;
-                    }
-                    *y = *y / self.units[turn.first + i];
-                }
-                x = y;
+            for slot in 0..turn.front {
+                let other = &accelerations[schedule.fronts[turn.column + slot] as usize];
+                let c = &coefficients[nd + 3 * slot..nd + 3 * slot + 3];
+                value -= c[0] * other[0] + c[1] * other[1] + c[2] * other[2];
             }
-            let mut a = [T::ZERO; 3];
-            if let Parent::Body(p) = linkage.links[body].parent {
-                let (up, [dx, dy]) = (self.accelerations[p], hanging.shift());
-                a = [up[0] - dy * up[2], up[1] + dx * up[2], up[2]];
-            }
-            if task == Task::Accelerations {
-                a[0] += hanging.bias[0];
-                a[1] += hanging.bias[1];
-            }
-            for q in 0..nd {
-                let axis = self.axis(body, turn.first + q);
-                for i in 0..3 {
-                    a[i] += axis[i] * x[q];
-                }
-                out[turn.first + q] = x[q];
-            }
-            self.accelerations[body] = a;
+            x[e] = value;
         }
+        if nd > 1 {
+            let combined = &self.combined[body];
+            let mut y = [T::ZERO; 3];
+            for (i, y) in y.iter_mut().enumerate().take(nd) {
+                for (j, &x) in x.iter().enumerate().take(nd) {
+                    *y += combined[i][j] * x;
+                }
+                *y = *y / mechanism.units[turn.first + i];
+            }
+            x = y;
+        }
+        let mut a = [T::ZERO; 3];
+        if let Some(p) = schedule.steps[body].parent() {
+            let (up, [dx, dy]) = (accelerations[p], hanging.shift());
+            a = [up[0] - dy * up[2], up[1] + dx * up[2], up[2]];
+        }
+        if task == Task::Accelerations {
+            a[0] += hanging.bias[0];
+            a[1] += hanging.bias[1];
+        }
+        for q in 0..nd {
+            let axis = placement.axis(mechanism, body, turn.first + q);
+            for i in 0..3 {
+                a[i] += axis[i] * x[q];
+            }
+            out[turn.first + q] = x[q];
+        }
+        accelerations[body] = a;
     }
 }

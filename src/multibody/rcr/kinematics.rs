@@ -10,19 +10,21 @@
 //! S are the columns ∂(x, y, θ)/∂(e_u, g, p) of the directions that move, and c gathers the centripetal and Coriolis parts,
 //! the acceleration when q̈ = 0 and the parent's is zero.
 
+use super::mechanism::Mechanism;
 use super::scalar::Real;
-use super::schedule::Step;
-use super::tree::{Link, Linkage, Parent};
+use super::tree::{Link, Parent};
 use std::ops::Range;
 
 /// Two components.
 pub(super) type Pair<T> = [T; 2];
 
-/// Inertia of one link over lanes.
+/// Inertia of one body over lanes.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct LinkData<T> {
+pub(super) struct Inertia<T> {
+    /// [kg]
     pub(super) mass: T,
-    pub(super) inertia: T,
+    /// About the centre of mass [kg·m²].
+    pub(super) moment: T,
 }
 
 /// From the centres of mass of a link's parent and of itself to their joint, as drawn [m], over lanes.
@@ -34,11 +36,13 @@ pub(super) struct Arms<T> {
 
 /// What a joint has beyond a pin.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct JointData<T> {
+pub(super) struct JointShape<T> {
     axis: Pair<T>,
     second: [T; 3],
-    /// Axial offset of a locked direction [m].
-    pub(super) rest: T,
+    /// Directions that move.
+    moving: [bool; 3],
+    /// No joint at all: the body moves freely.
+    free: bool,
 }
 
 /// A number of each variant, side by side.
@@ -50,20 +54,21 @@ pub(super) fn lane<T: Real>(of: &[&Link], f: &dyn Fn(&Link) -> f64) -> T {
     out
 }
 
-impl<T: Real> JointData<T> {
+impl<T: Real> JointShape<T> {
     pub(super) fn new(of: &[&Link]) -> Self {
         let lane = |f: &dyn Fn(&Link) -> f64| lane(of, f);
         Self {
             axis: [lane(&|l| l.frame.axis.x), lane(&|l| l.frame.axis.y)],
             second: [lane(&|l| l.second[(0, 0)]), lane(&|l| l.second[(0, 1)]), lane(&|l| l.second[(1, 1)])],
-            rest: lane(&|l| if l.moving[0] { 0.0 } else { l.rest }),
+            moving: of[0].moving,
+            free: of[0].parent == Parent::Free,
         }
     }
 }
 
-impl<T: Real> LinkData<T> {
+impl<T: Real> Inertia<T> {
     pub(super) fn new(of: &[&Link]) -> Self {
-        Self { mass: lane(of, &|l| l.mass), inertia: lane(of, &|l| l.inertia) }
+        Self { mass: lane(of, &|l| l.mass), moment: lane(of, &|l| l.inertia) }
     }
 }
 
@@ -79,7 +84,7 @@ impl<T: Real> Arms<T> {
 
 /// Where a body is and how it moves: what its children and the closures need of it.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Placed<T> {
+pub struct Placed<T> {
     /// Displacement and rotation from the drawn place.
     pub(super) pose: [T; 3],
     /// Rate.
@@ -111,20 +116,19 @@ impl<T: Real> Placed<T> {
 
     /// Takes `from` as one of the lanes.
     #[inline(always)]
-    pub(super) fn set_lane<U: Real>(&mut self, lane: usize, from: &Placed<U>) {
-        let set = |to: &mut [T], from: &[U]| to.iter_mut().zip(from).for_each(|(t, f)| t.set_lane(lane, f.lane(0)));
+    pub(super) fn set_lane(&mut self, lane: usize, from: &Placed<f64>) {
+        let set = |to: &mut [T], from: &[f64]| to.iter_mut().zip(from).for_each(|(t, f)| t.set_lane(lane, *f));
         set(&mut self.pose, &from.pose);
         set(&mut self.rate, &from.rate);
         set(&mut self.half, &from.half);
     }
 
     /// One of the lanes.
-    pub(super) fn one<U: Real>(&self, lane: usize) -> Placed<U> {
-        let pair = |x: Pair<T>| x.map(|x| U::splat(x.lane(lane)));
+    pub(super) fn lane(&self, lane: usize) -> Placed<f64> {
         Placed {
-            pose: self.pose.map(|x| U::splat(x.lane(lane))),
-            rate: self.rate.map(|x| U::splat(x.lane(lane))),
-            half: pair(self.half),
+            pose: self.pose.map(|x| x.lane(lane)),
+            rate: self.rate.map(|x| x.lane(lane)),
+            half: self.half.map(|x| x.lane(lane)),
         }
     }
 
@@ -146,8 +150,8 @@ impl<T: Real> Placed<T> {
 
 impl<T: Real> Hanging<T> {
     /// One of the lanes.
-    pub(super) fn one<U: Real>(&self, lane: usize) -> Hanging<U> {
-        let pair = |x: Pair<T>| x.map(|x| U::splat(x.lane(lane)));
+    pub(super) fn lane(&self, lane: usize) -> Hanging<f64> {
+        let pair = |x: Pair<T>| x.map(|x| x.lane(lane));
         Hanging { lever_parent: pair(self.lever_parent), lever: pair(self.lever), bias: pair(self.bias) }
     }
 
@@ -213,19 +217,19 @@ fn place_pin<T: Real>(arms: &Arms<T>, parent: &Placed<T>, out: &mut Placed<T>) -
     Hanging { lever_parent: to, lever, bias: [w2 * lever[0] - wp2 * to[0], w2 * lever[1] - wp2 * to[1]] }
 }
 
+/// A joint with any directions; `rest` is the axial offset of a locked one.
 fn place_joint<T: Real>(
-    link: &Link,
-    (arms, sign, joint): (&Arms<T>, T, &JointData<T>),
+    (arms, sign, joint, rest): (&Arms<T>, T, &JointShape<T>, T),
     parent: &Placed<T>,
     out: &mut Placed<T>,
     q: &[T],
     v: &[T],
     axes: &mut [[T; 3]],
 ) -> Hanging<T> {
-    let (mut e, mut de) = ([joint.rest, T::ZERO, T::ZERO], [T::ZERO; 3]);
+    let (mut e, mut de) = ([rest, T::ZERO, T::ZERO], [T::ZERO; 3]);
     let mut next = 0;
     for i in 0..3 {
-        if link.moving[i] {
+        if joint.moving[i] {
             (e[i], de[i]) = (q[next], v[next]);
             next += 1;
         }
@@ -270,7 +274,7 @@ fn place_joint<T: Real>(
     ];
     let mut next = 0;
     for i in 0..3 {
-        if link.moving[i] {
+        if joint.moving[i] {
             axes[next] = columns[i];
             next += 1;
         }
@@ -281,66 +285,89 @@ fn place_joint<T: Real>(
 /// Bodies whose sines are taken together.
 const BLOCK: usize = 16;
 
-/// Places the bodies of `range`, root → leaf, in blocks: angles first, so that the sines of a block are taken side by side.
-#[inline(always)]
-#[allow(clippy::too_many_arguments)]
-pub(super) fn place_all<T: Real>(
-    linkage: &Linkage,
-    steps: &[Step],
-    (arms, signs, joints): (&[Arms<T>], &[T], &[JointData<T>]),
-    q: &[T],
-    v: &[T],
-    placed: &mut [Placed<T>],
-    (hanging, axes): (&mut [Hanging<T>], &mut [[T; 3]]),
-    range: Range<usize>,
-) {
-    let rest = Placed::REST;
-    let mut end = range.end;
-    while end > range.start {
-        let start = end.saturating_sub(BLOCK).max(range.start);
-        let mut halves = [[T::ZERO; BLOCK]; 2];
-        let block = start..end;
-        let (some, signs) = (&steps[block.clone()], &signs[block.clone()]);
-        for (k, (step, sign)) in some.iter().zip(signs).enumerate().rev() {
-            let (mut theta, mut omega) = match step.parent() {
-                Some(p) => (placed[p].pose[2], placed[p].rate[2]),
-                None => (T::ZERO, T::ZERO),
-            };
-            if let Some(k) = step.turning() {
-                theta += *sign * q[k];
-                omega += *sign * v[k];
-            }
-            let out = &mut placed[start + k];
-            (out.pose[2], out.rate[2]) = (theta, omega);
-            halves[0][k] = T::splat(0.5) * theta;
+/// Where all bodies are and how they hang together.
+#[derive(Debug, Clone)]
+pub struct Placement<T> {
+    pub(super) placed: Vec<Placed<T>>,
+    pub(super) hanging: Vec<Hanging<T>>,
+    /// Axes of the coordinates of joints that are no pins; none where all joints are.
+    pub(super) axes: Vec<[T; 3]>,
+}
+
+impl<T: Real> Placement<T> {
+    /// Bodies at rest where they are drawn, of a mechanism with `coordinates` coordinates.
+    pub(super) fn new(mechanism: &Mechanism<T>, coordinates: usize) -> Self {
+        Self {
+            placed: vec![Placed::REST; mechanism.bodies()],
+            hanging: vec![Hanging::REST; mechanism.bodies()],
+            axes: vec![[T::ZERO; 3]; if mechanism.joints.is_empty() { 0 } else { coordinates }],
         }
-        let [sin, cos] = &mut halves;
-        T::sin_cos_each(&mut sin[..end - start], &mut cos[..end - start]);
-        let given = some.iter().zip(signs).zip(arms[block.clone()].iter().zip(&mut hanging[block]));
-        for (k, ((step, sign), (arms, hanging))) in given.enumerate().rev() {
-            let body = start + k;
-            let (before, after) = placed.split_at_mut(body + 1);
-            let out = &mut before[body];
-            out.half = [halves[0][k], halves[1][k]];
-            let parent = match step.parent() {
-                Some(p) => &after[p - body - 1],
-                None => &rest,
-            };
-            if step.pin {
-                *hanging = place_pin(arms, parent, out);
-                continue;
-            }
-            let link = &linkage.links[body];
-            let first = step.first as usize;
-            let range = first..first + link.freedom();
-            let (q, v, axes) = (&q[range.clone()], &v[range.clone()], &mut axes[range]);
-            *hanging = if link.parent == Parent::Free {
-                place_free(out, q, v, axes);
-                Hanging::REST
-            } else {
-                place_joint(link, (arms, *sign, &joints[step.joint as usize]), parent, out, q, v, axes)
-            };
+    }
+
+    /// Axis of a coordinate of `body`.
+    #[inline(always)]
+    pub(super) fn axis(&self, mechanism: &Mechanism<T>, body: usize, coordinate: usize) -> [T; 3] {
+        if mechanism.schedule.steps[body].pin {
+            self.hanging[body].pin_axis(mechanism.signs[body])
+        } else {
+            self.axes[coordinate]
         }
-        end = start;
+    }
+
+    /// Places the bodies of `range`, root → leaf, in blocks: angles first, so that the sines of a block are taken side by
+    /// side. `rests` are the axial offsets of locked joints.
+    #[inline(always)]
+    pub(super) fn place(&mut self, mechanism: &Mechanism<T>, rests: &[T], q: &[T], v: &[T], range: Range<usize>) {
+        let steps = &mechanism.schedule.steps;
+        let Self { placed, hanging, axes } = self;
+        let ground = Placed::REST;
+        let mut end = range.end;
+        while end > range.start {
+            let start = end.saturating_sub(BLOCK).max(range.start);
+            let mut halves = [[T::ZERO; BLOCK]; 2];
+            let block = start..end;
+            let (some, signs) = (&steps[block.clone()], &mechanism.signs[block.clone()]);
+            for (k, (step, sign)) in some.iter().zip(signs).enumerate().rev() {
+                let (mut theta, mut omega) = match step.parent() {
+                    Some(p) => (placed[p].pose[2], placed[p].rate[2]),
+                    None => (T::ZERO, T::ZERO),
+                };
+                if let Some(k) = step.turning() {
+                    theta += *sign * q[k];
+                    omega += *sign * v[k];
+                }
+                let out = &mut placed[start + k];
+                (out.pose[2], out.rate[2]) = (theta, omega);
+                halves[0][k] = T::splat(0.5) * theta;
+            }
+            let [sin, cos] = &mut halves;
+            T::sin_cos_each(&mut sin[..end - start], &mut cos[..end - start]);
+            let given = some.iter().zip(signs).zip(mechanism.arms[block.clone()].iter().zip(&mut hanging[block]));
+            for (k, ((step, sign), (arms, hanging))) in given.enumerate().rev() {
+                let body = start + k;
+                let (before, after) = placed.split_at_mut(body + 1);
+                let out = &mut before[body];
+                out.half = [halves[0][k], halves[1][k]];
+                let parent = match step.parent() {
+                    Some(p) => &after[p - body - 1],
+                    None => &ground,
+                };
+                if step.pin {
+                    *hanging = place_pin(arms, parent, out);
+                    continue;
+                }
+                let first = step.first as usize;
+                let range = first..first + step.freedom as usize;
+                let (q, v, axes) = (&q[range.clone()], &v[range.clone()], &mut axes[range]);
+                let joint = &mechanism.joints[step.joint as usize];
+                *hanging = if joint.free {
+                    place_free(out, q, v, axes);
+                    Hanging::REST
+                } else {
+                    place_joint((arms, *sign, joint, rests[step.joint as usize]), parent, out, q, v, axes)
+                };
+            }
+            end = start;
+        }
     }
 }

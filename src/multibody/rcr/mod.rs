@@ -1,33 +1,41 @@
 //! Recursive Coordinate Reduction in relative joint coordinates: the formulation of the paper.
 //!
+//! What does not move and what does are apart, and each algorithm over them has a file:
+//!
 //! | file | what it holds |
 //! |---|---|
 //! | [`tree`] | the spanning tree and the loops: n coordinates, m constraints |
 //! | [`rotary`] | the paper's model: joints that only turn |
 //! | `coordinates` | joint coordinates of given poses |
+//! | `mechanism` | what the recursion reads of a linkage: geometry and inertia over lanes, and the schedule; immutable |
+//! | `schedule` | who meets whom: fronts, rows passing through, places in the arenas |
+//! | `data` | what changes: loads, poses, rows and fronts on the way, accelerations |
 //! | `kinematics` | outward: poses, rates, joint axes, velocity parts |
 //! | `closures` | the rows of loop closures and their velocity parts |
-//! | `schedule` | who meets whom: fronts, rows passing through, places in the arenas |
+//! | [`reduction`] | the recursion inward and outward |
 //! | `front` | elimination of one body's coordinates, with a loop's row or without |
 //! | `general` | the turn of any body |
-//! | [`reduction`] | the recursion |
-//! | `storage` | what it works in, laid out once |
+//! | `pin` | the turn of a body on a pin that no loop passes |
 //! | `singular` | the recursion near singular configurations |
 //! | `projection` | positions and rates that fulfil the loops |
 //! | `springs` | forces of the joints' springs |
 //! | `stages` | the recursion for a stage of an implicit method |
 //! | [`scalar`] | what it runs over: one number, or lanes of variants |
-//! | `fast` | what is there for speed alone: runs of pins, small fronts, equal subtrees, lanes |
+//! | `traversal` | how the bodies are gone through |
+//! | `fast` | what is there for speed alone, with the same bits: runs of pins, small fronts, equal subtrees, lanes |
 
 // fixed-size blocks are indexed as the formulas are written
 #![allow(clippy::needless_range_loop)]
 
 mod closures;
 mod coordinates;
+mod data;
 mod fast;
 mod front;
 mod general;
 mod kinematics;
+mod mechanism;
+mod pin;
 mod projection;
 pub mod reduction;
 pub mod rotary;
@@ -36,11 +44,12 @@ mod schedule;
 mod singular;
 mod springs;
 mod stages;
-mod storage;
+mod traversal;
 pub mod tree;
 
+pub use data::Reduction;
 pub use fast::Lanes;
-pub use reduction::{Reduction, Task};
+pub use reduction::Task;
 pub use rotary::Counts;
 pub use scalar::Real;
 pub use singular::Singularity;

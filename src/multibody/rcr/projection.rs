@@ -6,8 +6,10 @@
 //!
 //! Reference: E. Hairer, G. Wanner, "Solving Ordinary Differential Equations II" (1996), §VII.2 (projection methods).
 
-use super::reduction::{Reduction, Task};
+use super::data::Reduction;
+use super::reduction::Task;
 use super::singular::Singularity;
+use super::traversal::Traversal;
 use super::{Linkage, Real};
 
 /// A loop's pivot below 1/100 of its lever loses more than 1e-12: the path for singular configurations is taken instead.
@@ -19,7 +21,7 @@ impl Reduction<f64> {
     /// [`Reduction::reduce`], or [`Reduction::reduce_singular`] where that is too near to a singular configuration; then
     /// says what was met.
     pub fn solve(&mut self, linkage: &Linkage, task: Task, out: &mut [f64]) -> Option<Singularity> {
-        if self.schedule.redundant == 0 {
+        if self.mechanism.schedule.redundant == 0 {
             self.reduce(linkage, task, out);
             if self.nearness <= NEAR && out.iter().all(|x| x.is_finite()) {
                 return None;
@@ -76,6 +78,6 @@ impl Reduction<f64> {
 
     /// Largest residual of the loops [m, or m/s].
     pub fn largest(&mut self, task: Task) -> f64 {
-        self.write_rows(task).lane(0)
+        <f64 as Real>::Traversal::rows(self, task)
     }
 }

@@ -3,7 +3,8 @@
 //! Both go through the same additions and multiplications in the same order, without fused operations and with the same
 //! sine and cosine, so that a lane's bits are those of the serial run, whatever the width of the processor's vectors.
 
-use super::Lanes;
+use super::fast::{Lanes, Packs};
+use super::traversal::Traversal;
 use crate::multibody::sine::{REDUCED, reduced};
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
@@ -24,6 +25,8 @@ pub trait Real:
     + SubAssign
     + 'static
 {
+    /// How the bodies of a mechanism over it are gone through.
+    type Traversal: Traversal<Self>;
     /// How many variants it holds.
     const LANES: usize;
     /// 0 in every lane.
@@ -56,6 +59,7 @@ pub trait Real:
 }
 
 impl Real for f64 {
+    type Traversal = Packs;
     const LANES: usize = 1;
     const ZERO: Self = 0.0;
     const ONE: Self = 1.0;

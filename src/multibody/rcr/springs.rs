@@ -3,9 +3,10 @@
 //! The coordinates of the tree are the strains of its joints, so their forces are −K·(e − e₀) as they stand. An elastic
 //! direction of a closure acts on its two bodies through its rows.
 
+use super::data::Reduction;
 use super::kinematics::Placed;
-use super::reduction::Reduction;
 use super::stages::AddedInertia;
+use super::traversal::Traversal;
 use super::tree::{Closure, Linkage};
 use crate::multibody::BodyId;
 use crate::multibody::forces::RestStrain;
@@ -14,18 +15,19 @@ use nalgebra::{Matrix3, Vector3};
 impl Reduction<f64> {
     /// Sets the offsets of locked directions, which a heated or stressed joint prescribes. Before placing.
     pub fn prescribe(&mut self, linkage: &Linkage, rest: &RestStrain<'_>) {
-        for (link, data) in linkage.links.iter().filter(|link| !link.pin).zip(&mut self.joints) {
+        let offsets = &mut self.offsets;
+        for (link, to) in linkage.links.iter().filter(|link| !link.pin).zip(&mut offsets.joints) {
             if !link.moving[0] {
-                data.rest = offset(link.rest, link.expansion, rest);
+                *to = offset(link.rest, link.expansion, rest);
             }
         }
-        for (closure, data) in linkage.closures.iter().zip(&mut self.closures) {
+        for (closure, to) in linkage.closures.iter().zip(&mut offsets.closures) {
             if let Closure::Joint(joint) = closure {
-                data.rest = offset(joint.rest, joint.expansion, rest);
+                *to = offset(joint.rest, joint.expansion, rest);
             }
         }
-        if let Some(packs) = &mut self.packs {
-            packs.prescribe(&self.joints, &self.closures);
+        if let Some(traversal) = &mut self.traversal {
+            traversal.prescribe(offsets);
         }
     }
 
@@ -64,7 +66,7 @@ impl Reduction<f64> {
                 BodyId::Free(k) => self.placed(k),
                 BodyId::Ground => Placed::REST,
             };
-            let strains = self.closures[c].strains(&at(joint.a), &at(joint.b));
+            let strains = self.mechanism.closures[c].strains(&at(joint.a), &at(joint.b));
             let mut e = Vector3::from_fn(|i, _| if joint.locked[i] { 0.0 } else { strains[i].value });
             if !joint.locked[0] {
                 e.x -= offset(joint.rest, joint.expansion, rest);
@@ -98,7 +100,7 @@ impl Reduction<f64> {
                 BodyId::Free(k) => self.placed(k),
                 BodyId::Ground => Placed::REST,
             };
-            let strains = self.closures[c].strains(&at(joint.a), &at(joint.b));
+            let strains = self.mechanism.closures[c].strains(&at(joint.a), &at(joint.b));
             let [ra, rb] = [0, 1].map(|side| {
                 Matrix3::from_fn(|i, d| match (joint.locked[i], side) {
                     (true, _) => 0.0,
@@ -145,7 +147,7 @@ impl Reduction<f64> {
                 BodyId::Free(k) => self.placed(k),
                 BodyId::Ground => Placed::REST,
             };
-            let strains = self.closures[c].strains(&at(joint.a), &at(joint.b));
+            let strains = self.mechanism.closures[c].strains(&at(joint.a), &at(joint.b));
             let mut e = Vector3::from_fn(|i, _| if joint.locked[i] { 0.0 } else { strains[i].value });
             if !joint.locked[0] {
                 e.x -= offset(joint.rest, joint.expansion, rest);

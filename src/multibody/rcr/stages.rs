@@ -13,8 +13,9 @@
 //! Coriolis terms) for zero, so that the iteration converges linearly, at the rate of what is left out over W. What it
 //! converges to does not depend on W.
 
-use super::reduction::{Reduction, Task};
-use super::schedule::Schedule;
+use super::data::Reduction;
+use super::reduction::Task;
+use super::schedule::Plan;
 use super::singular::Singularity;
 use super::tree::Linkage;
 use crate::multibody::BlockMatrix;
@@ -69,24 +70,24 @@ impl Reduction<f64> {
     /// Storage for [`Reduction::solve_implicit`] on `linkage`.
     pub fn implicit(linkage: &Linkage) -> Self {
         // springs, gaps and dampers may couple any pair of the pattern
-        let mut reduction = Self::with_schedule(&[linkage], Schedule::with_couplings(linkage, true));
-        reduction.added.reserve_exact(linkage.links.len());
-        reduction.added_coupling.reserve_exact(linkage.pattern.off_blocks());
+        let mut reduction = Self::planned(&[linkage], Plan { coupled: true, fast: true });
+        reduction.work.added.reserve_exact(linkage.links.len());
+        reduction.work.added_coupling.reserve_exact(linkage.pattern.off_blocks());
         reduction
     }
 
     /// Accelerations of the bodies when the coordinates have the accelerations `a`, at the placed configuration.
     pub fn accelerations_of(&self, linkage: &Linkage, a: &[f64], out: &mut [[f64; 3]]) {
         for (body, link) in linkage.links.iter().enumerate().rev() {
-            let hanging = &self.hanging[body];
+            let hanging = &self.placement.hanging[body];
             let ([dx, dy], [cx, cy]) = (hanging.shift(), hanging.bias);
             let mut sum = [cx, cy, 0.0];
-            if let Some(parent) = self.schedule.steps[body].parent() {
+            if let Some(parent) = self.mechanism.schedule.steps[body].parent() {
                 let up = out[parent];
                 sum = [cx + (up[0] - dy * up[2]), cy + (up[1] + dx * up[2]), up[2]];
             }
             for q in link.first..link.first + link.freedom() {
-                let axis = self.axis(body, q);
+                let axis = self.placement.axis(&self.mechanism, body, q);
                 for i in 0..3 {
                     sum[i] += axis[i] * a[q];
                 }
@@ -139,19 +140,19 @@ impl Reduction<f64> {
         }
         self.lay(added);
         let met = self.solve(linkage, Task::Accelerations, out);
-        self.added.clear();
-        self.added_coupling.clear();
+        self.work.added.clear();
+        self.work.added_coupling.clear();
         met
     }
 
     /// Lays what is added where the turns find it.
     fn lay(&mut self, added: &AddedInertia) {
         let own = added.joints.iter().zip(&added.bodies.diagonal);
-        self.added.extend(own.map(|(&joint, block)| Added {
+        self.work.added.extend(own.map(|(&joint, block)| Added {
             joint,
             body: [block[(0, 0)], block[(1, 0)], block[(1, 1)], block[(2, 0)], block[(2, 1)], block[(2, 2)]],
         }));
         let rows = |block: &Matrix3<f64>| std::array::from_fn(|k| block[(k / 3, k % 3)]);
-        self.added_coupling.extend(added.bodies.below.iter().map(rows));
+        self.work.added_coupling.extend(added.bodies.below.iter().map(rows));
     }
 }

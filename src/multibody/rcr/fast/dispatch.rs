@@ -1,36 +1,81 @@
-//! The recursion in the widest instructions of the processor at hand, for one mechanism or for lanes of variants.
+//! The recursion in the widest instructions of the processor at hand.
 //!
-//! The code is one and the same over either number ([`crate::multibody::rcr::scalar`]). It is compiled for each instruction set and chosen
-//! at run time (AVX-512, AVX2, NEON or the base set); as nothing is fused, the bits do not depend on the choice.
+//! The code is one and the same over either number ([`crate::multibody::rcr::scalar`]). It is compiled for each instruction
+//! set and chosen at run time (AVX-512, AVX2, NEON or the base set); as nothing is fused, the bits do not depend on the
+//! choice.
 
-use crate::multibody::rcr::reduction::{Reduction, Task};
+use crate::multibody::rcr::data::Reduction;
+use crate::multibody::rcr::reduction::Task;
 use crate::multibody::rcr::scalar::Real;
-use crate::multibody::rcr::tree::Linkage;
+use crate::multibody::rcr::traversal::Traversal;
 use pulp::{Arch, Simd, WithSimd};
 
-/// One evaluation, for [`Arch::dispatch`].
-struct Evaluation<'a, T> {
-    reduction: &'a mut Reduction<T>,
-    linkage: &'a Linkage,
-    q: &'a [T],
-    v: &'a [T],
-    out: &'a mut [T],
-}
+/// Places the bodies.
+struct Place<'a, T: Real>(&'a mut Reduction<T>, &'a [T], &'a [T]);
+/// Reduces.
+struct Reduce<'a, T: Real>(&'a mut Reduction<T>, Task, &'a mut [T]);
+/// Both, for accelerations.
+struct Accelerate<'a, T: Real>(&'a mut Reduction<T>, &'a [T], &'a [T], &'a mut [T]);
 
-impl<T: Real> WithSimd for Evaluation<'_, T> {
+impl<T: Real> WithSimd for Place<'_, T> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        self.reduction.place(self.linkage, self.q, self.v);
-        self.reduction.reduce(self.linkage, Task::Accelerations, self.out);
+        T::Traversal::place(self.0, self.1, self.2);
     }
 }
 
-impl<T: Real> Reduction<T> {
-    /// Places the bodies at `q`, `v` and finds q̈ in `out`, with the forces that [`Reduction::force`] and
-    /// [`Reduction::torque`] hold: the same as [`Reduction::place`] and [`Reduction::reduce`], in wider instructions.
-    pub fn accelerate(&mut self, linkage: &Linkage, q: &[T], v: &[T], out: &mut [T]) {
-        Arch::new().dispatch(Evaluation { reduction: self, linkage, q, v, out });
+impl<T: Real> WithSimd for Reduce<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        T::Traversal::reduce(self.0, self.1, self.2);
+    }
+}
+
+impl<T: Real> WithSimd for Accelerate<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        T::Traversal::place(self.0, self.1, self.2);
+        T::Traversal::reduce(self.0, Task::Accelerations, self.3);
+    }
+}
+
+/// [`Traversal::place`] in the widest instructions.
+pub(in crate::multibody::rcr) fn place<T: Real>(reduction: &mut Reduction<T>, q: &[T], v: &[T]) {
+    Arch::new().dispatch(Place(reduction, q, v));
+}
+
+/// [`Traversal::reduce`] in the widest instructions.
+pub(in crate::multibody::rcr) fn reduce<T: Real>(reduction: &mut Reduction<T>, task: Task, out: &mut [T]) {
+    Arch::new().dispatch(Reduce(reduction, task, out));
+}
+
+/// Both, for accelerations.
+pub(in crate::multibody::rcr) fn accelerate<T: Real>(reduction: &mut Reduction<T>, q: &[T], v: &[T], out: &mut [T]) {
+    Arch::new().dispatch(Accelerate(reduction, q, v, out));
+}
+
+/// Whether the processor has vector instructions. Without them eight lanes are eight times the work, and nothing is packed.
+pub(super) fn has_lanes() -> bool {
+    !matches!(Arch::new(), Arch::Scalar)
+}
+
+/// Runs `work` over lanes in the widest instructions. It is not compiled for a processor without any: that copy would be the
+/// largest, and never run.
+#[inline(always)]
+pub(super) fn across<W: WithSimd<Output: Default>>(work: W) -> W::Output {
+    match Arch::new() {
+        #[cfg(target_arch = "x86_64")]
+        Arch::V4(simd) => Simd::vectorize(simd, work),
+        #[cfg(target_arch = "x86_64")]
+        Arch::V3(simd) => Simd::vectorize(simd, work),
+        #[cfg(target_arch = "aarch64")]
+        Arch::Neon(simd) => Simd::vectorize(simd, work),
+        _ => W::Output::default(),
     }
 }

@@ -1,18 +1,62 @@
 //! Turns of bodies with one coordinate and a front of one or two bodies, with the rows of loops, in closed form. They do what
-//! [`crate::multibody::rcr::front`] does, with nothing left to decide while running.
+//! the turn of any body does (`general.rs`, `front.rs`), in the same order, with nothing left to decide while running.
 
-use crate::multibody::rcr::reduction::{Reduction, Task};
+use crate::multibody::rcr::reduction::{Given, Task, Workspace};
 use crate::multibody::rcr::scalar::Real;
 use crate::multibody::rcr::schedule::NONE;
 
-impl<T: Real> Reduction<T> {
+/// How small a front is: four times its bodies, and the constraint rows that reach it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::multibody::rcr) struct Small(u8);
+
+impl Small {
+    /// Of a body with one coordinate, a front of one or two bodies and at most three rows; none of any other.
+    pub(in crate::multibody::rcr) fn of(freedom: usize, front: usize, rows: usize) -> Option<Self> {
+        let small = freedom == 1 && (1..=2).contains(&front) && rows <= 3;
+        small.then_some(Self((4 * front + rows) as u8))
+    }
+}
+
+impl<T: Real> Workspace<T> {
+    /// Takes the coordinate of a body with a small front out.
+    #[inline(always)]
+    pub(in crate::multibody::rcr) fn small_inward(&mut self, given: Given<'_, T>, small: Small, body: usize) {
+        match small {
+            Small(4) => self.one_inward::<1, 0>(given, body),
+            Small(5) => self.one_inward::<1, 1>(given, body),
+            Small(6) => self.one_inward::<1, 2>(given, body),
+            Small(7) => self.one_inward::<1, 3>(given, body),
+            Small(8) => self.one_inward::<2, 0>(given, body),
+            Small(9) => self.one_inward::<2, 1>(given, body),
+            Small(10) => self.one_inward::<2, 2>(given, body),
+            Small(_) => self.one_inward::<2, 3>(given, body),
+        }
+    }
+
+    /// Acceleration of a body with a small front.
+    #[inline(always)]
+    pub(in crate::multibody::rcr) fn small_outward(
+        &self,
+        given: Given<'_, T>,
+        small: Small,
+        body: usize,
+        accelerations: &mut [[T; 3]],
+        out: &mut [T],
+    ) {
+        match small {
+            Small(4..8) => self.one_outward::<1>(given, body, accelerations, out),
+            Small(_) => self.one_outward::<2>(given, body, accelerations, out),
+        }
+    }
+
     /// A body with one coordinate, a front of `W` bodies and `H` constraint rows.
     #[inline(always)]
-    pub(in crate::multibody::rcr) fn one_inward<const W: usize, const H: usize>(&mut self, task: Task, body: usize) {
-        let turn = self.schedule.turn(body);
-        let inertia = self.take_inertia(body);
-        let mut force = self.take_force(task, body);
-        let s = self.axis(body, turn.first);
+    fn one_inward<const W: usize, const H: usize>(&mut self, given: Given<'_, T>, body: usize) {
+        let Given { task, mechanism, placement, .. } = given;
+        let turn = mechanism.schedule.turn(body);
+        let inertia = self.take_inertia(mechanism, body);
+        let mut force = self.take_force(given, body);
+        let s = placement.axis(mechanism, body, turn.first);
         let [i0, i1, i2, i3, i4, i5] = inertia;
         let u =
             [i0 * s[0] + i1 * s[1] + i3 * s[2], i1 * s[0] + i2 * s[1] + i4 * s[2], i3 * s[0] + i4 * s[1] + i5 * s[2]];
@@ -20,13 +64,13 @@ impl<T: Real> Reduction<T> {
         if let Some(added) = self.added.get(body) {
             mass += added.joint[0];
         }
-        let hanging = &self.hanging[body];
+        let hanging = &placement.hanging[body];
         let [dx, dy] = hanging.shift();
         let mut bias = [T::ZERO; 2];
         let mut own = T::ZERO;
         if task == Task::Accelerations {
             bias = hanging.bias;
-            own = self.torque[turn.first];
+            own = given.torque[turn.first];
         }
         force[0] -= i0 * bias[0] + i1 * bias[1];
         force[1] -= i1 * bias[0] + i2 * bias[1];
@@ -36,7 +80,7 @@ impl<T: Real> Reduction<T> {
         let (mut c, mut g, mut m) = ([[T::ZERO; 3]; W], [[T::ZERO; 3]; W], [[[T::ZERO; 9]; W]; W]);
         if turn.coupled {
             for slot in 0..W {
-                let block = self.take_coupling(turn.column + slot);
+                let block = self.take_coupling(mechanism, turn.column + slot);
                 for i in 0..3 {
                     let row = [block[3 * i], block[3 * i + 1], block[3 * i + 2]];
                     c[slot][i] = row[0] * s[0] + row[1] * s[1] + row[2] * s[2];
@@ -132,7 +176,7 @@ impl<T: Real> Reduction<T> {
                 meets[0] = alpha;
             }
             let inverse = T::ONE / meets[0];
-            self.nearness = self.nearness.max((self.units[turn.first] * inverse).abs());
+            self.nearness = self.nearness.max((mechanism.units[turn.first] * inverse).abs());
             let value = gamma[0] * inverse;
             let rest = push - mass * value;
             let half = T::splat(0.5) * mass;
@@ -184,7 +228,7 @@ impl<T: Real> Reduction<T> {
             }
         }
         for r in 0..W {
-            let to = self.schedule.nodes[turn.column + r] as usize;
+            let to = mechanism.schedule.nodes[turn.column + r] as usize;
             let block = &m[r][r];
             let inertia = &mut self.nodes[to].inertia;
             for (x, k) in inertia.iter_mut().zip([0, 3, 4, 6, 7, 8]) {
@@ -195,21 +239,21 @@ impl<T: Real> Reduction<T> {
             }
             for q in 0..r {
                 // of a front of two there is one pair
-                let coupling = &mut self.coupling[self.schedule.targets[turn.targets] as usize];
+                let coupling = &mut self.coupling[mechanism.schedule.targets[turn.targets] as usize];
                 for (x, y) in coupling.iter_mut().zip(&m[r][q]) {
                     *x += *y;
                 }
             }
         }
         if H > 1 && turn.next != NONE {
-            let next = self.schedule.turn(turn.next);
+            let next = mechanism.schedule.turn(turn.next);
             let width = 3 * next.front + 4;
             for l in 1..H {
                 let to = next.row_start + (turn.next_row + l - 1) * width;
                 let row = &mut self.rows[to..to + width];
                 row.fill(T::ZERO);
                 for slot in 0..W {
-                    let place = self.schedule.map(turn.map_start + slot);
+                    let place = mechanism.schedule.map(turn.map_start + slot);
                     if place != NONE {
                         row[3 * place..3 * place + 3].copy_from_slice(&on[l][slot]);
                     }
@@ -221,27 +265,34 @@ impl<T: Real> Reduction<T> {
 
     /// Acceleration of a body with one coordinate and a front of `W` bodies.
     #[inline(always)]
-    pub(in crate::multibody::rcr) fn one_outward<const W: usize>(&mut self, task: Task, body: usize, out: &mut [T]) {
-        let step = self.schedule.steps[body];
-        let turn = self.schedule.turn(body);
+    fn one_outward<const W: usize>(
+        &self,
+        given: Given<'_, T>,
+        body: usize,
+        accelerations: &mut [[T; 3]],
+        out: &mut [T],
+    ) {
+        let Given { task, mechanism, placement, .. } = given;
+        let step = mechanism.schedule.steps[body];
+        let turn = mechanism.schedule.turn(body);
         let first = step.first as usize;
-        let hanging = &self.hanging[body];
-        let (s, shift) = (self.axis(body, first), hanging.shift());
+        let hanging = &placement.hanging[body];
+        let (s, shift) = (placement.axis(mechanism, body, first), hanging.shift());
         let mut x = self.base[first];
         for slot in 0..W {
-            let other = &self.accelerations[self.schedule.fronts[turn.column + slot] as usize];
+            let other = &accelerations[mechanism.schedule.fronts[turn.column + slot] as usize];
             let c = &self.coefficients[turn.coefficient_start + 3 * slot..turn.coefficient_start + 3 + 3 * slot];
             x -= c[0] * other[0] + c[1] * other[1] + c[2] * other[2];
         }
         let mut a =
             if task == Task::Accelerations { [hanging.bias[0], hanging.bias[1], T::ZERO] } else { [T::ZERO; 3] };
         if let Some(parent) = step.parent() {
-            let up = self.accelerations[parent];
+            let up = accelerations[parent];
             a[0] += up[0] - shift[1] * up[2];
             a[1] += up[1] + shift[0] * up[2];
             a[2] = up[2];
         }
         out[first] = x;
-        self.accelerations[body] = [a[0] + s[0] * x, a[1] + s[1] * x, a[2] + s[2] * x];
+        accelerations[body] = [a[0] + s[0] * x, a[1] + s[1] * x, a[2] + s[2] * x];
     }
 }

@@ -1,6 +1,7 @@
 //! Lanes of numbers: variants side by side, in vector instructions.
 
-use crate::multibody::rcr::Real;
+use crate::multibody::rcr::scalar::Real;
+use crate::multibody::rcr::traversal::OneByOne;
 use crate::multibody::sine::{REDUCED, reduced};
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
@@ -58,6 +59,7 @@ impl<const N: usize> SubAssign for Lanes<N> {
 }
 
 impl<const N: usize> Real for Lanes<N> {
+    type Traversal = OneByOne;
     const LANES: usize = N;
     const ZERO: Self = Self([0.0; N]);
     const ONE: Self = Self([1.0; N]);

@@ -1,21 +1,20 @@
-//! What is there for speed alone.
+//! What is there for speed alone, with the bits that come out without it.
 //!
 //! | file | what it holds |
 //! |---|---|
-//! | `pins` | runs of pins without loops |
+//! | `pins` | runs of pins, walked side by side |
 //! | `kernels` | one coordinate and small fronts, in closed form |
 //! | `lanes` | numbers of eight variants side by side |
 //! | `dispatch` | the recursion in the widest instructions of the processor at hand |
-//! | `subtrees` | subtrees of one mechanism that are equal in structure |
-//! | `packing` | how they are laid into packs of eight |
-//! | `packs` | their recursion side by side, and what they exchange with the rest |
+//! | `packs` | equal subtrees of one mechanism side by side |
 
 mod dispatch;
 mod kernels;
 mod lanes;
-mod packing;
-pub(super) mod packs;
+mod packs;
 mod pins;
-mod subtrees;
 
+pub(super) use dispatch::{accelerate, place, reduce};
+pub(super) use kernels::Small;
 pub use lanes::Lanes;
+pub use packs::Packs;

@@ -1,7 +1,7 @@
 //! Equal subtrees of one mechanism reduced side by side.
 //!
-//! Subtrees that are equal in structure ([`super::subtrees`]) are laid into packs of eight, one to a lane, and all packs into
-//! one linkage over lanes, with the bodies that they share with the rest at its end. That linkage runs through the same
+//! Subtrees that are equal in structure (`subtrees`) are laid into packs of eight (`packing`), one to a lane, and all packs
+//! into one linkage over lanes, with the bodies that they share with the rest at its end. That linkage runs through the same
 //! recursion as lanes of variants:
 //!
 //! - outward, the shared bodies' poses are copied into it, and its subtrees are placed;
@@ -12,92 +12,197 @@
 //!
 //! Poses and rates stay in the lanes until someone asks for them. A pack that is not full repeats its last subtree.
 
-use crate::multibody::rcr::closures::ClosureData;
-use crate::multibody::rcr::kinematics::{Hanging, JointData, Placed};
-use crate::multibody::rcr::reduction::{Reduction, Task};
+mod exchange;
+mod packing;
+mod subtrees;
+
+use super::dispatch::across;
+use super::lanes::Lanes;
+use crate::multibody::rcr::data::{Offsets, Reduction};
+use crate::multibody::rcr::kinematics::{Placed, Placement};
+use crate::multibody::rcr::reduction::Task;
+use crate::multibody::rcr::scalar::Real;
+use crate::multibody::rcr::traversal::Traversal;
 use crate::multibody::rcr::tree::Linkage;
-use crate::multibody::rcr::{Lanes, Real};
-use pulp::{Arch, Simd, WithSimd};
+use pulp::{Simd, WithSimd};
 use std::ops::Range;
+use std::slice::from_ref;
+use std::sync::Arc;
 
 /// Subtrees side by side.
-pub(super) const WIDTH: usize = 8;
+const WIDTH: usize = 8;
 /// A number of each of them.
-pub(super) type Wide = Lanes<WIDTH>;
+type Wide = Lanes<WIDTH>;
 
 /// A subtree's first body, coordinate, closure and joint (that is no pin), in the mechanism or among the packs.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct First {
-    pub(super) body: usize,
-    pub(super) coordinate: usize,
-    pub(super) closure: usize,
-    pub(super) joint: usize,
+struct First {
+    body: usize,
+    coordinate: usize,
+    closure: usize,
+    joint: usize,
 }
 
 /// Eight equal subtrees.
-#[derive(Debug, Clone)]
-pub(super) struct Pack {
+#[derive(Debug)]
+struct Pack {
     /// Where they lie among the packs.
-    pub(super) at: First,
+    at: First,
     /// How many bodies, coordinates, closures and joints one of them has.
-    pub(super) size: First,
+    size: First,
     /// Where each lies in the mechanism.
-    pub(super) of: [First; WIDTH],
+    of: [First; WIDTH],
 }
 
 /// A body of the packs whose front holds shared bodies, and where what it hands to them is kept.
-#[derive(Debug, Clone)]
-pub(super) struct Hand {
-    pub(super) body: usize,
-    /// Among [`Packs::nodes`].
-    pub(super) nodes: Range<usize>,
-    /// Among [`Packs::blocks`].
-    pub(super) blocks: Range<usize>,
+#[derive(Debug)]
+struct Hand {
+    body: usize,
+    /// Among [`Packing::nodes`].
+    nodes: Range<usize>,
+    /// Among [`Packing::blocks`].
+    blocks: Range<usize>,
 }
 
 /// What the recursion over the rest does, in elimination order.
-#[derive(Debug, Clone)]
-pub(super) enum Item {
+#[derive(Debug)]
+enum Item {
     /// Takes the turns of these bodies.
     Turns(Range<usize>),
-    /// Adds what was kept for a body, the numbers of this range of [`Packs::order`].
+    /// Adds what was kept for a body, the numbers of this range of [`Packing::order`].
     Node(usize, Range<usize>),
     /// Adds what was kept for a block of couplings.
     Block(usize, Range<usize>),
 }
 
+/// How the equal subtrees of a mechanism lie in packs. Immutable.
+#[derive(Debug)]
+struct Packing {
+    packs: Vec<Pack>,
+    /// Bodies of all packs; the shared ones follow.
+    bodies: usize,
+    /// Which bodies of the mechanism each shared body is, lane by lane.
+    shared: Vec<[u32; WIDTH]>,
+    hands: Vec<Hand>,
+    /// The shared bodies that something is handed to.
+    nodes: Vec<usize>,
+    /// Their pairs, as blocks of the packs' pattern.
+    blocks: Vec<usize>,
+    items: Vec<Item>,
+    /// Which of what is kept is added, times the lanes, plus the lane.
+    order: Vec<u32>,
+    /// Bodies of the mechanism that are in no pack.
+    rest: Vec<Range<usize>>,
+    /// Closures of the mechanism that are in no pack.
+    rest_closures: Vec<Range<usize>>,
+    /// Each body's place in the packs, times the lanes, plus the lane; `u32::MAX`: in none.
+    place: Vec<u32>,
+}
+
 /// The packs of a mechanism with their recursion.
 #[derive(Debug, Clone)]
-pub(super) struct Packs {
-    /// The first lane's subtrees, with the shared bodies as roots at the end.
-    pub(super) linkage: Linkage,
-    pub(super) lanes: Reduction<Wide>,
-    pub(super) packs: Vec<Pack>,
-    /// Bodies of all packs; the shared ones follow.
-    pub(super) bodies: usize,
-    /// Which bodies of the mechanism each shared body is, lane by lane.
-    pub(super) shared: Vec<[u32; WIDTH]>,
-    pub(super) hands: Vec<Hand>,
-    /// The shared bodies that something is handed to.
-    pub(super) nodes: Vec<usize>,
-    /// The couplings between shared bodies that something is handed to.
-    pub(super) blocks: Vec<usize>,
-    pub(super) items: Vec<Item>,
-    /// Which of what is kept is added, times the lanes, plus the lane.
-    pub(super) order: Vec<u32>,
-    /// Bodies of the mechanism that are in no pack.
-    pub(super) rest: Vec<Range<usize>>,
-    /// Closures of the mechanism that are in no pack.
-    pub(super) rest_closures: Vec<Range<usize>>,
-    /// Each body's place in the packs, times the lanes, plus the lane; `u32::MAX`: in none.
-    pub(super) place: Vec<u32>,
-    pub(super) q: Vec<Wide>,
-    pub(super) v: Vec<Wide>,
-    pub(super) out: Vec<Wide>,
+pub struct Packs {
+    packing: Arc<Packing>,
+    /// The subtrees, with the shared bodies as roots at the end.
+    lanes: Reduction<Wide>,
+    q: Vec<Wide>,
+    v: Vec<Wide>,
+    out: Vec<Wide>,
     /// Inertia and wrench handed to shared bodies.
-    pub(super) kept: Vec<[Wide; 9]>,
+    kept: Vec<[Wide; 9]>,
     /// Couplings handed to pairs of shared bodies.
-    pub(super) kept_blocks: Vec<[Wide; 9]>,
+    kept_blocks: Vec<[Wide; 9]>,
+}
+
+impl Traversal<f64> for Packs {
+    fn new(linkage: &Linkage, reduction: &Reduction<f64>) -> Option<Box<Self>> {
+        Self::lay(linkage, &reduction.mechanism.schedule).map(Box::new)
+    }
+
+    #[inline(always)]
+    fn place(reduction: &mut Reduction<f64>, q: &[f64], v: &[f64]) {
+        let Reduction { mechanism, offsets, placement, traversal, .. } = reduction;
+        let all = 0..mechanism.bodies();
+        for range in traversal.as_ref().map_or(from_ref(&all), |t| &t.packing.rest).iter().rev() {
+            placement.place(mechanism, &offsets.joints, q, v, range.clone());
+        }
+        if let Some(packs) = traversal {
+            packs.take_motion(&placement.placed, q, v);
+            packs.place_lanes();
+        }
+    }
+
+    #[inline(always)]
+    fn rows(reduction: &mut Reduction<f64>, task: Task) -> f64 {
+        let mut traversal = reduction.traversal.take();
+        let mut largest = traversal.as_mut().map_or(0.0, |packs| packs.rows_of_lanes(task));
+        let (given, work, _) = reduction.parts(task);
+        let all = 0..given.mechanism.closures.len();
+        for range in traversal.as_ref().map_or(from_ref(&all), |t| &t.packing.rest_closures) {
+            largest = largest.max(work.write_rows(given, range.clone()));
+        }
+        reduction.traversal = traversal;
+        largest
+    }
+
+    #[inline(always)]
+    fn reduce(reduction: &mut Reduction<f64>, task: Task, out: &mut [f64]) {
+        let mut traversal = reduction.traversal.take();
+        let (given, work, accelerations) = reduction.parts(task);
+        let schedule = &given.mechanism.schedule;
+        let (bodies, closures) = (0..given.mechanism.bodies(), 0..given.mechanism.closures.len());
+        let all = Item::Turns(bodies.clone());
+        work.nearness = 0.0;
+        if let Some(packs) = &mut traversal {
+            if task == Task::Accelerations {
+                packs.take_loads(given.force, given.torque);
+            }
+            packs.lanes_inward(task);
+            work.nearness = packs.nearness();
+        }
+        for range in traversal.as_ref().map_or(from_ref(&closures), |t| &t.packing.rest_closures) {
+            work.write_rows(given, range.clone());
+        }
+        for item in traversal.as_ref().map_or(from_ref(&all), |t| &t.packing.items) {
+            match (item, &traversal) {
+                (Item::Turns(range), _) => work.inward(given, range.clone()),
+                (Item::Node(to, terms), Some(packs)) => {
+                    packs.add_node(terms.clone(), &mut work.nodes[schedule.steps[*to].node as usize]);
+                }
+                (Item::Block(to, terms), Some(packs)) => {
+                    packs.add_block(terms.clone(), &mut work.coupling[schedule.blocks[*to] as usize]);
+                }
+                (_, None) => {}
+            }
+        }
+        for range in traversal.as_ref().map_or(from_ref(&bodies), |t| &t.packing.rest).iter().rev() {
+            work.outward(given, range.clone(), accelerations, out);
+        }
+        if let Some(packs) = &mut traversal {
+            packs.take_accelerations(accelerations);
+            packs.lanes_outward(task);
+            packs.give_accelerations(accelerations, out);
+        }
+        reduction.traversal = traversal;
+        reduction.nearness = reduction.work.nearness;
+    }
+
+    fn placed(&self, body: usize) -> Option<Placed<f64>> {
+        let (at, lane) = self.lane_of(body)?;
+        Some(self.lanes.placement.placed[at].lane(lane))
+    }
+
+    fn spread(&self, placement: &mut Placement<f64>) {
+        self.give_placement(placement);
+    }
+
+    fn prescribe(&mut self, offsets: &Offsets<f64>) {
+        self.take_offsets(offsets);
+    }
+
+    fn side_by_side(&self) -> usize {
+        self.packing.place.len() - self.packing.rest.iter().map(Range::len).sum::<usize>()
+    }
 }
 
 /// Places the subtrees.
@@ -113,8 +218,9 @@ impl WithSimd for Place<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        let Packs { linkage, lanes, bodies, q, v, .. } = self.0;
-        lanes.place_bodies(linkage, 0..*bodies, q, v);
+        let Packs { packing, lanes, q, v, .. } = self.0;
+        let Reduction { mechanism, offsets, placement, .. } = lanes;
+        placement.place(mechanism, &offsets.joints, q, v, 0..packing.bodies);
     }
 }
 
@@ -122,9 +228,8 @@ impl WithSimd for Rows<'_> {
     type Output = f64;
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> f64 {
-        let lanes = &mut self.0.lanes;
-        let all = 0..lanes.closures.len();
-        lanes.rows_of(self.1, all).0.into_iter().fold(0.0, f64::max)
+        let (given, work, _) = self.0.lanes.parts(self.1);
+        work.write_rows(given, 0..given.mechanism.closures.len()).0.into_iter().fold(0.0, f64::max)
     }
 }
 
@@ -132,25 +237,26 @@ impl WithSimd for Inward<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        let Self(packs, task) = self;
-        let Packs { lanes, bodies, hands, nodes, blocks, kept, kept_blocks, .. } = packs;
-        let all = 0..lanes.closures.len();
-        lanes.rows_of(task, all);
-        lanes.nearness = Wide::ZERO;
+        let Self(Packs { packing, lanes, kept, kept_blocks, .. }, task) = self;
+        let Packing { bodies, hands, nodes, blocks, .. } = &**packing;
+        let (given, work, _) = lanes.parts(task);
+        let schedule = &given.mechanism.schedule;
+        work.write_rows(given, 0..given.mechanism.closures.len());
+        work.nearness = Wide::ZERO;
         let mut from = 0;
         for k in 0..=hands.len() {
             let to = hands.get(k).map_or(*bodies, |h| h.body + 1);
-            lanes.turns_inward(task, from..to);
+            work.inward(given, from..to);
             from = to;
             let Some(hand) = hands.get(k) else { break };
             for (kept, &node) in kept[hand.nodes.clone()].iter_mut().zip(&nodes[hand.nodes.clone()]) {
-                let node = &mut lanes.nodes[lanes.schedule.steps[node].node as usize];
+                let node = &mut work.nodes[schedule.steps[node].node as usize];
                 let [a, b, c, d, e, f] = std::mem::replace(&mut node.inertia, [Wide::ZERO; 6]);
                 let [x, y, w] = std::mem::replace(&mut node.momentum, [Wide::ZERO; 3]);
                 *kept = [a, b, c, d, e, f, x, y, w];
             }
             for (kept, &block) in kept_blocks[hand.blocks.clone()].iter_mut().zip(&blocks[hand.blocks.clone()]) {
-                *kept = std::mem::replace(&mut lanes.coupling[lanes.schedule.blocks[block] as usize], [Wide::ZERO; 9]);
+                *kept = std::mem::replace(&mut work.coupling[schedule.blocks[block] as usize], [Wide::ZERO; 9]);
             }
         }
     }
@@ -160,39 +266,9 @@ impl WithSimd for Outward<'_> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        let Self(packs, task) = self;
-        let Packs { linkage, lanes, bodies, out, .. } = packs;
-        lanes.turns_outward(linkage, task, 0..*bodies, out);
-    }
-}
-
-/// Copies `size` numbers of each lane, from where its subtree starts.
-#[inline(always)]
-fn gather<T: Real>(to: &mut [Wide], from: &[T], starts: [usize; WIDTH]) {
-    for (lane, start) in starts.into_iter().enumerate() {
-        for (to, from) in to.iter_mut().zip(&from[start..]) {
-            to.0[lane] = from.lane(0);
-        }
-    }
-}
-
-/// Whether the processor has vector instructions. Without them eight lanes are eight times the work, and nothing is packed.
-pub(super) fn vectors() -> bool {
-    !matches!(Arch::new(), Arch::Scalar)
-}
-
-/// Runs `work` in the widest instructions. It is not compiled for a processor without any: that copy would be the largest, and
-/// never run.
-#[inline(always)]
-fn wide<W: WithSimd<Output: Default>>(work: W) -> W::Output {
-    match Arch::new() {
-        #[cfg(target_arch = "x86_64")]
-        Arch::V4(simd) => Simd::vectorize(simd, work),
-        #[cfg(target_arch = "x86_64")]
-        Arch::V3(simd) => Simd::vectorize(simd, work),
-        #[cfg(target_arch = "aarch64")]
-        Arch::Neon(simd) => Simd::vectorize(simd, work),
-        _ => W::Output::default(),
+        let Self(Packs { packing, lanes, out, .. }, task) = self;
+        let (given, work, accelerations) = lanes.parts(task);
+        work.outward(given, 0..packing.bodies, accelerations, out);
     }
 }
 
@@ -200,171 +276,22 @@ fn wide<W: WithSimd<Output: Default>>(work: W) -> W::Output {
 impl Packs {
     #[inline(never)]
     fn place_lanes(&mut self) {
-        wide(Place(self));
+        across(Place(self));
     }
 
     #[inline(never)]
-    fn inward_lanes(&mut self, task: Task) {
-        wide(Inward(self, task));
+    fn lanes_inward(&mut self, task: Task) {
+        across(Inward(self, task));
     }
 
     #[inline(never)]
-    fn outward_lanes(&mut self, task: Task) {
-        wide(Outward(self, task));
+    fn lanes_outward(&mut self, task: Task) {
+        across(Outward(self, task));
     }
 
     /// Writes the rows of the subtrees' closures for `task`. Returns the largest residual.
     #[inline(never)]
-    pub(super) fn rows(&mut self, task: Task) -> f64 {
-        if self.lanes.closures.is_empty() { 0.0 } else { wide(Rows(self, task)) }
-    }
-}
-
-impl Packs {
-    /// Places the subtrees for coordinates `q` and rates `v` of the mechanism, whose other bodies are `placed`.
-    #[inline(always)]
-    pub(super) fn place<T: Real>(&mut self, placed: &[Placed<T>], q: &[T], v: &[T]) {
-        for pack in &self.packs {
-            let range = pack.at.coordinate..pack.at.coordinate + pack.size.coordinate;
-            let starts = pack.of.map(|f| f.coordinate);
-            gather(&mut self.q[range.clone()], q, starts);
-            gather(&mut self.v[range], v, starts);
-        }
-        for (to, of) in self.lanes.placed[self.bodies..].iter_mut().zip(&self.shared) {
-            for (lane, &body) in of.iter().enumerate() {
-                to.set_lane(lane, &placed[body as usize]);
-            }
-        }
-        self.place_lanes();
-    }
-
-    /// Reduces the subtrees, with `force` on the bodies and `torque` on the coordinates of the mechanism. Returns how near
-    /// the worst of them is to a singular configuration.
-    #[inline(always)]
-    pub(super) fn inward<T: Real>(&mut self, task: Task, force: &[[T; 3]], torque: &[T]) -> f64 {
-        if task == Task::Accelerations {
-            for pack in &self.packs {
-                let (at, size) = (pack.at, pack.size);
-                for (lane, of) in pack.of.iter().enumerate() {
-                    let to = &mut self.lanes.force[at.body..at.body + size.body];
-                    for (to, from) in to.iter_mut().zip(&force[of.body..]) {
-                        for (to, from) in to.iter_mut().zip(from) {
-                            to.0[lane] = from.lane(0);
-                        }
-                    }
-                }
-                let to = &mut self.lanes.torque[at.coordinate..at.coordinate + size.coordinate];
-                gather(to, torque, pack.of.map(|f| f.coordinate));
-            }
-        }
-        self.inward_lanes(task);
-        self.lanes.nearness.0.into_iter().fold(0.0, f64::max)
-    }
-
-    /// The sum of what was kept in `kept` and `sum`, one term after the other.
-    #[inline(always)]
-    fn sum<T: Real>(kept: &[[Wide; 9]], order: &[u32], mut sum: [T; 9]) -> [T; 9] {
-        for &k in order {
-            let (kept, lane) = (&kept[k as usize / WIDTH], k as usize % WIDTH);
-            for (sum, x) in sum.iter_mut().zip(kept) {
-                *sum += T::splat(x.0[lane]);
-            }
-        }
-        sum
-    }
-
-    /// What a body's inertia and momentum become with the terms of `range`.
-    #[inline(always)]
-    pub(super) fn add_node<T: Real>(&self, range: Range<usize>, inertia: &mut [T; 6], momentum: &mut [T; 3]) {
-        let ([a, b, c, d, e, f], [x, y, w]) = (*inertia, *momentum);
-        let [a, b, c, d, e, f, x, y, w] = Self::sum(&self.kept, &self.order[range], [a, b, c, d, e, f, x, y, w]);
-        (*inertia, *momentum) = ([a, b, c, d, e, f], [x, y, w]);
-    }
-
-    /// What a block of couplings becomes with the terms of `range`.
-    #[inline(always)]
-    pub(super) fn add_block<T: Real>(&self, range: Range<usize>, block: &mut [T; 9]) {
-        *block = Self::sum(&self.kept_blocks, &self.order[range], *block);
-    }
-
-    /// Finds the accelerations of the subtrees' bodies and coordinates from those of the bodies that they share.
-    #[inline(always)]
-    pub(super) fn outward<T: Real>(&mut self, task: Task, accelerations: &mut [[T; 3]], out: &mut [T]) {
-        for (to, of) in self.lanes.accelerations[self.bodies..].iter_mut().zip(&self.shared) {
-            for (lane, &body) in of.iter().enumerate() {
-                for (to, from) in to.iter_mut().zip(&accelerations[body as usize]) {
-                    to.0[lane] = from.lane(0);
-                }
-            }
-        }
-        self.outward_lanes(task);
-        for pack in &self.packs {
-            let (at, size) = (pack.at, pack.size);
-            for (lane, of) in pack.of.iter().enumerate() {
-                let from = &self.out[at.coordinate..at.coordinate + size.coordinate];
-                for (to, from) in out[of.coordinate..].iter_mut().zip(from) {
-                    *to = T::splat(from.0[lane]);
-                }
-                let from = &self.lanes.accelerations[at.body..at.body + size.body];
-                for (to, from) in accelerations[of.body..].iter_mut().zip(from) {
-                    *to = from.map(|x| T::splat(x.0[lane]));
-                }
-            }
-        }
-    }
-
-    /// Where a body is, if it is in a pack.
-    pub(super) fn placed<T: Real>(&self, body: usize) -> Option<Placed<T>> {
-        let (at, lane) = self.lane_of(body)?;
-        Some(self.lanes.placed[at].one(lane))
-    }
-
-    /// Pose of a body, if it is in a pack.
-    pub(super) fn pose<T: Real>(&self, body: usize) -> Option<[T; 3]> {
-        let (at, lane) = self.lane_of(body)?;
-        Some(self.lanes.placed[at].pose.map(|x| T::splat(x.0[lane])))
-    }
-
-    /// Rate of a body's pose, if it is in a pack.
-    pub(super) fn rate<T: Real>(&self, body: usize) -> Option<[T; 3]> {
-        let (at, lane) = self.lane_of(body)?;
-        Some(self.lanes.placed[at].rate.map(|x| T::splat(x.0[lane])))
-    }
-
-    fn lane_of(&self, body: usize) -> Option<(usize, usize)> {
-        let place = self.place[body];
-        (place != u32::MAX).then_some((place as usize / WIDTH, place as usize % WIDTH))
-    }
-
-    /// Copies places, levers and joint axes of all subtrees back to the mechanism's.
-    pub(super) fn spread<T: Real>(&self, placed: &mut [Placed<T>], hanging: &mut [Hanging<T>], axes: &mut [[T; 3]]) {
-        for pack in &self.packs {
-            let (at, size) = (pack.at, pack.size);
-            for (lane, of) in pack.of.iter().enumerate() {
-                for k in 0..size.body {
-                    placed[of.body + k] = self.lanes.placed[at.body + k].one(lane);
-                    hanging[of.body + k] = self.lanes.hanging[at.body + k].one(lane);
-                }
-                // a mechanism of pins alone has none
-                let axed = if axes.is_empty() { 0 } else { size.coordinate };
-                for k in 0..axed {
-                    axes[of.coordinate + k] = self.lanes.axes[at.coordinate + k].map(|x| T::splat(x.0[lane]));
-                }
-            }
-        }
-    }
-
-    /// Takes over the offsets of locked directions.
-    pub(super) fn prescribe<T: Real>(&mut self, joints: &[JointData<T>], closures: &[ClosureData<T>]) {
-        for pack in &self.packs {
-            for (lane, of) in pack.of.iter().enumerate() {
-                for k in 0..pack.size.joint {
-                    self.lanes.joints[pack.at.joint + k].rest.0[lane] = joints[of.joint + k].rest.lane(0);
-                }
-                for k in 0..pack.size.closure {
-                    self.lanes.closures[pack.at.closure + k].rest.0[lane] = closures[of.closure + k].rest.lane(0);
-                }
-            }
-        }
+    fn rows_of_lanes(&mut self, task: Task) -> f64 {
+        if self.lanes.mechanism.closures.is_empty() { 0.0 } else { across(Rows(self, task)) }
     }
 }

@@ -1,4 +1,4 @@
-//! Subtrees of one mechanism that are equal in structure: what [`super::packs`] reduces side by side.
+//! Subtrees of one mechanism that are equal in structure: what packs reduce side by side.
 //!
 //! A subtree here is one of the elimination tree: a body with all bodies whose elimination changes its front. Everything that
 //! a subtree's bodies couple to lies in it, or in the front of its root, the **shared** bodies. Joints, closures and fill all
@@ -17,11 +17,11 @@ use std::ops::Range;
 const FEWEST: usize = 5;
 
 /// Equal subtrees, each the range of its bodies in elimination order.
-pub(in crate::multibody::rcr) type Equal = Vec<Range<usize>>;
+pub(super) type Equal = Vec<Range<usize>>;
 
 /// The groups of at least [`FEWEST`] equal subtrees of a mechanism, the largest subtrees there are, disjoint. What is left
 /// over of a group when packs of `width` are full, and is fewer than `FEWEST`, is left out.
-pub(in crate::multibody::rcr) fn equal(linkage: &Linkage, schedule: &Schedule, width: usize) -> Vec<Equal> {
+pub(super) fn equal(linkage: &Linkage, schedule: &Schedule, width: usize) -> Vec<Equal> {
     let mut groups = Shapes::new(linkage, schedule).choose();
     for group in &mut groups {
         let left = group.len() % width;

@@ -1,19 +1,21 @@
 //! How equal subtrees are laid into packs, once for a mechanism.
 
-use super::packs::{First, Hand, Item, Pack, Packs, WIDTH, Wide, vectors};
 use super::subtrees::equal;
-use crate::multibody::rcr::reduction::Reduction;
+use super::{First, Hand, Item, Pack, Packing, Packs, WIDTH, Wide};
+use crate::multibody::rcr::data::Reduction;
+use crate::multibody::rcr::fast::dispatch::has_lanes;
 use crate::multibody::rcr::scalar::Real;
 use crate::multibody::rcr::schedule::{NONE, Schedule};
 use crate::multibody::rcr::tree::{Closure, Link, Linkage, Parent};
 use crate::multibody::{BodyId, Pattern};
 use std::ops::Range;
+use std::sync::Arc;
 
 impl Packs {
     /// The packs of a mechanism; none where it has no equal subtrees, or more constraints than coordinates in some loop, or the
     /// processor no lanes.
-    pub(super) fn new(linkage: &Linkage, schedule: &Schedule) -> Option<Box<Self>> {
-        if schedule.redundant > 0 || !vectors() {
+    pub(super) fn lay(linkage: &Linkage, schedule: &Schedule) -> Option<Self> {
+        if schedule.redundant > 0 || !has_lanes() {
             return None;
         }
         let groups = equal(linkage, schedule, WIDTH);
@@ -29,12 +31,28 @@ impl Packs {
             })
             .collect();
         let lanes = Reduction::<Wide>::without_packs(&variants.iter().collect::<Vec<_>>());
-        let coordinates = variants[0].coordinates;
-        let mut packs = Self {
-            linkage: variants.into_iter().next()?,
+        let room = vec![Wide::ZERO; variants[0].coordinates];
+        let packing = Packing::new(linkage, schedule, layout, &pattern);
+        Some(Self {
+            kept: vec![[Wide::ZERO; 9]; packing.nodes.len()],
+            kept_blocks: vec![[Wide::ZERO; 9]; packing.blocks.len()],
+            packing: Arc::new(packing),
             lanes,
+            q: room.clone(),
+            v: room.clone(),
+            out: room,
+        })
+    }
+}
+
+impl Packing {
+    /// `pattern` couples the bodies of the packs.
+    fn new(linkage: &Linkage, schedule: &Schedule, layout: Layout, pattern: &Pattern) -> Self {
+        let place = layout.place(linkage.links.len());
+        let mut packing = Self {
+            rest_closures: runs(schedule.entries.iter().map(|e| place[e.body] == u32::MAX)),
             bodies: layout.bodies,
-            place: layout.place(linkage.links.len()),
+            place,
             packs: layout.packs,
             shared: layout.shared,
             hands: Vec::new(),
@@ -43,22 +61,14 @@ impl Packs {
             items: Vec::new(),
             order: Vec::new(),
             rest: Vec::new(),
-            rest_closures: Vec::new(),
-            q: vec![Wide::ZERO; coordinates],
-            v: vec![Wide::ZERO; coordinates],
-            out: vec![Wide::ZERO; coordinates],
-            kept: Vec::new(),
-            kept_blocks: Vec::new(),
         };
-        packs.find_hands();
-        packs.find_items(linkage);
-        packs.rest_closures = runs(schedule.entries.iter().map(|e| packs.place[e.body] == u32::MAX));
-        Some(Box::new(packs))
+        packing.find_hands(pattern);
+        packing.find_items(linkage);
+        packing
     }
 
     /// Lists the bodies that hand something to shared bodies.
-    fn find_hands(&mut self) {
-        let pattern = &self.linkage.pattern;
+    fn find_hands(&mut self, pattern: &Pattern) {
         for body in 0..self.bodies {
             let rows = pattern.rows(body);
             let inner = rows.iter().take_while(|&&row| (row as usize) < self.bodies).count();
@@ -72,8 +82,6 @@ impl Packs {
             }
             self.hands.push(Hand { body, nodes: nodes..self.nodes.len(), blocks: blocks..self.blocks.len() });
         }
-        self.kept = vec![[Wide::ZERO; 9]; self.nodes.len()];
-        self.kept_blocks = vec![[Wide::ZERO; 9]; self.blocks.len()];
     }
 
     /// Lists what the recursion over the other bodies does.
@@ -191,7 +199,7 @@ impl Layout {
         self.bodies + self.shared.binary_search(&pack.shared(linkage, slot)).unwrap_or(0)
     }
 
-    /// Each body's place, see [`Packs::place`].
+    /// Each body's place, see [`Packing::place`].
     fn place(&self, count: usize) -> Vec<u32> {
         let mut place = vec![u32::MAX; count];
         for (pack, &lanes) in self.packs.iter().zip(&self.lanes) {

@@ -1,0 +1,185 @@
+//! Lays the schedule out: one sweep over the bodies in elimination order.
+
+use super::slots::Slots;
+use super::{Entry, Kind, NONE, Packed, Plan, Schedule, Step};
+use crate::multibody::rcr::fast::Small;
+use crate::multibody::rcr::tree::{Closure, Linkage, Parent};
+use crate::multibody::{BodyId, Pattern};
+
+impl Schedule {
+    /// The schedule of a linkage.
+    pub(in crate::multibody::rcr) fn new(linkage: &Linkage, plan: Plan) -> Self {
+        let pattern = &linkage.pattern;
+        let count = linkage.links.len();
+        let mut incoming = vec![0usize; count];
+        let mut coupled = vec![plan.coupled; pattern.off_blocks()];
+        for body in 0..count {
+            for &block in pattern.targets(body) {
+                coupled[block as usize] = true;
+            }
+        }
+        let mut support: Vec<Vec<usize>> = vec![Vec::new(); count];
+        let mut entries = Vec::with_capacity(linkage.closures.len());
+        for closure in &linkage.closures {
+            let (body, other) = closure.bodies();
+            let slot = other.map_or(NONE, |o| slot_of(pattern, body, o));
+            let free = |id| if let BodyId::Free(k) = id { Some(k as u32) } else { None };
+            let ends = match closure {
+                Closure::Joint(joint) => [free(joint.a), free(joint.b)],
+                Closure::Held { body, .. } => [Some(*body as u32), None],
+            };
+            entries.push(Entry { body, row: incoming[body], other: slot, count: closure.constraints(), ends });
+            incoming[body] += closure.constraints();
+            if closure.constraints() > 0 {
+                support[body].extend(other);
+            }
+        }
+        let mut schedule = Self {
+            plan,
+            turns: Vec::with_capacity(count),
+            steps: Vec::with_capacity(count),
+            fronts: Vec::with_capacity(pattern.off_blocks()),
+            nodes: Vec::with_capacity(pattern.off_blocks()),
+            blocks: Vec::with_capacity(pattern.off_blocks()),
+            targets: Vec::new(),
+            node_count: 0,
+            block_count: 0,
+            entries,
+            maps: Vec::new(),
+            row_entries: 0,
+            coefficient_entries: 0,
+            redundant: 0,
+            multiplications: 0,
+        };
+        let (mut nodes, mut blocks) = (Slots::new(count), Slots::new(pattern.off_blocks()));
+        let mut joint = 0;
+        for body in 0..count {
+            let link = &linkage.links[body];
+            let freedom = link.freedom();
+            let front = pattern.column(body).len();
+            let rows = incoming[body];
+            let left = rows.saturating_sub(freedom);
+            let mut bodies = std::mem::take(&mut support[body]);
+            let mut parent = NONE;
+            if let Parent::Body(p) = link.parent {
+                parent = slot_of(pattern, body, p);
+                if rows > 0 {
+                    bodies.push(p);
+                }
+            }
+            bodies.sort_unstable();
+            bodies.dedup();
+            let coupled = pattern.column(body).any(|k| coupled[k]);
+            let mut turn = Packed {
+                front: narrow(front),
+                rows: narrow(rows),
+                parent: narrow(parent),
+                targets: narrow(schedule.targets.len()),
+                row_start: narrow(schedule.row_entries),
+                next: u32::MAX,
+                next_row: 0,
+                map_start: narrow(schedule.maps.len()),
+            };
+            schedule.row_entries += rows * (3 + 3 * front + 1);
+            schedule.multiplications += multiplications(freedom, front, rows, parent != NONE);
+            if left > 0 {
+                match bodies.first() {
+                    None => schedule.redundant += left,
+                    Some(&next) => {
+                        turn.next = narrow(next);
+                        turn.next_row = narrow(incoming[next]);
+                        incoming[next] += left;
+                        support[next].extend(bodies.iter().skip(1));
+                        for k in pattern.column(body) {
+                            let b = pattern.row(k);
+                            schedule.maps.push(match b.cmp(&next) {
+                                std::cmp::Ordering::Equal => 0,
+                                std::cmp::Ordering::Greater => narrow(1 + slot_of(pattern, next, b)),
+                                // not touched by these rows: its entries are zero
+                                std::cmp::Ordering::Less => u32::MAX,
+                            });
+                        }
+                    }
+                }
+            }
+            // what has gathered for this body is taken before it hands anything on
+            let node = nodes.hold(body);
+            nodes.release(body);
+            let column = pattern.column(body);
+            schedule.blocks.extend(column.clone().map(|k| blocks.hold(k)));
+            column.clone().for_each(|k| blocks.release(k));
+            schedule.fronts.extend(column.clone().map(|k| pattern.row(k) as u32));
+            schedule.nodes.extend(column.clone().map(|k| nodes.hold(pattern.row(k))));
+            schedule.targets.extend(pattern.targets(body).iter().map(|&k| blocks.hold(k as usize)));
+            let alone = rows == 0 && !coupled && !plan.coupled;
+            let pin = link.pin && alone && (front == 0 || front == 1 && parent != NONE);
+            let small = Small::of(freedom, front, rows).filter(|_| plan.fast);
+            let kind = if pin { Kind::Pin } else { small.map_or(Kind::Any, Kind::Small) };
+            let step = Step {
+                kind,
+                pin: link.pin,
+                gathers: false,
+                hands_on: false,
+                parent: match link.parent {
+                    Parent::Body(p) => narrow(p),
+                    Parent::Ground | Parent::Free => u32::MAX,
+                },
+                turns: link.moving[2],
+                coupled,
+                freedom: freedom as u8,
+                first: narrow(link.first),
+                joint,
+                node,
+                column: narrow(column.start),
+                coefficient_start: narrow(schedule.coefficient_entries),
+            };
+            schedule.coefficient_entries += match kind {
+                Kind::Pin => 2,
+                Kind::Small(_) => 3 * front,
+                Kind::Any => freedom * (freedom + 3 * front),
+            };
+            joint += u32::from(!link.pin);
+            schedule.steps.push(step);
+            schedule.turns.push(turn);
+        }
+        (schedule.node_count, schedule.block_count) = (nodes.count(), blocks.count());
+        schedule.mark_runs(pattern);
+        schedule
+    }
+
+    /// Marks what goes from pin to pin within a run, and who receives anything else.
+    fn mark_runs(&mut self, pattern: &Pattern) {
+        for body in 0..self.steps.len() {
+            let pin = |k: usize| self.steps.get(k).is_some_and(|s| s.kind == Kind::Pin);
+            let hands_on = self.steps[body].parent() == Some(body + 1) && pin(body) && pin(body + 1);
+            self.steps[body].hands_on = hands_on;
+            for k in pattern.column(body).filter(|_| !hands_on) {
+                self.steps[pattern.row(k)].gathers = true;
+            }
+        }
+    }
+}
+
+fn slot_of(pattern: &Pattern, body: usize, other: usize) -> usize {
+    pattern.column(body).position(|k| pattern.row(k) == other).unwrap_or(NONE)
+}
+
+/// Multiplications at one body, as the general front does them.
+fn multiplications(freedom: usize, front: usize, rows: usize, hangs: bool) -> u64 {
+    let local = freedom + 3 * front;
+    let shift = if hangs { 12 + 9 * front } else { 0 };
+    let assemble = 9 * freedom + 3 * freedom * freedom + 9 * freedom * front + shift + rows * (3 * freedom + 2);
+    let dependent = freedom.min(rows);
+    let mut eliminate = 0;
+    for e in 0..freedom {
+        let left = local - e - 1;
+        eliminate += if e < dependent { left * (left + 3) + (rows - e) * (left + 1) } else { left * (left + 3) / 2 };
+    }
+    (assemble + eliminate + freedom * local) as u64
+}
+
+/// An index or count in 32 bits; [`NONE`] stays none.
+fn narrow(x: usize) -> u32 {
+    debug_assert!(x == NONE || x < u32::MAX as usize, "more than four thousand million entries");
+    x as u32
+}
