@@ -8,6 +8,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+// the plug-in's own file: what it declares to ngspice, and what it makes of a line
+#[allow(unreachable_pub)]
 #[path = "../clients/ngspice/src/deck_options.rs"]
 mod deck_options;
 

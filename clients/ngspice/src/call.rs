@@ -1,9 +1,11 @@
 //! ngspice's memory, read and written: parameters at setup, inputs and outputs at each call.
 
 use crate::abi::{Circuit, Complex, Connection, Instance, Model, Parameter, Tail, Value, analysis, port_data};
+use crate::deck_options::{Written, declared};
 use crate::instance::Question;
 use crate::layout::Layout;
 use crate::model_card::RawCard;
+use crate::table::OWN_COUNT;
 use std::ffi::{CStr, c_char, c_int, c_void};
 
 /// Electrical ports.
@@ -20,7 +22,7 @@ pub(crate) unsafe fn text(at: *const c_char) -> Option<String> {
     (!at.is_null()).then(|| unsafe { CStr::from_ptr(at) }.to_string_lossy().into_owned())
 }
 
-/// Reads a `.model` line's parameters, in the order of [`crate::table::PARAMETERS`].
+/// Reads a `.model` line's parameters, in the order in which [`crate::table`] declares them.
 ///
 /// # Safety
 /// `param` points to the model's `count` parameters, as set up by the host.
@@ -46,12 +48,14 @@ pub(crate) unsafe fn card(param: *mut *mut Parameter, count: c_int) -> RawCard {
         monitors: strings(2),
         set: strings(3),
         remote: string(4, 0),
-        tol: real(5),
-        band: real(6),
-        linear: flag(7),
-        undamped: flag(8),
-        deadline: real(9),
-        junctions: string(10, 0),
+        deadline: real(5),
+        options: (declared().iter().zip(OWN_COUNT..))
+            .map(|(declared, n)| match declared.default {
+                Written::Flag(_) => flag(n).map(Written::Flag),
+                Written::Number(_) => real(n).map(Written::Number),
+                Written::Text(_) => string(n, 0).map(Written::Text),
+            })
+            .collect(),
     }
 }
 

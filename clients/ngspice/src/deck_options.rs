@@ -6,7 +6,7 @@ use bimorph::options::{CompileOptions, MODEL, ModelOption, Range, Refused, Value
 
 /// A value as a deck can write it.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Written {
+pub enum Written {
     /// `name=true`.
     Flag(bool),
     /// `name=1e-3`.
@@ -17,17 +17,17 @@ pub(crate) enum Written {
 
 /// A parameter as it is declared to the host.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Declared {
+pub struct Declared {
     /// Its name.
-    pub(crate) name: &'static str,
+    pub name: &'static str,
     /// What it reads where the line does not say it.
-    pub(crate) default: Written,
+    pub default: Written,
     /// What it means, with its unit.
-    pub(crate) text: String,
+    pub text: String,
 }
 
 /// The parameters, in the order of [`MODEL`].
-pub(crate) fn declared() -> Vec<Declared> {
+pub fn declared() -> Vec<Declared> {
     let declare = |ModelOption { about, .. }: &ModelOption| {
         let unit = if matches!(about.unit, "" | "1") { String::new() } else { format!(" [{}]", about.unit) };
         let zero = if about.default == Value::Unset { format!("; 0: {}", about.unset) } else { String::new() };
@@ -44,7 +44,7 @@ pub(crate) fn declared() -> Vec<Declared> {
 }
 
 /// A value as a deck writes it.
-pub(crate) fn written(value: &Value) -> Written {
+pub fn written(value: &Value) -> Written {
     match value {
         Value::Unset => Written::Number(0.0),
         Value::Flag(flag) => Written::Flag(*flag),
@@ -58,7 +58,7 @@ pub(crate) fn written(value: &Value) -> Written {
 ///
 /// # Errors
 /// [`Refused`]: a value that the option cannot have.
-pub(crate) fn choose(options: &mut CompileOptions, option: &ModelOption, written: &Written) -> Result<(), Refused> {
+pub fn choose(options: &mut CompileOptions, option: &ModelOption, written: &Written) -> Result<(), Refused> {
     let unset = option.about.default == Value::Unset;
     let value = match (written, option.about.range) {
         (Written::Number(x), _) if unset && *x == 0.0 => Value::Unset,

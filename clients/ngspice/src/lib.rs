@@ -12,7 +12,7 @@
 //! What ngspice's memory looks like: `abi` the structures, [`layout`] which host this is, `table` what the plug-in
 //! declares, `exports` the symbols, `host` the host's functions, `call` one call's data. Between the two sides stand
 //! `callbacks`, `opening` and `respond`, with the `registry` of instances. What does not know ngspice: [`model_card`],
-//! [`settings`] and `names` the `.model` line, [`opener`] from line to device, [`instance`] questions and outcomes,
+//! [`settings`], [`deck_options`] and `names` the `.model` line, [`opener`] from line to device, [`instance`] questions and outcomes,
 //! [`companion`] charges to currents, [`history`] what an accepted point leaves behind.
 //!
 //! This is the only crate of the project with `unsafe` code; each block says why it holds.
@@ -24,6 +24,7 @@ mod abi;
 mod call;
 mod callbacks;
 pub mod companion;
+pub mod deck_options;
 mod exports;
 pub mod history;
 mod host;

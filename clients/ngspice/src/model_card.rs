@@ -1,7 +1,9 @@
 //! The `.model` line of a device: what was given, checked and with its defaults.
 
+use crate::deck_options::{self, Written};
 use crate::settings::{self, Monitor};
-use bimorph::compile::{CompileOptions, Junctions};
+use bimorph::compile::CompileOptions;
+use bimorph::options::{MODEL, Refused};
 use std::time::Duration;
 use thiserror::Error;
 
@@ -18,18 +20,10 @@ pub struct RawCard {
     pub set: Vec<String>,
     /// `remote`
     pub remote: Option<String>,
-    /// `tol`
-    pub tol: Option<f64>,
-    /// `band` [Hz]
-    pub band: Option<f64>,
-    /// `linear`
-    pub linear: Option<bool>,
-    /// `undamped`
-    pub undamped: Option<bool>,
     /// `deadline` [s]
     pub deadline: Option<f64>,
-    /// `junctions`
-    pub junctions: Option<String>,
+    /// The options of the model, in the order of [`MODEL`]; those that were left out are none.
+    pub options: Vec<Option<Written>>,
 }
 
 /// A checked `.model` line.
@@ -64,12 +58,9 @@ pub enum CardError {
     /// An address that ngspice cut at its `//`.
     #[error("remote: ngspice takes // for a comment; write remote=\"unix:/PATH\" or remote=\"HOST:PORT\"")]
     Address,
-    /// No such kind of junctions.
-    #[error("junctions=\"{name}\": expected centreline, offset or calibrated")]
-    Junctions {
-        /// What was given.
-        name: String,
-    },
+    /// An option of the model that cannot be so.
+    #[error(transparent)]
+    Option(#[from] Refused),
     /// A number is not positive.
     #[error("{name}={value} must be positive")]
     NotPositive {
@@ -91,7 +82,7 @@ pub enum CardError {
 }
 
 /// Longest wait for a server's answer unless `deadline` says otherwise [s].
-const DEADLINE: f64 = 5.0;
+pub const DEADLINE: f64 = 5.0;
 
 impl ModelCard {
     /// Checks a line. `remote` is an address that overrides the line's, from outside the deck.
@@ -103,7 +94,15 @@ impl ModelCard {
             Some(value) if !(value.is_finite() && value > 0.0) => Err(CardError::NotPositive { name, value }),
             _ => Ok(value),
         };
-        let defaults = CompileOptions::default();
+        let mut options = CompileOptions {
+            set: settings::settings(&raw.set).map_err(|word| CardError::Set { word })?,
+            ..CompileOptions::default()
+        };
+        for (option, written) in MODEL.iter().zip(&raw.options) {
+            if let Some(written) = written {
+                deck_options::choose(&mut options, option, written)?;
+            }
+        }
         Ok(Self {
             file: raw.file.clone().filter(|f| !f.is_empty()).ok_or(CardError::NoFile)?,
             ports: settings::rejoin(&raw.ports),
@@ -112,18 +111,7 @@ impl ModelCard {
                 Some(cut) if ["unix:", "http:", "grpc:"].contains(&cut.as_str()) => return Err(CardError::Address),
                 address => address,
             },
-            options: CompileOptions {
-                set: settings::settings(&raw.set).map_err(|word| CardError::Set { word })?,
-                band: positive("band", raw.band)?,
-                tol: positive("tol", raw.tol)?.unwrap_or(defaults.tol),
-                linear: raw.linear.unwrap_or(defaults.linear),
-                undamped: raw.undamped.unwrap_or(defaults.undamped),
-                junctions: match &raw.junctions {
-                    Some(name) => Junctions::named(name).ok_or_else(|| CardError::Junctions { name: name.clone() })?,
-                    None => defaults.junctions,
-                },
-                ..defaults
-            },
+            options,
             deadline: Duration::from_secs_f64(positive("deadline", raw.deadline)?.unwrap_or(DEADLINE).min(1e6)),
         })
     }
@@ -146,9 +134,24 @@ impl ModelCard {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bimorph::options::{Formulation, Junctions, Scheme};
+
+    /// A line with these options.
+    fn with(given: &[(&str, Written)]) -> RawCard {
+        let find = |name: &str| given.iter().find(|(other, _)| *other == name).map(|(_, written)| written.clone());
+        assert!(given.iter().all(|(name, _)| MODEL.iter().any(|option| option.about.name == *name)));
+        RawCard { options: MODEL.iter().map(|option| find(option.about.name)).collect(), ..raw() }
+    }
 
     fn raw() -> RawCard {
         RawCard { file: Some("bank.net".into()), ..RawCard::default() }
+    }
+
+    /// `band=0` is what ngspice shows of a line without it, and takes a band back.
+    #[test]
+    fn a_band_of_zero_is_by_the_scene() {
+        let card = ModelCard::new(&with(&[("band", Written::Number(0.0))]), None).unwrap();
+        assert_eq!(card.options.band, None);
     }
 
     /// A line with a file alone is complete: in process, all ports, no monitors, the library's own defaults.
@@ -169,19 +172,36 @@ mod tests {
             monitors: words("yoke.y:1e6"),
             set: words("w 2u"),
             remote: Some("unix:///a".into()),
-            tol: Some(1e-4),
-            band: Some(1e6),
-            linear: Some(true),
-            undamped: Some(true),
             deadline: Some(0.5),
-            junctions: Some("offset".into()),
-            ..raw()
+            ..with(&[
+                ("tol", Written::Number(1e-4)),
+                ("band", Written::Number(1e6)),
+                ("linear", Written::Flag(true)),
+                ("undamped", Written::Flag(true)),
+                ("junctions", Written::Text("Offset".into())),
+                ("scheme", Written::Text("d1".into())),
+                ("segments", Written::Number(6.0)),
+                ("shear", Written::Flag(true)),
+                ("rotary_inertia", Written::Flag(true)),
+                ("formulation", Written::Text("rcr".into())),
+            ])
         };
         let card = ModelCard::new(&raw, None).unwrap();
         assert_eq!(card.remote.as_deref(), Some("unix:///a"));
-        assert_eq!((card.options.tol, card.options.band), (1e-4, Some(1e6)));
-        assert_eq!(card.options.junctions, Junctions::Offset);
-        assert!(card.options.linear && card.options.undamped && card.options.set.len() == 1);
+        let want = CompileOptions {
+            set: card.options.set.clone(),
+            tol: 1e-4,
+            band: Some(1e6),
+            linear: true,
+            undamped: true,
+            junctions: Junctions::Offset,
+            scheme: Scheme::D1,
+            segments: Some(6),
+            shear: true,
+            rotary_inertia: true,
+            formulation: Formulation::Rcr,
+        };
+        assert_eq!((&card.options, card.options.set.len()), (&want, 1));
         assert_eq!(card.deadline, Duration::from_millis(500));
         assert_eq!(ModelCard::new(&raw, Some("b:1".into())).unwrap().remote.as_deref(), Some("b:1"));
         assert_eq!(card.check_counts(1, 1), Err(CardError::Count { what: "ports", names: 2, nodes: 1 }));
@@ -192,10 +212,18 @@ mod tests {
     #[test]
     fn refusals() {
         assert_eq!(ModelCard::new(&RawCard::default(), None), Err(CardError::NoFile));
-        let bad = RawCard { tol: Some(0.0), ..raw() };
-        assert_eq!(ModelCard::new(&bad, None), Err(CardError::NotPositive { name: "tol", value: 0.0 }));
-        let bad = RawCard { junctions: Some("welded".into()), ..raw() };
-        assert_eq!(ModelCard::new(&bad, None), Err(CardError::Junctions { name: "welded".into() }));
+        for (name, bad) in [
+            ("tol", Written::Number(0.0)),
+            ("band", Written::Number(-1.0)),
+            ("segments", Written::Number(2.5)),
+            ("segments", Written::Number(1e6)),
+            ("junctions", Written::Text("welded".into())),
+        ] {
+            let refused = ModelCard::new(&with(&[(name, bad)]), None);
+            assert!(matches!(&refused, Err(CardError::Option(r)) if r.option == name), "{refused:?}");
+        }
+        let bad = RawCard { deadline: Some(0.0), ..raw() };
+        assert_eq!(ModelCard::new(&bad, None), Err(CardError::NotPositive { name: "deadline", value: 0.0 }));
         let bad = RawCard { remote: Some("unix:".into()), ..raw() };
         assert_eq!(ModelCard::new(&bad, None), Err(CardError::Address));
         let bad = RawCard { set: vec!["w".into()], ..raw() };

@@ -8,33 +8,69 @@ use crate::abi::{
     port,
 };
 use crate::callbacks;
+use crate::deck_options::{Declared, Written, declared};
 use crate::layout::{Layout, LayoutError, TABLE_WORDS};
+use crate::model_card::DEADLINE;
 use std::cell::UnsafeCell;
-use std::ffi::{CStr, c_char, c_int, c_void};
+use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::sync::OnceLock;
 
-/// Name of a parameter, how code models and how SPICE call its kind, and what it is.
-type Declaration = (&'static CStr, c_int, c_int, &'static CStr);
+/// A parameter of a `.model` line.
+pub(crate) struct Declaration {
+    name: CString,
+    /// How code models call its kind.
+    kind: c_int,
+    /// How SPICE does.
+    data_type: c_int,
+    /// What ngspice shows where the line leaves it out; none: no text, an empty list. From 43 on it refuses a line that
+    /// leaves out a number or a boolean without one; that a parameter was left out can still be told, so the plug-in itself
+    /// never reads these.
+    default: Option<Value>,
+    text: CString,
+}
 
 const STRINGS: c_int = kind::IF_STRING | kind::IF_VECTOR;
+const NOTHING: Value = Value { complex: Complex { re: 0.0, im: 0.0 } };
+
+/// The parameters that are the plug-in's own; the options of a model follow them.
+const OWN: [(&str, c_int, c_int, Option<f64>, &str); OWN_COUNT] = [
+    ("file", kind::STRING, kind::IF_STRING, None, "netlist of the mechanical part"),
+    ("ports", kind::STRING, STRINGS, None, "names of the electrical ports, in the order of the node pairs"),
+    ("monitors", kind::STRING, STRINGS, None, "signals shown as voltages, NAME or NAME:SCALE"),
+    ("set", kind::STRING, STRINGS, None, "netlist parameters, NAME=VALUE"),
+    ("remote", kind::STRING, kind::IF_STRING, None, "address of a server that steps the model"),
+    ("deadline", kind::REAL, kind::IF_REAL, Some(DEADLINE), "longest wait for the server [s]"),
+];
+/// How many they are.
+pub(crate) const OWN_COUNT: usize = 6;
 
 /// Parameters of a `.model` line, in the order of [`crate::call::card`].
-pub(crate) const PARAMETERS: [Declaration; 11] = [
-    (c"file", kind::STRING, kind::IF_STRING, c"netlist of the mechanical part"),
-    (c"ports", kind::STRING, STRINGS, c"names of the electrical ports, in the order of the node pairs"),
-    (c"monitors", kind::STRING, STRINGS, c"signals shown as voltages, NAME or NAME:SCALE"),
-    (c"set", kind::STRING, STRINGS, c"netlist parameters, NAME=VALUE"),
-    (c"remote", kind::STRING, kind::IF_STRING, c"address of a server that steps the model"),
-    (c"tol", kind::REAL, kind::IF_REAL, c"relative error aimed at"),
-    (c"band", kind::REAL, kind::IF_REAL, c"highest frequency to resolve [Hz]"),
-    (c"linear", kind::BOOLEAN, kind::IF_FLAG, c"small displacements about the drawn geometry"),
-    (c"undamped", kind::BOOLEAN, kind::IF_FLAG, c"leave out gas damping"),
-    (c"deadline", kind::REAL, kind::IF_REAL, c"longest wait for the server [s]"),
-    (c"junctions", kind::STRING, kind::IF_STRING, c"how beams meet: centreline, offset, calibrated"),
-];
+fn parameters() -> Vec<Declaration> {
+    let real = |x| Value { complex: Complex { re: x, im: 0.0 } };
+    let text = |text: &str| CString::new(text).unwrap_or_default();
+    let own = OWN.iter().map(|(name, kind, data_type, default, about)| Declaration {
+        name: text(name),
+        kind: *kind,
+        data_type: *data_type,
+        default: default.map(real),
+        text: text(about),
+    });
+    let option = |declared: Declared| {
+        let (kind, data_type, default) = match declared.default {
+            Written::Flag(flag) => {
+                let mut value = NOTHING;
+                value.flag = flag.into();
+                (kind::BOOLEAN, kind::IF_FLAG, Some(value))
+            }
+            Written::Number(x) => (kind::REAL, kind::IF_REAL, Some(real(x))),
+            Written::Text(_) => (kind::STRING, kind::IF_STRING, None),
+        };
+        Declaration { name: text(declared.name), kind, data_type, default, text: text(&declared.text) }
+    };
+    own.chain(declared().into_iter().map(option)).collect()
+}
 
 static ZERO: c_int = 0;
-static PARAMETER_COUNT: c_int = PARAMETERS.len() as c_int;
 
 /// Declarations whose addresses the host keeps.
 struct Declarations {
@@ -42,6 +78,9 @@ struct Declarations {
     connections: Vec<ConnectionInfo>,
     parameters42: Vec<ParameterInfo42>,
     parameters43: Vec<ParameterInfo43>,
+    count: c_int,
+    /// What the others point to.
+    _parameters: Vec<Declaration>,
 }
 
 // SAFETY: written once behind a `OnceLock`, then only read; the pointers in it point to constants.
@@ -62,7 +101,7 @@ fn declarations() -> &'static Declarations {
     DECLARATIONS.get_or_init(|| {
         let zero =
             Bound42 { flag: 0, integer: 0, real: 0.0, complex: Complex { re: 0.0, im: 0.0 }, string: std::ptr::null() };
-        let none = Value { complex: Complex { re: 0.0, im: 0.0 } };
+        let none = NOTHING;
         // Lists are declared to code models as single values: only so may one be left out, and have any length. The
         // SPICE half of the declaration, by which the line is parsed, says that they are lists.
         let rest = ParameterInfoTail {
@@ -75,29 +114,35 @@ fn declarations() -> &'static Declarations {
             upper: 0,
             null_allowed: 1,
         };
+        // What points into it stays where it is when the vector itself is moved.
+        let parameters = parameters();
         Declarations {
-            spice: PARAMETERS
+            spice: parameters
                 .iter()
                 .enumerate()
-                .map(|(id, (name, _, data_type, text))| SpiceParameter {
-                    keyword: name.as_ptr(),
+                .map(|(id, declared)| SpiceParameter {
+                    keyword: declared.name.as_ptr(),
                     id: id as c_int,
-                    data_type: data_type | kind::IF_ASK_SET,
-                    description: text.as_ptr(),
+                    data_type: declared.data_type | kind::IF_ASK_SET,
+                    description: declared.text.as_ptr(),
                 })
                 .collect(),
             connections: vec![
                 connection(c"ports", port::INOUT, &PORT_KINDS, false),
                 connection(c"monitors", port::OUT, &MONITOR_KINDS, true),
             ],
-            parameters42: PARAMETERS
+            parameters42: parameters
                 .iter()
-                .map(|(name, kind, _, text)| ParameterInfo42 {
-                    name: name.as_ptr(),
-                    description: text.as_ptr(),
-                    kind: *kind,
+                .map(|declared| ParameterInfo42 {
+                    name: declared.name.as_ptr(),
+                    description: declared.text.as_ptr(),
+                    kind: declared.kind,
                     has_default: 1,
-                    default: zero,
+                    default: declared.default.map_or(zero, |value| {
+                        // SAFETY: every bit of a value of either kind is set.
+                        let (flag, real) = unsafe { (value.flag, value.real) };
+                        Bound42 { flag, real, ..zero }
+                    }),
                     has_lower: 0,
                     lower: zero,
                     has_upper: 0,
@@ -105,14 +150,14 @@ fn declarations() -> &'static Declarations {
                     rest,
                 })
                 .collect(),
-            parameters43: PARAMETERS
+            parameters43: parameters
                 .iter()
-                .map(|(name, kind, _, text)| ParameterInfo43 {
-                    name: name.as_ptr(),
-                    description: text.as_ptr(),
-                    kind: *kind,
-                    default_count: 0,
-                    defaults: std::ptr::null(),
+                .map(|declared| ParameterInfo43 {
+                    name: declared.name.as_ptr(),
+                    description: declared.text.as_ptr(),
+                    kind: declared.kind,
+                    default_count: declared.default.is_some().into(),
+                    defaults: declared.default.as_ref().map_or(std::ptr::null(), |value| &raw const *value),
                     has_lower: 0,
                     lower: none,
                     has_upper: 0,
@@ -120,6 +165,8 @@ fn declarations() -> &'static Declarations {
                     rest,
                 })
                 .collect(),
+            count: parameters.len() as c_int,
+            _parameters: parameters,
         }
     })
 }
@@ -184,12 +231,12 @@ impl Table {
             self.put(16, &raw const ZERO); // terminals
             self.put(24, &raw const ZERO); // named terminals
             self.put(40, &raw const ZERO); // instance parameters
-            self.put(56, &raw const PARAMETER_COUNT);
+            self.put(56, &raw const declarations.count);
             self.put(64, declarations.spice.as_ptr());
             self.put(72, callbacks::evaluate as unsafe extern "C" fn(*mut c_void));
             self.put(80, declarations.connections.len() as c_int);
             self.put(88, declarations.connections.as_ptr());
-            self.put(96, PARAMETER_COUNT);
+            self.put(96, declarations.count);
         }
     }
 

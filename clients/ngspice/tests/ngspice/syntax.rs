@@ -59,7 +59,7 @@ fn refusals() {
             "ports: the .model line names 1, but the instance connects 2",
         ),
         (r#"file="plate""#, PLAIN, "monitors: the .model line names 0, but the instance connects 1"),
-        (r#"file="plate" monitors=["plate.x"] tol=-1"#, PLAIN, "tol=-1 must be positive"),
+        (r#"file="plate" monitors=["plate.x"] tol=-1"#, PLAIN, "tol: expected a number above 0, below 1, got -1"),
         (
             r#"file="plate" monitors=["plate.x"] set=["w"]"#,
             PLAIN,
