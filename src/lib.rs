@@ -25,5 +25,6 @@ pub mod refine;
 pub mod results;
 #[cfg(feature = "remote")]
 pub mod service;
+mod sets;
 pub mod solve;
 pub mod structure;

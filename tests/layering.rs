@@ -4,7 +4,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-const FLOORS: [&[&str]; 9] = [
+const FLOORS: [&[&str]; 10] = [
+    &["sets"],
     &["structure", "multibody"],
     &["netlist", "layout", "gaps", "results"],
     &["options"],
@@ -17,10 +18,10 @@ const FLOORS: [&[&str]; 9] = [
 ];
 
 /// The floor whose modules see each other.
-const TOGETHER: usize = 5;
+const TOGETHER: usize = 6;
 
 /// Words that belong to one floor and those above it.
-const RESERVED: [(&str, usize); 4] = [("tonic::", 7), ("tokio::", 7), ("prost::", 7), ("clap::", 8)];
+const RESERVED: [(&str, usize); 4] = [("tonic::", 8), ("tokio::", 8), ("prost::", 8), ("clap::", 9)];
 
 fn floor(module: &str) -> Option<usize> {
     FLOORS.iter().position(|floor| floor.contains(&module))

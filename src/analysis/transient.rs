@@ -7,6 +7,7 @@ use crate::compile::Compiled;
 use crate::gaps::{Ramp, System, contact};
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
+use crate::options::analysis::TRAN_POINTS;
 use crate::solve::adaptive::{Advance, Control, Observer};
 use crate::solve::dense::interpolate;
 use crate::solve::event::{Detector, Direction};
@@ -46,7 +47,7 @@ impl Default for TransientOptions<'_> {
         Self {
             stop: 1.0,
             signals: Vec::new(),
-            points: 1001,
+            points: TRAN_POINTS.count(),
             tol: 1e-3,
             voltages: Vec::new(),
             release: None,

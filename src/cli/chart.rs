@@ -10,6 +10,8 @@ use super::output::{check_folder, print, write_picture};
 use super::{interrupt, progress, value};
 use bimorph::analysis::chart::{Chart as Measured, ChartSpec, Formulation, Part, chart};
 use bimorph::analysis::integrator::Integrator;
+use bimorph::options::Value;
+use bimorph::options::analysis::CHART_POINTS;
 use bimorph::results::atomic;
 use bimorph::results::format::Format;
 use bimorph::solve::linear::SolverKind;
@@ -42,7 +44,7 @@ pub(crate) struct Chart {
     stop: Option<f64>,
 
     /// Output times at which errors are taken
-    #[arg(long, default_value_t = 401)]
+    #[arg(long, default_value_t = CHART_POINTS.count())]
     points: usize,
 
     /// Start from the equilibrium at this parameter's value; the parameter is 0 from t = 0
@@ -131,9 +133,7 @@ impl Chart {
             }
             check_folder(path)?;
         }
-        if !(2..=1_000_000).contains(&self.points) {
-            return Err(Failure::bad("--points", "2 to 1000000 output times", self.points.to_string()));
-        }
+        CHART_POINTS.check(&Value::Count(self.points))?;
         let spec = self.spec()?;
         let compiled = self.model.compile()?;
         let (bundle, options) = (self.model.bundle()?, self.model.options()?);

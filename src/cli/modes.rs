@@ -10,6 +10,8 @@ use bimorph::analysis::frame::{frame, frame_modes};
 use bimorph::analysis::modes::{ModesResult, modes_with_curves};
 use bimorph::analysis::statics::NodeMotion;
 use bimorph::compile::Compiled;
+use bimorph::options::Value;
+use bimorph::options::analysis::MODES_COUNT;
 use bimorph::results::format::Format;
 use bimorph::results::plot::animation::{self, Frame, Play};
 use bimorph::results::plot::axis::quantity;
@@ -36,7 +38,7 @@ pub(crate) struct Modes {
     model: ModelArgs,
 
     /// How many modes, from the lowest
-    #[arg(long, short = 'n', default_value_t = 6)]
+    #[arg(long, short = 'n', default_value_t = MODES_COUNT.count())]
     count: usize,
 
     /// Hold a port at a voltage [V]; others are at 0 V. Repeatable
@@ -67,9 +69,7 @@ struct Document<'a> {
 impl Modes {
     pub(crate) fn run(&self) -> Result<(), Failure> {
         self.output.check()?;
-        if self.count == 0 {
-            return Err(Failure::bad("--count", "at least one mode", "0"));
-        }
+        MODES_COUNT.check(&Value::Count(self.count))?;
         let compiled = match self.solver {
             ModelChoice::Recursion => self.model.compile()?,
             ModelChoice::Frame => self.model.compile_frame()?,

@@ -8,6 +8,8 @@ use bimorph::analysis::continuation::{ContinuationRequest, ContinuationResult, C
 use bimorph::analysis::statics::NodeMotion;
 use bimorph::compile::{Compiled, compile};
 use bimorph::netlist::Setting;
+use bimorph::options::Value;
+use bimorph::options::analysis::PATH_POINTS;
 use bimorph::results::plot::axis::quantity;
 use bimorph::results::plot::mechanism::{self, Drawing, Scale};
 use bimorph::results::plot::plane::{self, Curve, Mark, Plane, Sign};
@@ -46,7 +48,7 @@ pub(crate) struct PathCommand {
     branch: BranchArg,
 
     /// Most points
-    #[arg(long, default_value_t = 2000)]
+    #[arg(long, default_value_t = PATH_POINTS.count())]
     points: usize,
 
     /// Hold another port at a voltage [V]; others are at 0 V. Repeatable
@@ -104,9 +106,7 @@ struct Document<'a> {
 impl PathCommand {
     pub(crate) fn run(&self) -> Result<(), Failure> {
         self.output.check()?;
-        if self.points < 2 {
-            return Err(Failure::bad("--points", "at least 2", self.points.to_string()));
-        }
+        PATH_POINTS.check(&Value::Count(self.points))?;
         let drawn = self.model.compile()?;
         let ends = self.ends(&drawn)?;
         let first = ends.as_ref().map_or(&drawn, |[first, _]| first);

@@ -5,6 +5,8 @@ use super::model::{Context, ModelArgs};
 use super::output::OutputArgs;
 use super::{progress, report, value};
 use bimorph::analysis::pull_in::{PullInResult, pull_in};
+use bimorph::options::Value;
+use bimorph::options::analysis::PULL_IN_MAX;
 use bimorph::results::plot::axis::quantity;
 use bimorph::results::table::Table;
 use clap::Args;
@@ -26,7 +28,7 @@ pub(crate) struct Pullin {
     source: Option<String>,
 
     /// Highest voltage tried [V]
-    #[arg(long, default_value = "200", value_name = "VOLTS", value_parser = value::number, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = PULL_IN_MAX.number(), value_name = "VOLTS", value_parser = value::number, allow_negative_numbers = true)]
     max: f64,
 
     #[command(flatten)]
@@ -49,9 +51,7 @@ impl Pullin {
             let hint = "write .csv or .raw";
             return Err(Failure::NoSuchOutput { what: "pullin", kind: "picture", hint });
         }
-        if self.max <= 0.0 {
-            return Err(Failure::bad("--max", "a voltage above 0 V", self.max.to_string()));
-        }
+        PULL_IN_MAX.check(&Value::Number(self.max))?;
         let compiled = self.model.compile()?;
         let busy = progress::spinner("pull-in");
         let result = pull_in(&compiled, self.source.as_deref(), self.max);

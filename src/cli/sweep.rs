@@ -5,6 +5,8 @@ use super::model::ModelArgs;
 use super::output::{check_folder, print};
 use super::{interrupt, progress, value};
 use bimorph::jobs::sweep::{self, Shard, SweepAnalysis, SweepParameter, SweepProgress, SweepSpec, SweepTable};
+use bimorph::options::Value;
+use bimorph::options::analysis::{MODES_COUNT, PULL_IN_MAX};
 use bimorph::results::atomic;
 use bimorph::service::client::Client;
 use clap::{Args, ValueEnum};
@@ -34,7 +36,7 @@ pub(crate) struct Sweep {
     analysis: Analysis,
 
     /// Modes: how many
-    #[arg(long, short = 'n', default_value_t = 6)]
+    #[arg(long, short = 'n', default_value_t = MODES_COUNT.count())]
     count: usize,
 
     /// Static: columns wanted, NODE.x, NODE.y, NODE.rz, PORT.i, PORT.q, BEAM.T [default: every node]
@@ -50,7 +52,7 @@ pub(crate) struct Sweep {
     source: Option<String>,
 
     /// Pull-in: highest voltage tried [V]
-    #[arg(long, default_value = "200", value_name = "VOLTS", value_parser = value::number, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = PULL_IN_MAX.number(), value_name = "VOLTS", value_parser = value::number, allow_negative_numbers = true)]
     max: f64,
 
     /// Run part I of N (I from 0) of the grid
@@ -116,11 +118,12 @@ impl Sweep {
 
     fn spec(&self) -> Result<SweepSpec, Failure> {
         let parameters = self.parameters.iter().map(|text| text.parse()).collect::<Result<Vec<SweepParameter>, _>>()?;
+        MODES_COUNT.check(&Value::Count(self.count))?;
+        PULL_IN_MAX.check(&Value::Number(self.max))?;
         let analysis = match self.analysis {
             Analysis::Static => {
                 SweepAnalysis::Static { outputs: value::names(&self.signals), voltages: self.ports.clone() }
             }
-            Analysis::Modes if self.count == 0 => return Err(Failure::bad("--count", "at least one mode", "0")),
             Analysis::Modes => SweepAnalysis::Modes { count: self.count, voltages: self.ports.clone() },
             Analysis::Pullin => SweepAnalysis::PullIn { port: self.source.clone(), max: self.max },
         };

@@ -12,6 +12,8 @@ use bimorph::analysis::integrator::Integrator;
 use bimorph::analysis::joint_transient::{JointReport, joint_transient};
 use bimorph::analysis::transient::{Counters, Event, TransientOptions, TransientResult, transient};
 use bimorph::compile::Compiled;
+use bimorph::options::Value;
+use bimorph::options::analysis::{TRAN_POINTS, TRAN_RHO, TRAN_STEP, TRAN_STOP};
 use bimorph::results::plot::axis::quantity;
 use bimorph::results::plot::chart::{self, Chart, Panel, Series};
 use bimorph::results::plot::svg::Picture;
@@ -60,7 +62,7 @@ pub(crate) struct Tran {
     stop: f64,
 
     /// Number of equally spaced output times, both ends included
-    #[arg(long, default_value_t = 1001)]
+    #[arg(long, default_value_t = TRAN_POINTS.count())]
     points: usize,
 
     /// Signals wanted: a,b or repeated [default: x and y of every free node]
@@ -129,12 +131,10 @@ impl Tran {
                 return Err(Failure::bad("--draw", "--solver recursion or another of its equations", "--solver frame"));
             }
         }
-        if self.stop <= 0.0 {
-            return Err(Failure::bad("--stop", "a time above 0 s", self.stop.to_string()));
-        }
-        if !(2..=10_000_000).contains(&self.points) {
-            return Err(Failure::bad("--points", "2 to 10000000 output times", self.points.to_string()));
-        }
+        TRAN_STOP.check(&Value::Number(self.stop))?;
+        TRAN_POINTS.check(&Value::Count(self.points))?;
+        TRAN_STEP.check(&self.step.map_or(Value::Unset, Value::Number))?;
+        TRAN_RHO.check(&Value::Number(self.rho.unwrap_or(TRAN_RHO.number())))?;
         let formulation = self.model.options()?.formulation;
         let method = self.integrator(formulation)?;
         let initial = match self.solver {
@@ -229,10 +229,7 @@ impl Tran {
             ));
         }
         match (method, self.rho) {
-            (Integrator::GeneralizedAlpha { .. }, Some(rho)) if (0.0..=1.0).contains(&rho) => {
-                Ok(Integrator::GeneralizedAlpha { rho })
-            }
-            (Integrator::GeneralizedAlpha { .. }, Some(rho)) => Err(Failure::bad("--rho", "0 to 1", rho.to_string())),
+            (Integrator::GeneralizedAlpha { .. }, Some(rho)) => Ok(Integrator::GeneralizedAlpha { rho }),
             (_, Some(_)) => Err(Failure::bad("--rho", "--method generalized-alpha beside it", name.to_owned())),
             (method, None) => Ok(method),
         }

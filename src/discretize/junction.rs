@@ -91,14 +91,18 @@ pub fn find(structure: &Structure, rigid: &Assembly, kind: Junctions) -> Ends {
 impl Ends {
     /// Takes away the mass that junctions have twice, and adds what corners lack.
     pub fn correct_mass(&self, structure: &Structure, undamped: bool, rigid: &mut Assembly) {
+        let mut shortest = vec![f64::INFINITY; structure.nodes.len()];
+        for beam in &structure.beams {
+            for node in [beam.a, beam.b] {
+                shortest[node.0] = shortest[node.0].min(beam.length);
+            }
+        }
         for (node, strips, beam) in &self.meetings {
             let beam = &structure.beams[*beam];
             let m = &beam.material;
             let mut excess = overlap::overlap(strips);
             // beams shorter than the junction have no such overlap
-            let shortest = (structure.beams.iter().filter(|b| b.a.0 == *node || b.b.0 == *node))
-                .map(|b| b.length)
-                .fold(f64::INFINITY, f64::min);
+            let shortest = shortest[*node];
             let widest = strips.iter().map(|s| s.width).fold(0.0, f64::max);
             let scale = -m.density * beam.thickness * (shortest / widest).min(1.0);
             excess.amount *= scale;

@@ -7,6 +7,7 @@
 use crate::gaps::Point;
 use crate::multibody::planar::JointFrame;
 use crate::multibody::{Body, BodyId, BodyName, Drag, Joint};
+use crate::sets::Sets;
 use crate::structure::{Mass, Structure};
 use nalgebra::{Matrix2, Matrix3, Vector2};
 
@@ -58,16 +59,15 @@ impl Assembly {
     /// Groups the nodes of a drawing, of which the beams marked in `rigid` are links too.
     pub fn new(structure: &Structure, rigid: &[bool]) -> Self {
         let count = structure.nodes.len();
-        let mut leader: Vec<usize> = (0..count).collect();
+        let mut joined = Sets::new(count);
         let stiff = structure.beams.iter().zip(rigid).filter(|(_, rigid)| **rigid).map(|(beam, _)| (beam.a, beam.b));
         for (a, b) in structure.links.iter().map(|link| (link.a, link.b)).chain(stiff) {
-            let (a, b) = (root(&mut leader, a.0), root(&mut leader, b.0));
-            leader[a.max(b)] = a.min(b);
+            joined.join(a.0, b.0);
         }
         let mut anchored = vec![false; count];
         for support in &structure.supports {
             if support.held == [true; 3] {
-                anchored[root(&mut leader, support.node.0)] = true;
+                anchored[joined.first(support.node.0)] = true;
             }
         }
         let position: Vec<_> = structure.nodes.iter().map(|n| Vector2::new(n.position[0], n.position[1])).collect();
@@ -77,7 +77,7 @@ impl Assembly {
             if !structure.nodes[node].mechanical {
                 continue;
             }
-            let first = root(&mut leader, node);
+            let first = joined.first(node);
             if anchored[first] {
                 continue;
             }
@@ -269,12 +269,4 @@ impl Rough {
         }
         Some(p)
     }
-}
-
-fn root(leader: &mut [usize], mut node: usize) -> usize {
-    while leader[node] != node {
-        leader[node] = leader[leader[node]];
-        node = leader[node];
-    }
-    node
 }

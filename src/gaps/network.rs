@@ -5,6 +5,7 @@
 //! source voltages, found once by modified nodal analysis (Ho, Ruehli, Brennan 1975), and by reciprocity the same numbers
 //! divide displacement currents among the ports.
 
+use crate::sets::Sets;
 use nalgebra::{DMatrix, DVector};
 use thiserror::Error;
 
@@ -45,28 +46,27 @@ impl Circuit {
     /// [`SourceLoop`].
     pub fn solve(&self) -> Result<Potentials, SourceLoop> {
         // spanning forest: sources first, to find loops of sources; then resistors, to find parts without ground
-        let mut part: Vec<usize> = (0..=self.nodes).collect();
+        let mut part = Sets::new(self.nodes + 1);
         let ground = self.nodes;
         for &node in &self.grounds {
-            join(&mut part, node, ground);
+            part.join(node, ground);
         }
         for (index, &(plus, minus)) in self.sources.iter().enumerate() {
-            if !join(&mut part, plus, minus.unwrap_or(ground)) {
+            if !part.join(plus, minus.unwrap_or(ground)) {
                 return Err(SourceLoop { source_index: index });
             }
         }
         for &(a, b, _) in &self.resistors {
-            join(&mut part, a, b);
+            part.join(a, b);
         }
         let mut fixed = vec![false; self.nodes];
         for &node in &self.grounds {
             fixed[node] = true;
         }
         for (node, fix) in fixed.iter_mut().enumerate() {
-            let root = find(&mut part, node);
-            if root != find(&mut part, ground) {
+            if !part.together(node, ground) {
                 *fix = true;
-                join(&mut part, node, ground);
+                part.join(node, ground);
             }
         }
         let mut row = vec![usize::MAX; self.nodes];
@@ -119,21 +119,6 @@ impl Potentials {
     pub fn difference(&self, a: usize, b: usize) -> DVector<f64> {
         (self.potential.row(a) - self.potential.row(b)).transpose()
     }
-}
-
-fn find(part: &mut [usize], mut node: usize) -> usize {
-    while part[node] != node {
-        part[node] = part[part[node]];
-        node = part[node];
-    }
-    node
-}
-
-/// Joins two parts; false when they were one already.
-fn join(part: &mut [usize], a: usize, b: usize) -> bool {
-    let (a, b) = (find(part, a), find(part, b));
-    part[a] = b;
-    a != b
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@ use super::order::elimination_order;
 use super::pattern::Pattern;
 use super::planar::{Block, JointFrame, Pose};
 use super::section::{LaidJoint, NONE, Place, Section, Sections};
+use crate::sets::Sets;
 use nalgebra::{Matrix2, Matrix3, Matrix6, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -204,13 +205,12 @@ impl Model {
     pub fn grounded(&self, body: usize) -> bool {
         // joints in any order join sets of bodies; ground is one more
         let ground = self.bodies.len();
-        let mut leader: Vec<usize> = (0..=ground).collect();
+        let mut joined = Sets::new(ground + 1);
         let index = |id: u32| if id == NONE { ground } else { id as usize };
         for joint in &self.joints {
-            let (a, b) = (root(&mut leader, index(joint.place.a)), root(&mut leader, index(joint.place.b)));
-            leader[a] = b;
+            joined.join(index(joint.place.a), index(joint.place.b));
         }
-        root(&mut leader, body) == root(&mut leader, ground)
+        joined.together(body, ground)
     }
 
     /// What a joint shares with others.
@@ -288,13 +288,4 @@ fn locate(pattern: &Pattern, a: BodyId, b: BodyId) -> Place {
         _ => NONE,
     };
     Place { a: index(a), b: index(b), block }
-}
-
-/// The set that `k` belongs to.
-fn root(leader: &mut [usize], mut k: usize) -> usize {
-    while leader[k] != k {
-        leader[k] = leader[leader[k]];
-        k = leader[k];
-    }
-    k
 }

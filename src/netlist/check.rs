@@ -5,6 +5,7 @@ use super::drawing::{Drawing, Fact};
 use super::sink::Sink;
 use super::suggest::did_you_mean;
 use super::value::short;
+use crate::sets::Sets;
 use crate::structure::{GapVoltage, NodeId, Structure};
 
 /// So many loose parts or floating nodes are told one by one.
@@ -18,7 +19,7 @@ pub(crate) fn check(drawing: &Drawing, sink: &mut Sink) {
     facts(drawing, sink);
     let structure = &drawing.structure;
     let mut connected = vec![false; structure.nodes.len()];
-    let mut parts = Groups::new(structure.nodes.len());
+    let mut parts = Sets::new(structure.nodes.len());
     for (a, b) in mechanical_connections(structure) {
         connected[a.0] = true;
         connected[b.0] = true;
@@ -101,16 +102,16 @@ fn loose_nodes(drawing: &Drawing, connected: &[bool], sink: &mut Sink) {
 }
 
 /// A part that no support holds in any direction.
-fn unheld_parts(drawing: &Drawing, connected: &[bool], parts: &mut Groups, sink: &mut Sink) {
+fn unheld_parts(drawing: &Drawing, connected: &[bool], parts: &mut Sets, sink: &mut Sink) {
     let structure = &drawing.structure;
     let mut held = vec![false; structure.nodes.len()];
     for support in &structure.supports {
-        held[parts.root(support.node.0)] = true;
+        held[parts.first(support.node.0)] = true;
     }
     let mut told = vec![false; structure.nodes.len()];
     let mut loose = Vec::new();
     for index in (0..structure.nodes.len()).filter(|&i| connected[i]) {
-        let root = parts.root(index);
+        let root = parts.first(index);
         if !held[root] && !std::mem::replace(&mut told[root], true) {
             loose.push(index);
         }
@@ -131,7 +132,7 @@ fn unheld_parts(drawing: &Drawing, connected: &[bool], parts: &mut Groups, sink:
 /// Potentials that no port, source or ground fixes.
 fn floating_potentials(drawing: &Drawing, sink: &mut Sink) {
     let structure = &drawing.structure;
-    let mut nets = Groups::new(structure.nodes.len() + 1);
+    let mut nets = Sets::new(structure.nodes.len() + 1);
     let ground = structure.nodes.len();
     for resistor in &structure.resistors {
         nets.join(resistor.a.0, resistor.b.0);
@@ -154,8 +155,8 @@ fn floating_potentials(drawing: &Drawing, sink: &mut Sink) {
     let mut told = vec![false; structure.nodes.len() + 1];
     let mut floating = Vec::new();
     for index in (0..structure.nodes.len()).filter(|&i| structure.nodes[i].electrical) {
-        let root = nets.root(index);
-        if root != nets.root(ground) && !std::mem::replace(&mut told[root], true) {
+        let root = nets.first(index);
+        if root != nets.first(ground) && !std::mem::replace(&mut told[root], true) {
             floating.push(index);
         }
     }
@@ -176,29 +177,5 @@ fn floating_potentials(drawing: &Drawing, sink: &mut Sink) {
             let message = format!("both electrodes of a gap are the node `{name}`: it never has a voltage");
             sink.warning("W014", drawing.first_named[a.0], message, "");
         }
-    }
-}
-
-/// Disjoint sets (Tarjan 1975): union by index, path halving.
-struct Groups {
-    parent: Vec<usize>,
-}
-
-impl Groups {
-    fn new(count: usize) -> Self {
-        Self { parent: (0..count).collect() }
-    }
-
-    fn root(&mut self, mut of: usize) -> usize {
-        while self.parent[of] != of {
-            self.parent[of] = self.parent[self.parent[of]];
-            of = self.parent[of];
-        }
-        of
-    }
-
-    fn join(&mut self, a: usize, b: usize) {
-        let (a, b) = (self.root(a), self.root(b));
-        self.parent[a.max(b)] = a.min(b);
     }
 }

@@ -3,9 +3,11 @@
 //! | file | what it holds |
 //! |---|---|
 //! | [`model`] | the table of the options of a model |
+//! | [`analysis`] | options of single analyses |
 //! | [`table`] | what an option is, and the check of a value |
 //! | [`choices`] | the names that some options take |
 
+pub mod analysis;
 pub mod choices;
 pub mod model;
 pub mod table;

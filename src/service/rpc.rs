@@ -19,6 +19,8 @@ use crate::analysis::{modes, pull_in, statics};
 use crate::compile::{CompileError, CompileOptions, compile};
 use crate::device::Token;
 use crate::netlist::Bundle;
+use crate::options::Value;
+use crate::options::analysis::{MODES_COUNT, PULL_IN_MAX, TRAN_POINTS, TRAN_RHO, TRAN_STEP, TRAN_STOP};
 use proto::device_reply::Kind as ReplyKind;
 use proto::sweep_status::State;
 use std::pin::Pin;
@@ -47,8 +49,6 @@ pub(super) struct Calls(pub(super) Arc<Shared>);
 
 /// Time between two messages of WatchSweep.
 const WATCH_INTERVAL: Duration = Duration::from_millis(100);
-/// Output times of a transient that names none.
-const DEFAULT_POINTS: usize = 201;
 
 type Reply<T> = Result<Response<T>, Status>;
 
@@ -160,7 +160,7 @@ impl proto::bimorph_server::Bimorph for Calls {
     async fn modes(&self, request: Request<proto::ModesRequest>) -> Reply<proto::ModesResponse> {
         let request = request.into_inner();
         let voltages = voltages(request.voltages)?;
-        let count = if request.count == 0 { sweeps_wire::DEFAULT_MODES } else { request.count as usize };
+        let count = if request.count == 0 { MODES_COUNT.count() } else { request.count as usize };
         if count > self.0.limits.modes {
             return Err(status::limit("modes", self.0.limits.modes, count));
         }
@@ -173,7 +173,8 @@ impl proto::bimorph_server::Bimorph for Calls {
 
     async fn pull_in(&self, request: Request<proto::PullInRequest>) -> Reply<proto::PullInResponse> {
         let request = request.into_inner();
-        let max = convert::number("max_v", request.max_v, true).map_err(status::violation)?;
+        let max = request.max_v;
+        convert::options::analysis(&PULL_IN_MAX, Value::Number(max)).map_err(status::violation)?;
         let port = (!request.port.is_empty()).then_some(request.port);
         let job = move |model: &Model| {
             let result = pull_in::pull_in(&model.compiled, port.as_deref(), max).map_err(status::analysis)?;
@@ -191,15 +192,15 @@ impl proto::bimorph_server::Bimorph for Calls {
             "" => None,
             id => Some(self.0.models.get(id)?),
         };
-        let stop = convert::number("stop_s", request.stop_s, true).map_err(status::violation)?;
+        let given = |about, value| convert::options::analysis(about, value).map_err(status::violation);
+        let stop = request.stop_s;
+        given(&TRAN_STOP, Value::Number(stop))?;
         let tol = match request.tol {
             0.0 => model.compiled.options.tol,
             tol => convert::number("tol", tol, true).map_err(status::violation)?,
         };
-        let points = if request.points == 0 { DEFAULT_POINTS } else { request.points as usize };
-        if points < 2 {
-            return Err(status::violation(Violation::new("points", "expected at least 2, both ends, got 1")));
-        }
+        let points = if request.points == 0 { TRAN_POINTS.count() } else { request.points as usize };
+        given(&TRAN_POINTS, Value::Count(points))?;
         let values = points.saturating_mul(request.signals.len() + 1);
         if values > self.0.limits.transient_values {
             return Err(status::limit("transient_values", self.0.limits.transient_values, values));
@@ -213,7 +214,8 @@ impl proto::bimorph_server::Bimorph for Calls {
         };
         let method = match (method, request.rho) {
             (Integrator::GeneralizedAlpha { .. }, Some(rho)) => {
-                Integrator::GeneralizedAlpha { rho: convert::number("rho", rho, false).map_err(status::violation)? }
+                given(&TRAN_RHO, Value::Number(rho))?;
+                Integrator::GeneralizedAlpha { rho }
             }
             (_, Some(_)) => {
                 return Err(status::violation(Violation::new("rho", "expected only with method generalized-alpha")));
@@ -222,7 +224,10 @@ impl proto::bimorph_server::Bimorph for Calls {
         };
         let step = match request.step_s {
             0.0 => None,
-            step => Some(convert::number("step_s", step, true).map_err(status::violation)?),
+            step => {
+                given(&TRAN_STEP, Value::Number(step))?;
+                Some(step)
+            }
         };
         let events = convert::pairs(request.events);
         let (signals, voltages) = (request.signals, voltages(request.voltages)?);

@@ -132,7 +132,7 @@ impl<M: Method> Adaptive<M> {
                 self.rejected += 1;
                 rejected += 1;
                 *h = step_size::rejected(step, error, exponent, 0.1);
-                if rejected > MAX_REJECTED || *h < 1e-12 * ramp.dt.min(*h * 1e12) || *h < f64::MIN_POSITIVE {
+                if rejected > MAX_REJECTED || s + *h <= s {
                     stepped.map_err(|e| failed(system, s, step, e))?;
                     return Err(self.too_small(system, s, step, rejected));
                 }

@@ -22,6 +22,7 @@ use crate::gaps::System;
 use crate::multibody::BlockMatrix;
 use crate::multibody::factor::ZeroPivot;
 use crate::multibody::planar::Pose;
+use crate::options::analysis::PATH_POINTS;
 
 /// Where to go at a bifurcation that takes the path's stability away.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -48,7 +49,7 @@ pub struct ContinuationOptions {
     pub smallest: f64,
     /// Smallest cosine between the tangents at both ends of a step, default 0.98. Larger: more points where the path bends.
     pub straightness: f64,
-    /// Most points, default 2000.
+    /// Most points.
     pub points: usize,
     /// The path ends where s falls below this, default −1.
     pub lowest: f64,
@@ -64,7 +65,7 @@ impl Default for ContinuationOptions {
             longest: 0.04,
             smallest: 1e-9,
             straightness: 0.98,
-            points: 2000,
+            points: PATH_POINTS.count(),
             lowest: -1.0,
             branch: Branch::Plus,
         }

@@ -35,6 +35,7 @@ fn every_solver_gives_the_same_motion() {
     for kind in SolverKind::ALL {
         let other = run(kind);
         assert_eq!(other.counters, recursion.counters, "{}", kind.name());
+        assert_eq!(other.signals.len(), 2);
         for (a, b) in other.signals.iter().zip(&recursion.signals) {
             let amplitude = b.2.iter().fold(0.0f64, |m, v| m.max(v.abs()));
             let apart = a.2.iter().zip(&b.2).fold(0.0f64, |m, (a, b)| m.max((a - b).abs()));
@@ -83,7 +84,9 @@ fn a_coarse_frame_is_that_of_another_program() {
         2254014.787442343,
         2275633.3905416466,
     ];
-    for (got, want) in fine_modes(1, false).iter().zip(want) {
+    let got = fine_modes(1, false);
+    assert!(got.len() >= want.len());
+    for (got, want) in got.iter().zip(want) {
         close(*got, want, 1e-8);
     }
 }
@@ -147,6 +150,7 @@ fn frame_modes_agree_with_the_segments() {
     let own = modes(&compiled, 10, &[]).unwrap().frequencies_hz;
     let frame = frame(&compiled).unwrap();
     let framed = frame_modes(&compiled, &frame, 10, &[]).unwrap().0.frequencies_hz;
+    assert_eq!((framed.len(), own.len()), (10, 10));
     for (a, b) in framed.iter().zip(&own) {
         close(*a, *b, 2e-3);
     }
@@ -174,6 +178,7 @@ fn frame_motion_agrees_with_the_linear_model() {
     let (a, b) = (&framed.signals[0].2, &own.signals[0].2);
     let amplitude = b[0].abs();
     close(a[0], b[0], 1e-6);
+    assert_eq!((a.len(), b.len()), (401, 401));
     for (a, b) in a.iter().zip(b) {
         assert!((a - b).abs() < 2e-3 * amplitude, "{a:e} {b:e}");
     }

@@ -83,6 +83,7 @@ fn frequencies_hold_their_tolerance() {
         let band = roots[2] * roots[2] * unit;
         let compiled = model(&text, &CompileOptions { band: Some(band), tol: 1e-3, ..CompileOptions::default() });
         let found = modes(&compiled, 3, &[]).unwrap();
+        assert_eq!(found.frequencies_hz.len(), roots.len());
         for (f, root) in found.frequencies_hz.iter().zip(roots) {
             close(*f, root * root * unit, 1.1e-3);
         }
@@ -107,6 +108,7 @@ fn bank_modes() {
     let compiled = model(&text, &CompileOptions { band: Some(1.3e6), ..CompileOptions::default() });
     let found = modes(&compiled, 10, &[]).unwrap();
     let want = [86.3, 407.7, 408.1, 418.0, 627.0, 641.6, 798.5, 1123.4, 1123.9, 1141.7];
+    assert_eq!(found.frequencies_hz.len(), want.len());
     for (f, want) in found.frequencies_hz.iter().zip(want) {
         close(*f, 1e3 * want, 2e-3);
     }

@@ -23,6 +23,7 @@ fn band(band: f64) -> CompileOptions {
 
 fn frequencies(compiled: &Compiled, want: &[f64], relative: f64) {
     let found = modes(compiled, want.len(), &[]).unwrap().frequencies_hz;
+    assert_eq!(found.len(), want.len());
     for (found, want) in found.iter().zip(want) {
         close(*found, *want, relative);
     }

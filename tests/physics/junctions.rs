@@ -26,6 +26,7 @@ fn five_layouts_in_plane_stress() {
         let compiled = compile(&Bundle::read(&path, &[]).unwrap(), &options).unwrap();
         assert_eq!(compiled.options.junctions, Junctions::Calibrated);
         let found = modes(&compiled, reference.len(), &[]).unwrap().frequencies_hz;
+        assert_eq!(found.len(), reference.len());
         for (k, (found, wanted)) in found.iter().zip(reference).enumerate() {
             println!("{name} mode {}: {:+.2} %", k + 1, 100.0 * (found / wanted - 1.0));
             close(*found, wanted, 6.5e-3);

@@ -135,6 +135,7 @@ fn multimode_resonator() {
     let found = modes(&compiled, 6, &[]).unwrap().frequencies_hz;
     let want =
         [1554.76457037644, 18623.7477677747, 27165.652658913, 111567.511621121, 114404.522008679, 198384.753038686];
+    assert_eq!(found.len(), want.len());
     for (found, want) in found.iter().zip(want) {
         close(*found, want, 2e-3);
     }

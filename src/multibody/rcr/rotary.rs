@@ -12,6 +12,7 @@
 use crate::multibody::planar::Symmetric;
 use crate::multibody::section::Section;
 use crate::multibody::{BodyId, Model};
+use crate::sets::Sets;
 use nalgebra::Matrix3;
 
 /// Coordinates and constraints as the paper counts them: loops cut through bodies, the last body free.
@@ -69,19 +70,17 @@ impl Model {
 
     /// Coordinates, loops and constraints as the paper counts them.
     pub fn counts(&self) -> Counts {
-        let mut part: Vec<usize> = (0..self.bodies.len()).collect();
-        let mut parts = part.len();
+        let mut joined = Sets::new(self.bodies.len());
+        let mut parts = self.bodies.len();
         let mut edges = 0;
         let mut coordinates = 0;
         for joint in (0..self.joints.len()).map(|k| self.joint(k)).filter(|j| j.a != j.b) {
             edges += 1;
             coordinates += joint.locked.iter().filter(|&&l| !l).count();
-            if let (BodyId::Free(a), BodyId::Free(b)) = (joint.a, joint.b) {
-                let (a, b) = (root(&mut part, a), root(&mut part, b));
-                if a != b {
-                    part[a] = b;
-                    parts -= 1;
-                }
+            if let (BodyId::Free(a), BodyId::Free(b)) = (joint.a, joint.b)
+                && joined.join(a, b)
+            {
+                parts -= 1;
             }
         }
         // every part floats on one body, so that each of its ways to ground closes a loop
@@ -90,12 +89,4 @@ impl Model {
             self.bodies.iter().map(|b| b.free.as_ref().map_or(0, |p| 3 - p.trace().round() as usize)).sum();
         Counts { coordinates: coordinates + 3 * parts, loops, constraints: 3 * loops + held }
     }
-}
-
-fn root(part: &mut [usize], mut k: usize) -> usize {
-    while part[k] != k {
-        part[k] = part[part[k]];
-        k = part[k];
-    }
-    k
 }

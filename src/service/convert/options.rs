@@ -6,7 +6,7 @@
 use super::Violation;
 use super::model::{setting_from_wire, setting_to_wire};
 use crate::compile::CompileOptions;
-use crate::options::{MODEL, ModelOption, Range, Refused, Value};
+use crate::options::{Described, MODEL, ModelOption, Range, Refused, Value};
 use crate::service::proto;
 use prost::Message;
 use prost::encoding::{DecodeContext, WireType, decode_key, decode_varint, encode_key, encode_varint, skip_field};
@@ -48,6 +48,14 @@ pub(crate) fn refused(refused: Refused) -> Violation {
     let option = MODEL.iter().find(|option| option.about.name == refused.option);
     let field = option.map_or_else(|| format!("options.{}", refused.option), field);
     Violation::new(field, format!("expected {}, got {}", refused.expected, refused.got))
+}
+
+/// Refuses a value that an option of an analysis cannot have.
+///
+/// # Errors
+/// A violation of its field.
+pub(crate) fn analysis(about: &Described, value: Value) -> Result<(), Violation> {
+    about.check(&value).map_err(|r| Violation::new(about.wire, format!("expected {}, got {}", r.expected, r.got)))
 }
 
 fn field(option: &ModelOption) -> String {

@@ -4,12 +4,10 @@ use super::model::{setting_from_wire, setting_to_wire};
 use super::{Violation, named, number, required, voltages};
 use crate::jobs::sweep::parse::linear;
 use crate::jobs::sweep::{Shard, SweepAnalysis, SweepParameter, SweepRow, SweepSpec, SweepTable};
+use crate::options::analysis::MODES_COUNT;
 use crate::service::proto;
 use proto::sweep_parameter::Values;
 use proto::sweep_spec::Analysis;
-
-/// Modes per point when a request leaves it open, as in `ModesRequest`.
-pub(crate) const DEFAULT_MODES: usize = 6;
 
 /// A specification as it travels.
 pub fn spec_to_wire(spec: &SweepSpec) -> proto::SweepSpec {
@@ -54,7 +52,7 @@ pub fn spec_from_wire(spec: Option<proto::SweepSpec>, most: usize) -> Result<Swe
             SweepAnalysis::Static { outputs: s.outputs, voltages: voltages("spec.static.voltages", s.voltages)? }
         }
         Analysis::Modes(m) => {
-            let count = if m.count == 0 { DEFAULT_MODES } else { m.count as usize };
+            let count = if m.count == 0 { MODES_COUNT.count() } else { m.count as usize };
             SweepAnalysis::Modes { count, voltages: voltages("spec.modes.voltages", m.voltages)? }
         }
         Analysis::PullIn(p) => SweepAnalysis::PullIn {

@@ -177,7 +177,7 @@ class Model:
         stop: float,
         signals: Sequence[str],
         *,
-        points: int = 201,
+        points: int = 1001,
         tol: float = 0.0,
         voltages: Voltages | None = None,
         release: Model | None = None,

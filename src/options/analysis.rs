@@ -1,0 +1,118 @@
+//! Options of single analyses: the same defaults and ranges on the command line, on the wire and in Python.
+
+use super::table::{Described, Range, Value};
+
+/// Most output times of a run: each holds every signal as a double.
+const MOST_POINTS: usize = 10_000_000;
+
+/// `tran`: output times.
+pub static TRAN_POINTS: Described = Described {
+    name: "points",
+    wire: "points",
+    unit: "",
+    range: Range::Count(2, MOST_POINTS),
+    default: Value::Count(1001),
+    unset: "",
+    help: "Number of equally spaced output times, both ends included",
+};
+
+/// `tran`: the end.
+pub static TRAN_STOP: Described = Described {
+    name: "stop",
+    wire: "stop_s",
+    unit: "s",
+    range: Range::Above(0.0, 1e9),
+    default: Value::Unset,
+    unset: "must be given",
+    help: "End time",
+};
+
+/// `tran`: equal steps.
+pub static TRAN_STEP: Described = Described {
+    name: "step",
+    wire: "step_s",
+    unit: "s",
+    range: Range::Above(0.0, 1e9),
+    default: Value::Unset,
+    unset: "steps follow tol",
+    help: "Length of equal steps",
+};
+
+/// `tran`: how generalized-alpha damps.
+pub static TRAN_RHO: Described = Described {
+    name: "rho",
+    wire: "rho",
+    unit: "1",
+    range: Range::Within(0.0, 1.0),
+    default: Value::Number(0.8),
+    unset: "",
+    help: "Of generalized-alpha: factor by which an infinitely fast motion shrinks in a step",
+};
+
+/// `modes`: how many.
+pub static MODES_COUNT: Described = Described {
+    name: "count",
+    wire: "count",
+    unit: "",
+    range: Range::Count(1, 100_000),
+    default: Value::Count(6),
+    unset: "",
+    help: "How many modes, from the lowest",
+};
+
+/// `pullin`: how far.
+pub static PULL_IN_MAX: Described = Described {
+    name: "max",
+    wire: "max_v",
+    unit: "V",
+    range: Range::Above(0.0, 1e9),
+    default: Value::Number(200.0),
+    unset: "",
+    help: "Highest voltage tried",
+};
+
+/// `path`: points.
+pub static PATH_POINTS: Described = Described {
+    name: "points",
+    wire: "points",
+    unit: "",
+    range: Range::Count(2, 1_000_000),
+    default: Value::Count(2000),
+    unset: "",
+    help: "Most points",
+};
+
+/// `chart`: output times.
+pub static CHART_POINTS: Described = Described {
+    name: "points",
+    wire: "points",
+    unit: "",
+    range: Range::Count(2, 1_000_000),
+    default: Value::Count(401),
+    unset: "",
+    help: "Output times at which errors are taken",
+};
+
+/// The commands and their options, as documented.
+pub static ANALYSES: [(&str, &Described); 8] = [
+    ("tran", &TRAN_STOP),
+    ("tran", &TRAN_POINTS),
+    ("tran", &TRAN_STEP),
+    ("tran", &TRAN_RHO),
+    ("modes", &MODES_COUNT),
+    ("pullin", &PULL_IN_MAX),
+    ("path", &PATH_POINTS),
+    ("chart", &CHART_POINTS),
+];
+
+impl Described {
+    /// The default of an option that counts; 0 for others.
+    pub fn count(&self) -> usize {
+        if let Value::Count(count) = self.default { count } else { 0 }
+    }
+
+    /// The default of an option that is a number; 0 for others.
+    pub fn number(&self) -> f64 {
+        if let Value::Number(x) = self.default { x } else { 0.0 }
+    }
+}
