@@ -3,6 +3,9 @@
 //! What is written from the table (docs/options.md, fields in proto/, the keywords of the Python client) is compared with it;
 //! `BIMORPH_WRITE=1 cargo test --test options` writes it anew.
 
+use bimorph::analysis::integrator::Integrator;
+use bimorph::analysis::transient::TransientOptions;
+use bimorph::options::analysis::{ANALYSES, MODES_COUNT, TRAN_POINTS, TRAN_RHO};
 use bimorph::options::{CompileOptions, Described, MODEL, ModelOption, Range, Value};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -50,6 +53,24 @@ fn rows() -> String {
         let unit = if about.unit.is_empty() { "–" } else { about.unit };
         text +=
             &format!("| `{}` | `{}` | {unit} | {range} | {default} | {} |\n", about.name, about.wire, about.about());
+    }
+    text
+}
+
+fn analysis_rows() -> String {
+    let mut text = String::from(
+        "| command | option | on the wire | unit | range | default | meaning |\n|---|---|---|---|---|---|---|\n",
+    );
+    for (command, about) in ANALYSES {
+        let unit = if about.unit.is_empty() { "–" } else { about.unit };
+        text += &format!(
+            "| {command} | `{}` | `{}` | {unit} | {} | {} | {} |\n",
+            about.name,
+            about.wire,
+            about.range,
+            about.by_default(),
+            about.about()
+        );
     }
     text
 }
@@ -112,6 +133,7 @@ fn files_are_as_written_from_the_table() {
     let proto = ["written from the table in src/options/model.rs.", "// end of the options"];
     for (path, markers, want) in [
         ("docs/options.md", Some(["<!-- options -->", "<!-- end of options -->"]), rows()),
+        ("docs/options.md", Some(["<!-- analyses -->", "<!-- end of analyses -->"]), analysis_rows()),
         ("proto/bimorph/v1/model.proto", Some(proto), fields()),
         ("clients/python/src/bimorph/options.py", None, python()),
     ] {
@@ -231,4 +253,40 @@ fn every_front_takes_the_same_options() {
             assert!(row.contains(part), "{name}: {row} lacks {part}");
         }
     }
+}
+
+/// Options of single analyses: the command shows the default and refuses what is beyond the range by name; the wire and Python
+/// say the same default.
+#[test]
+fn analyses_take_the_same_options() {
+    for (command, about) in ANALYSES {
+        let flag = format!("--{}", about.flag());
+        let (_, help, _) = bimorph(&[command.to_owned(), "--help".into()]);
+        let help = help.split_whitespace().collect::<Vec<_>>().join(" ");
+        let (_, of) = help.rsplit_once(&format!("{flag} <")).unwrap_or_else(|| panic!("{command} has no {flag}"));
+        let of = of.split(" --").next().unwrap_or(of);
+        assert!(of.contains(&about.about()), "{command} {flag}: {of}");
+        let default = about.by_default();
+        assert!(
+            about.default == Value::Unset || of.contains(&format!("[default: {default}]")),
+            "{command} {flag}: {of}"
+        );
+        let Some(beyond) = inside_and_beyond(about).1.and_then(|value| written(&value)) else { continue };
+        let mut words = vec![command.to_owned(), "c.net".into()];
+        match command {
+            "tran" => words.extend(["--stop", "1u"].into_iter().filter(|_| about.name != "stop").map(str::to_owned)),
+            "path" => words.extend(["--along".to_owned(), "loads=0:1".into()]),
+            "chart" => words.extend(["--signals".to_owned(), "b.x".into()]),
+            _ => {}
+        }
+        let (status, _, err) = bimorph(&[words, vec![flag.clone(), beyond]].concat());
+        assert_eq!(status, Some(1), "{command} {flag}: {err}");
+        assert!(err.contains(&flag) && err.contains(&about.expected()), "{command} {flag}: {err}");
+    }
+    let proto = fs::read_to_string(place("proto/bimorph/v1/analysis.proto")).expect("the messages");
+    assert!(proto.contains(&format!("{}; 0: {}.", TRAN_POINTS.range, TRAN_POINTS.count())));
+    let client = fs::read_to_string(place("clients/python/src/bimorph/client.py")).expect("the client");
+    assert!(client.contains(&format!("points: int = {},", TRAN_POINTS.count())));
+    assert!(client.contains(&format!("count: int = {},", MODES_COUNT.count())));
+    assert_eq!((TransientOptions::default().points, Integrator::RHO), (TRAN_POINTS.count(), TRAN_RHO.number()));
 }

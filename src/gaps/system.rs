@@ -57,7 +57,8 @@ pub struct System {
     pub loads: Vec<Load>,
     /// Ports, sources, heaters.
     pub electrics: Electrics,
-    /// Mass-weighted scale of displacement below which motion does not matter [m]: a share of the narrowest beam.
+    /// What displacements are measured against [m]: the narrowest beam or the smallest gap, whichever is smaller; 1 µm where
+    /// there is neither.
     pub length_scale: f64,
 }
 

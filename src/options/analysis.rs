@@ -35,7 +35,7 @@ pub static TRAN_STEP: Described = Described {
     range: Range::Above(0.0, 1e9),
     default: Value::Unset,
     unset: "steps follow tol",
-    help: "Length of equal steps",
+    help: "Equal steps of this length",
 };
 
 /// `tran`: how generalized-alpha damps.
@@ -46,7 +46,7 @@ pub static TRAN_RHO: Described = Described {
     range: Range::Within(0.0, 1.0),
     default: Value::Number(0.8),
     unset: "",
-    help: "Of generalized-alpha: factor by which an infinitely fast motion shrinks in a step",
+    help: "Of generalized-alpha: factor by which an infinitely fast motion shrinks in a step, 0 to 1",
 };
 
 /// `modes`: how many.

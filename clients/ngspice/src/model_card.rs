@@ -181,7 +181,6 @@ mod tests {
                 ("junctions", Written::Text("Offset".into())),
                 ("scheme", Written::Text("d1".into())),
                 ("segments", Written::Number(6.0)),
-                ("shear", Written::Flag(true)),
                 ("rotary_inertia", Written::Flag(true)),
                 ("formulation", Written::Text("rcr".into())),
             ])
@@ -197,9 +196,9 @@ mod tests {
             junctions: Junctions::Offset,
             scheme: Scheme::D1,
             segments: Some(6),
-            shear: true,
             rotary_inertia: true,
             formulation: Formulation::Rcr,
+            ..CompileOptions::default()
         };
         assert_eq!((&card.options, card.options.set.len()), (&want, 1));
         assert_eq!(card.deadline, Duration::from_millis(500));

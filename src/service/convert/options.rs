@@ -134,9 +134,8 @@ mod tests {
             junctions: Junctions::Centreline,
             scheme: Scheme::D1,
             segments: Some(6),
-            shear: true,
-            rotary_inertia: true,
             formulation: Formulation::RcrElastic,
+            ..CompileOptions::default()
         };
         let sent = options_to_wire(&options);
         assert_eq!((sent.band_hz, sent.tol, sent.segments), (Some(1e6), Some(1e-4), Some(6)));
