@@ -263,14 +263,21 @@ impl Table {
             self.put(at + 16, callbacks::load as *const c_void);
             self.put(at + 24, callbacks::setup as *const c_void);
             self.put(at + 32, callbacks::unsetup as *const c_void);
+            self.put(at + 40, callbacks::pole_zero_setup as *const c_void);
             self.put(at + 56, callbacks::trunc as *const c_void);
-            self.put(at + 72, callbacks::load as *const c_void);
+            self.put(at + 72, callbacks::small_signal_load as *const c_void);
             self.put(at + 80, callbacks::accept as *const c_void);
             self.put(at + 96, callbacks::model_delete as *const c_void);
             self.put(at + 104, callbacks::delete as *const c_void);
             self.put(at + 120, callbacks::ask as *const c_void);
             self.put(at + 128, callbacks::model_ask as *const c_void);
             self.put(at + 144, callbacks::convergence_test as *const c_void);
+            self.put(at + 200, callbacks::distortion as *const c_void);
+            // Behind the table of a host without KLU, which never looks there.
+            let bind = layout.sizes() + 16;
+            self.put(bind, callbacks::bind as *const c_void);
+            self.put(bind + 8, callbacks::bind_complex as *const c_void);
+            self.put(bind + 16, callbacks::bind_real as *const c_void);
         }
         Ok(layout)
     }
