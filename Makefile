@@ -14,7 +14,7 @@ demo:
 	@examples/bank/demo
 
 test:
-	@scripts/setup ngspice python
+	@scripts/setup ngspice versions python
 	@scripts/check
 
 bench:

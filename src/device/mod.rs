@@ -11,6 +11,7 @@
 //! knows the steps that were accepted.
 
 pub mod local;
+pub mod shown;
 mod small_signal;
 pub mod states;
 mod trial;

@@ -1,5 +1,6 @@
 //! The states behind tokens: immutable, few, found by a hash of the request that made them.
 
+use super::shown::Shown;
 use super::{Mode, Token, Trial};
 use crate::multibody::planar::Pose;
 use serde::{Deserialize, Serialize};
@@ -24,6 +25,8 @@ pub struct Snapshot {
     pub sources: Vec<f64>,
     /// First internal step of what follows [s].
     pub next_step: f64,
+    /// What the circuit has seen.
+    pub shown: Shown,
 }
 
 /// Held states, in order of last use.
@@ -75,7 +78,9 @@ impl States {
     /// Bytes that the states take, about.
     pub fn bytes(&self) -> usize {
         let size = |s: &Snapshot| {
-            (s.q.len() + s.v.len()) * size_of::<Pose>() + (s.rise.len() + s.sources.len()) * 8 + size_of::<Snapshot>()
+            (s.q.len() + s.v.len()) * size_of::<Pose>()
+                + (s.rise.len() + s.sources.len() + s.shown.doubles()) * 8
+                + size_of::<Snapshot>()
         };
         self.held.values().map(|(_, s)| size(s)).sum()
     }

@@ -2,9 +2,10 @@
 //! parent's state; then currents, charges, outputs and their partials from what came out.
 
 use super::local::Session;
+use super::shown::Shown;
 use super::states::Snapshot;
 use super::{Status, Trial, TrialReply};
-use crate::analysis::signal::View;
+use crate::analysis::signal::{Signal, View};
 use crate::compile::Compiled;
 use crate::gaps::Ramp;
 use crate::multibody::planar::Pose;
@@ -14,10 +15,16 @@ use crate::solve::path::SourcePath;
 /// Share of the compilation's tolerance that one internal step may use.
 const STEP_SHARE: f64 = 1e-2;
 /// Internal steps in one circuit step before the device asks for a shorter one.
-const MAX_INTERNAL_STEPS: usize = 64;
-/// Longest circuit step proposed, in internal steps: the circuit sees the motion only at its own time points, and its
-/// formula for the current of a moving charge is of second order.
-const PROPOSED_STEPS: f64 = 0.5;
+const MAX_INTERNAL_STEPS: usize = 512;
+/// Longest circuit step proposed, in internal steps, whatever the circuit sees: a step that has to be taken again shall
+/// not cost too much, and a change of pace from one step to the next stay below [`MAX_INTERNAL_STEPS`].
+const PROPOSED_STEPS: f64 = 32.0;
+/// Share of the length scale that the integrator takes for nothing, in units of its tolerance [1].
+const FLOOR: f64 = 1e-4;
+/// A temperature that no circuit tells from another [K].
+const SAME_TEMPERATURE: f64 = 1e-6;
+/// A voltage that no circuit tells from another, and its share of the voltage at the port: what ngspice iterates to [V, 1].
+const SAME_VOLTAGE: [f64; 2] = [1e-6, 1e-6];
 
 impl Session {
     /// A static trial: from the parent's equilibrium along straight lines in voltage, or from rest.
@@ -117,17 +124,18 @@ impl Session {
         }
         ramp.at(request.dt, &mut self.drive);
         self.rise.copy_from_slice(&self.rise_slope);
-        self.answer(compiled, request, Some(&from), h, reply);
-        reply.dt_next = PROPOSED_STEPS * h;
+        let none = Shown::default();
+        self.answer(compiled, request, Some((&from, parent.map_or(&none, |p| &p.shown))), h, reply);
+        reply.dt_next = reply.dt_next.min(PROPOSED_STEPS * h);
     }
 
     /// Fills in the reply from `motion`, `rise`, `sources` and `sensitivity`, and stores the state. `from` holds the
-    /// sources at the start of a transient step.
+    /// sources at the start of a transient step, and what was seen up to there; `dt_next` becomes what is seen now.
     fn answer(
         &mut self,
         compiled: &Compiled,
         request: &Trial<'_>,
-        from: Option<&[f64]>,
+        from: Option<(&[f64], &Shown)>,
         next_step: f64,
         reply: &mut TrialReply,
     ) {
@@ -162,7 +170,7 @@ impl Session {
                         self.unit[port] = 1.0;
                         2.0 * electrics.heating.mixed(k, &self.sources, &self.unit)
                     }
-                    Some(from) => Ramp { electrics, from, to: &self.sources, rise: &self.rise, dt: request.dt }
+                    Some((from, _)) => Ramp { electrics, from, to: &self.sources, rise: &self.rise, dt: request.dt }
                         .rise_sensitivity(k, request.dt, port),
                 };
             }
@@ -178,7 +186,29 @@ impl Session {
                 reply.doutputs_dv[row * ports + p] = signal.slope(compiled, &view, &change);
             }
         }
+        let seen = reply.outputs.iter().chain(&reply.charges).copied().collect();
+        let (shown, bound) = match from {
+            None => (Shown::start(seen), f64::INFINITY),
+            Some((_, before)) => {
+                let (tol, signals) = (compiled.options.tol, self.signals.len());
+                let nothing = STEP_SHARE * tol * FLOOR;
+                let charge = |capacitance: f64, volts: f64| {
+                    capacitance.abs() * (SAME_VOLTAGE[0] + SAME_VOLTAGE[1] * volts.abs())
+                };
+                before.step(request.dt, seen, tol, |n| match self.signals.get(n) {
+                    Some(Signal::Displacement(_, 2)) => nothing,
+                    Some(Signal::Displacement(..) | Signal::Distance(_)) => nothing * system.length_scale,
+                    Some(Signal::Rate(_, 2)) => nothing / self.first_step,
+                    Some(Signal::Rate(..)) => nothing * system.length_scale / self.first_step,
+                    Some(Signal::Temperature(_) | Signal::Prescribed(_)) => SAME_TEMPERATURE,
+                    Some(Signal::Charge(g)) => charge(system.capacitance(*g, view.q), view.volts[*g]),
+                    None => charge(reply.dq_dv[(n - signals) * (ports + 1)], request.voltages[n - signals]),
+                })
+            }
+        };
+        reply.dt_next = bound;
         let snapshot = Snapshot {
+            shown,
             q: self.motion.q.clone(),
             v: self.motion.v.clone(),
             rise: self.rise.clone(),

@@ -48,8 +48,8 @@ pub(crate) mod kind {
     pub(crate) const IF_STRING: c_int = 0x20;
     /// SPICE: an array of what the lower bits say.
     pub(crate) const IF_VECTOR: c_int = 0x8000;
-    /// SPICE: may be read and set.
-    pub(crate) const IF_ASK_SET: c_int = 0x3000;
+    /// SPICE: may be read and set, and `.sens` leaves it alone.
+    pub(crate) const IF_ASK_SET: c_int = 0x0020_3000;
 }
 
 /// Error codes of ngspice that the plug-in answers with.
@@ -63,21 +63,6 @@ pub(crate) mod code {
     pub(crate) const PARMVAL: c_int = 11;
     /// Newton's iteration limit: the step or the operating point is tried again by other means.
     pub(crate) const ITERLIM: c_int = 103;
-}
-
-/// What is read of a circuit (`CKTcircuit`).
-pub(crate) mod circuit {
-    /// Offset of the present step [byte].
-    pub(crate) const DELTA: usize = 88;
-    /// Offsets at which the mode may stand: up to ngspice 45, and from 46 on [byte].
-    pub(crate) const MODES: [usize; 2] = [392, 400];
-
-    /// Whether a word is the mode of a DC sweep: that bit alone of the DC kinds, one stage of initialisation, and
-    /// nothing that is no mode bit.
-    pub(crate) fn is_sweep(word: u64) -> bool {
-        const ALL: u64 = 0x13f73;
-        word & !ALL == 0 && word & 0x73 == 0x40 && (word & 0x3f00).count_ones() == 1
-    }
 }
 
 /// Slots of the host's function table. These have the same place from ngspice 39 to 47.
@@ -165,6 +150,11 @@ pub(crate) mod port_data {
     pub(crate) const INPUT: usize = 48;
     /// Output value.
     pub(crate) const OUTPUT: usize = 64;
+    /// Node and branch numbers within a port's matrix data: positive, negative, branch.
+    pub(crate) const NODES: [usize; 2] = [0, 4];
+    pub(crate) const BRANCH: usize = 8;
+    /// Element pointers over the inputs within a port's matrix data, up to ngspice 41.
+    pub(crate) const INPUTS_39: usize = 80;
     /// Partials in ngspice 39; null in later hosts, where they follow at + 8.
     pub(crate) const PARTIAL_39: usize = 80;
 }

@@ -1,6 +1,7 @@
 //! ngspice's memory, read and written: parameters at setup, inputs and outputs at each call.
 
-use crate::abi::{Circuit, Complex, Connection, Instance, Model, Parameter, Tail, Value, analysis, port_data};
+use crate::abi::{self, Complex, Connection, Instance, Model, Parameter, Tail, Value, analysis, port_data};
+use crate::circuit::Circuit;
 use crate::deck_options::{Written, declared};
 use crate::instance::Question;
 use crate::layout::Layout;
@@ -94,25 +95,39 @@ pub(crate) unsafe fn partial_at_80(conn: *mut *mut Connection) -> bool {
     unsafe { !(*(*(**conn).port).add(port_data::PARTIAL_39).cast::<*mut c_void>()).is_null() }
 }
 
+/// By which of its functions the host wants the device loaded. It tells a code model the kind of the analysis, too, but
+/// that may be the kind of the one before: `.noise`, `.pz`, `.tf` and `.sens` do not set it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Wanted {
+    /// Currents at these voltages.
+    Large,
+    /// Admittances at a frequency.
+    Small,
+}
+
 /// One call of the model by the host.
 pub(crate) struct Call<'a> {
-    circuit: &'a Circuit,
+    told: &'a abi::Circuit,
     tail: &'a Tail,
+    circuit: Circuit,
+    wanted: Wanted,
     partial: usize,
+    matrix: usize,
 }
 
 impl Call<'_> {
     /// Sees a call's data.
     ///
     /// # Safety
-    /// `data` is what the host passed to the model in this call, and `layout` is the host's.
-    pub(crate) unsafe fn new(data: *mut c_void, layout: &Layout) -> Self {
+    /// `data` is what the host passed to the model in this call, `layout` is the host's, and `circuit` the one it loads.
+    pub(crate) unsafe fn new(data: *mut c_void, layout: &Layout, circuit: Circuit, wanted: Wanted) -> Self {
         // SAFETY: by contract.
         unsafe {
-            let circuit = &*data.cast::<Circuit>();
+            let told = &*data.cast::<abi::Circuit>();
             let tail = &*data.cast::<u8>().add(layout.call_tail()).cast::<Tail>();
-            let partial = port_data::PARTIAL_39 + if partial_at_80(tail.conn) { 0 } else { 8 };
-            Self { circuit, tail, partial }
+            let as_39 = partial_at_80(tail.conn);
+            let partial = port_data::PARTIAL_39 + if as_39 { 0 } else { 8 };
+            Self { told, tail, circuit, wanted, partial, matrix: layout.port_matrix(as_39) }
         }
     }
 
@@ -123,23 +138,44 @@ impl Call<'_> {
 
     /// First call of the instance in an analysis.
     pub(crate) fn init(&self) -> bool {
-        self.circuit.init != 0
+        self.told.init != 0
     }
 
-    /// What is asked. Analyses that leave the kind of the one before them show as transients in which no time
-    /// passes; they want an operating point. `delta` is the circuit's step [s]: the difference of the two times is
-    /// the same up to their rounding.
-    pub(crate) fn question(&self, delta: f64) -> Question {
-        let c = self.circuit;
-        let dt = c.t[0] - c.t[1];
-        match c.anal_type {
-            analysis::AC => Question::SmallSignal { omega: c.frequency },
-            analysis::TRAN if dt > 0.0 && (dt - delta).abs() <= 4.0 * f64::EPSILON * c.t[0] => {
-                Question::Transient { t: c.time, dt: delta }
-            }
-            analysis::TRAN if dt > 0.0 => Question::Transient { t: c.time, dt },
-            _ => Question::Static,
+    /// A sweep, whose points follow each other's branch; an operating point starts from rest.
+    pub(crate) fn sweep(&self) -> bool {
+        self.circuit.sweep()
+    }
+
+    /// What is asked, or why it cannot be told. The circuit's step and the difference of the two times are the same up to
+    /// the rounding of the times.
+    pub(crate) fn question(&self) -> Result<Question, &'static str> {
+        let (c, delta) = (self.told, self.circuit.delta());
+        if self.wanted == Wanted::Small {
+            let told = (c.anal_type == analysis::AC).then_some(c.frequency);
+            return match told.or_else(|| self.circuit.omega()) {
+                Some(omega) => Ok(Question::SmallSignal { omega }),
+                None => Err("this ngspice does not tell code models the frequency in this analysis; use .ac"),
+            };
         }
+        if c.anal_type != analysis::TRAN || !self.circuit.transient() {
+            return Ok(Question::Static);
+        }
+        let dt = c.t[0] - c.t[1];
+        Ok(match dt > 0.0 {
+            true if (dt - delta).abs() <= 4.0 * f64::EPSILON * c.t[0] => Question::Transient { t: c.time, dt: delta },
+            true => Question::Transient { t: c.time, dt },
+            false => Question::Static,
+        })
+    }
+
+    /// Currents are wanted, but the host loads as for a small signal: without inputs, and without right-hand sides.
+    fn large_as_small(&self) -> bool {
+        self.wanted == Wanted::Large && self.told.anal_type == analysis::AC
+    }
+
+    /// Admittances are wanted, but the host loads as for currents: without imaginary parts.
+    fn small_as_large(&self) -> bool {
+        self.wanted == Wanted::Small && self.told.anal_type != analysis::AC
     }
 
     /// Number of ports of a connection.
@@ -154,15 +190,56 @@ impl Call<'_> {
         unsafe { *(**self.tail.conn.add(which)).port.add(n) }
     }
 
-    /// Port voltages.
+    /// Positive and negative node of a port.
+    pub(crate) fn nodes(&self, which: usize, n: usize) -> [i32; 2] {
+        // SAFETY: a port's matrix data begin with its two nodes, set by the host.
+        port_data::NODES.map(|at| unsafe { *self.port(which, n).add(self.matrix + at).cast::<i32>() })
+    }
+
+    fn input(&self, n: usize) -> *mut f64 {
+        // SAFETY: an analogue port's input is a double.
+        unsafe { self.port(PORTS, n).add(port_data::INPUT).cast() }
+    }
+
+    /// Port voltages. The host's are not right where it takes the load for a small signal, and it does not know those that
+    /// a transient starts from (`uic`); what is read instead is given to it, too, now and for the first step.
     pub(crate) fn voltages(&self, into: &mut Vec<f64>) {
         into.clear();
-        // SAFETY: an analogue port's input is a double.
-        into.extend((0..self.size(PORTS)).map(|n| unsafe { *self.port(PORTS, n).add(port_data::INPUT).cast::<f64>() }));
+        let given = self.wanted == Wanted::Large && self.circuit.given();
+        for n in 0..self.size(PORTS) {
+            // SAFETY: the circuit's nodes; the place of the input lasts as long as this call. The host keeps the input of
+            // the point before in the state vector, at an index that follows the gains.
+            unsafe {
+                if self.large_as_small() || given {
+                    let first = self.circuit.first() && !given;
+                    *self.input(n) = if first { 0.0 } else { self.circuit.loaded_at(self.nodes(PORTS, n)) };
+                    let kept = *self.port(PORTS, n).add(self.partial + 16).cast::<i32>();
+                    *self.circuit.states().add(kept as usize) = *self.input(n);
+                }
+                into.push(*self.input(n));
+            }
+        }
     }
 
     /// Sets a port's output and its partials over the electrical ports.
     pub(crate) fn set(&self, which: usize, n: usize, output: f64, partials: &[f64]) {
+        if self.large_as_small() {
+            self.set_gains(which, n, partials.iter().map(|gain| [*gain, 0.0]));
+            // SAFETY: inputs are doubles.
+            let linear: f64 = partials.iter().enumerate().map(|(m, gain)| unsafe { gain * *self.input(m) }).sum();
+            let [positive, negative] = self.nodes(which, n);
+            // SAFETY: equations of the circuit, which is being loaded.
+            unsafe {
+                if which == PORTS {
+                    self.circuit.add(positive, linear - output);
+                    self.circuit.add(negative, output - linear);
+                } else {
+                    let branch = *self.port(which, n).add(self.matrix + port_data::BRANCH).cast::<i32>();
+                    self.circuit.add(branch, output - linear);
+                }
+            }
+            return;
+        }
         let port = self.port(which, n);
         // SAFETY: the host allocated an output and one partial per electrical port for every output port.
         unsafe {
@@ -175,6 +252,18 @@ impl Call<'_> {
     /// Sets a port's small-signal gains over the electrical ports.
     pub(crate) fn set_gains(&self, which: usize, n: usize, gains: impl Iterator<Item = [f64; 2]>) {
         let port = self.port(which, n);
+        if self.small_as_large() {
+            // The host adds partials alone, and to the right-hand side what they make of the inputs: nothing.
+            for (m, [re, im]) in gains.enumerate() {
+                // SAFETY: as for `set`; this is a host of generation `Since39`, the only one whose frequency is known.
+                unsafe {
+                    *self.input(m) = 0.0;
+                    *(**port.add(self.partial).cast::<*const *mut f64>()).add(m) = re;
+                    self.add_imaginary(which, port, m, im);
+                }
+            }
+            return;
+        }
         // SAFETY: as for the partials; the gains' pointer follows that of the partials.
         let row = unsafe {
             let row = **port.add(self.partial + 8).cast::<*const *mut Complex>();
@@ -182,6 +271,24 @@ impl Call<'_> {
         };
         for (gain, [re, im]) in row.iter_mut().zip(gains) {
             *gain = Complex { re, im };
+        }
+    }
+
+    /// Adds the imaginary part of a gain to the matrix.
+    ///
+    /// # Safety
+    /// The host is ngspice 39 to 41 and is loading the complex matrix; `port` is a port of connection `which`.
+    unsafe fn add_imaginary(&self, which: usize, port: *mut u8, input: usize, im: f64) {
+        /// Words of a port's element pointers, one set for each input.
+        const SET: usize = 4;
+        // SAFETY: the host made these elements when it set the instance up; each is a pair of doubles.
+        unsafe {
+            let inputs = *port.add(self.matrix + port_data::INPUTS_39).cast::<*const *const *mut f64>();
+            let elements = (*inputs.add(PORTS)).add(SET * input);
+            let signs: &[f64] = if which == PORTS { &[1.0, -1.0, -1.0, 1.0] } else { &[-1.0, 1.0] };
+            for (k, sign) in signs.iter().enumerate() {
+                *(*elements.add(k)).add(1) += sign * im;
+            }
         }
     }
 }

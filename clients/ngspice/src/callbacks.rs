@@ -3,12 +3,13 @@
 //! Each passes the call on to the host's own code model support and adds what Bimorph needs around it. None lets a
 //! panic out.
 
-use crate::abi::{self, Model, circuit as at, code};
-use crate::call::{self, Call};
+use crate::abi::{self, Model, code};
+use crate::call::{self, Call, Wanted};
+use crate::circuit::Circuit;
 use crate::instance::Outcome;
 use crate::opening::open_all;
 use crate::registry::{close, registry};
-use crate::respond::respond;
+use crate::respond::{respond, settle};
 use crate::table::LAYOUT;
 use crate::{host, panics, trace};
 use std::ffi::{c_int, c_void};
@@ -82,7 +83,7 @@ pub(crate) unsafe extern "C" fn setup(
             return result;
         }
         // SAFETY: the host's lists of models and instances, set up above.
-        match unsafe { open_all(model) } {
+        match unsafe { open_all(model, circuit) } {
             Ok(()) => code::OK,
             Err(text) => {
                 let _ = writeln!(std::io::stderr(), "Error: bimorph: {text}");
@@ -116,27 +117,97 @@ pub(crate) unsafe extern "C" fn delete(instance: *mut abi::Instance) -> c_int {
     })
 }
 
-/// Loads the matrix: the host calls [`evaluate`] for each instance.
+/// Ends an analysis before it begins, with one message.
+fn refuse(text: &str) -> c_int {
+    let _ = writeln!(std::io::stderr(), "Error: bimorph: {text}");
+    record_failure(text);
+    trace::line(format_args!("refused: {text}"));
+    code::PANIC
+}
+
+/// Loads the matrix for currents: the host calls [`evaluate`] for each instance.
+pub(crate) unsafe extern "C" fn load(model: *mut Model, circuit: *mut c_void) -> c_int {
+    // SAFETY: passed on.
+    guarded(|| unsafe { load_for(Wanted::Large, model, circuit) })
+}
+
+/// Loads the complex matrix of a small-signal analysis.
+pub(crate) unsafe extern "C" fn small_signal_load(model: *mut Model, circuit: *mut c_void) -> c_int {
+    // SAFETY: passed on.
+    guarded(|| unsafe { load_for(Wanted::Small, model, circuit) })
+}
+
+/// Loads the matrix.
 ///
-/// Where one has no answer this ends Newton's iteration, and ngspice tries a shorter step or another way to the
+/// Where an instance has no answer this ends Newton's iteration, and ngspice tries a shorter step or another way to the
 /// operating point. Once an instance has stopped the analysis, none of these succeeds and ngspice gives up. (The code
 /// that ends a transient at once would make ngspice report success.)
-pub(crate) unsafe extern "C" fn load(model: *mut Model, circuit: *mut c_void) -> c_int {
+///
+/// # Safety
+/// The arguments are those with which the host called the plug-in.
+unsafe fn load_for(wanted: Wanted, model: *mut Model, circuit: *mut c_void) -> c_int {
+    let Some(layout) = LAYOUT.get() else { return code::PANIC };
+    {
+        let mut registry = registry();
+        registry.good = true;
+        // SAFETY: the host's circuit, for this load.
+        registry.loading = Some((unsafe { Circuit::new(circuit, layout) }, wanted));
+    }
+    // SAFETY: passed on; the registry is not locked while the host calls back.
+    let result = unsafe { host::load(model, circuit) };
+    if registry().good { result } else { code::ITERLIM }
+}
+
+/// Pole-zero analysis solves at complex frequencies, where the part cannot be asked; ngspice would leave it out.
+pub(crate) unsafe extern "C" fn pole_zero_setup(
+    _matrix: *mut c_void,
+    model: *mut Model,
+    _circuit: *mut c_void,
+    _states: *mut c_int,
+) -> c_int {
     guarded(|| {
-        {
-            let mut registry = registry();
-            registry.good = true;
-            // SAFETY: a circuit is larger than this from 39 to 47, and the step stands at the same place in all.
-            unsafe {
-                let circuit = circuit.cast::<u8>();
-                registry.delta = *circuit.add(at::DELTA).cast::<f64>();
-                registry.sweep = at::MODES.iter().any(|&mode| at::is_sweep(*circuit.add(mode).cast::<u64>()));
-            }
-        }
-        // SAFETY: passed on; the registry is not locked while the host calls back.
-        let result = unsafe { host::load(model, circuit) };
-        if registry().good { result } else { code::ITERLIM }
+        // SAFETY: the host's lists.
+        let any = unsafe { call::instances(model).next() }.is_some();
+        let text = ".pz knows no electro-mechanical parts; use .ac, or `bimorph modes` for natural frequencies";
+        if any { refuse(text) } else { code::OK }
     })
+}
+
+/// Distortion analysis needs third derivatives; ngspice would take the part for linear.
+pub(crate) unsafe extern "C" fn distortion(_mode: c_int, model: *mut Model, _circuit: *mut c_void) -> c_int {
+    guarded(|| {
+        // SAFETY: the host's lists.
+        let any = unsafe { call::instances(model).next() }.is_some();
+        let text = ".disto knows no electro-mechanical parts; use .tran and fourier";
+        if any { refuse(text) } else { code::OK }
+    })
+}
+
+/// Binds the matrix entries for KLU.
+pub(crate) unsafe extern "C" fn bind(model: *mut Model, circuit: *mut c_void) -> c_int {
+    // SAFETY: passed on.
+    guarded(|| unsafe { bind_by(0, model, circuit) })
+}
+
+/// Binds them to the complex matrix.
+pub(crate) unsafe extern "C" fn bind_complex(model: *mut Model, circuit: *mut c_void) -> c_int {
+    // SAFETY: passed on.
+    guarded(|| unsafe { bind_by(1, model, circuit) })
+}
+
+/// Binds them to the real matrix again.
+pub(crate) unsafe extern "C" fn bind_real(model: *mut Model, circuit: *mut c_void) -> c_int {
+    // SAFETY: passed on.
+    guarded(|| unsafe { bind_by(2, model, circuit) })
+}
+
+/// # Safety
+/// The arguments are those with which the host called the plug-in.
+unsafe fn bind_by(which: usize, model: *mut Model, circuit: *mut c_void) -> c_int {
+    // SAFETY: passed on.
+    let bound = LAYOUT.get().and_then(|layout| unsafe { host::bind(which, model, circuit, layout) });
+    bound
+        .unwrap_or_else(|| refuse("it is not known how this ngspice binds code models for KLU; leave out .options klu"))
 }
 
 /// Bounds the next step by the truncation error of the charges, as the host does for capacitors, and by what the devices
@@ -161,12 +232,16 @@ pub(crate) unsafe extern "C" fn trunc(model: *mut Model, circuit: *mut c_void, s
 }
 
 /// A point was accepted.
-pub(crate) unsafe extern "C" fn accept(_circuit: *mut c_void, model: *mut Model) -> c_int {
+pub(crate) unsafe extern "C" fn accept(circuit: *mut c_void, model: *mut Model) -> c_int {
     guarded(|| {
+        let Some(layout) = LAYOUT.get() else { return code::PANIC };
+        // SAFETY: the host's circuit, for this call.
+        let circuit = unsafe { Circuit::new(circuit, layout) };
         let mut registry = registry();
         // SAFETY: the host's lists.
         for (_, instance) in unsafe { call::instances(model) } {
             if let Some(entry) = registry.find(instance.conn as usize) {
+                settle(entry, circuit);
                 entry.instance.accept();
             }
         }
@@ -178,9 +253,10 @@ pub(crate) unsafe extern "C" fn accept(_circuit: *mut c_void, model: *mut Model)
 pub(crate) unsafe extern "C" fn evaluate(data: *mut c_void) {
     let outcome = catch_unwind(AssertUnwindSafe(|| {
         let layout = LAYOUT.get()?;
-        // SAFETY: the host passes the data of this call, in its layout.
-        let call = unsafe { Call::new(data, layout) };
         let mut registry = registry();
+        let (circuit, wanted) = registry.loading?;
+        // SAFETY: the host passes the data of this call, in its layout, while it loads the circuit.
+        let call = unsafe { Call::new(data, layout, circuit, wanted) };
         if registry.stopped {
             registry.good = false;
             return None;

@@ -1,9 +1,11 @@
 //! The host's functions, reached through the table it gives the plug-in.
 
 use crate::abi::{Instance, Model, slot};
+use crate::layout::{Generation, Layout};
 use std::cell::UnsafeCell;
 use std::ffi::{CString, c_char, c_int, c_void};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 /// The host's table of function pointers; null until it has been handed over.
 #[repr(transparent)]
@@ -129,6 +131,35 @@ pub(crate) unsafe fn message(text: &str) {
     unsafe {
         CORE.function::<unsafe extern "C" fn(*mut c_char) -> c_int>(slot::MESSAGE_SEND)(text.as_ptr().cast_mut());
     }
+}
+
+/// Whether the host is ngspice 42 to 44: there the function in [`Layout::telling_slot`] tells a circuit, from 45 on the
+/// folder of the deck or null. Asked once, since a host does not change.
+///
+/// # Safety
+/// To be called from within a call of the host, with its layout and the circuit it passed.
+pub(crate) unsafe fn until_44(layout: &Layout, circuit: *mut c_void) -> bool {
+    static ANSWER: OnceLock<bool> = OnceLock::new();
+    let Some(slot) = layout.telling_slot() else { return layout.generation < Generation::Since43 };
+    *ANSWER.get_or_init(|| {
+        // SAFETY: in each of these hosts the function takes nothing and answers a pointer it owns, or null.
+        let told = unsafe { CORE.function::<unsafe extern "C" fn() -> *mut c_void>(slot)() };
+        // Another circuit than this one is none whose bytes name a folder.
+        // SAFETY: a circuit, whose first pointers hold zero bytes, or a text.
+        told == circuit || unsafe { crate::call::text(told.cast()) }.is_some_and(|text| !Path::new(&text).is_dir())
+    })
+}
+
+/// Binds the matrix entries of code models for KLU, by the host's own function `which`: 0 real, 1 from real to complex, 2
+/// back.
+///
+/// # Safety
+/// The arguments are those with which the host called the plug-in.
+pub(crate) unsafe fn bind(which: usize, model: *mut Model, circuit: *mut c_void, layout: &Layout) -> Option<c_int> {
+    // SAFETY: by contract.
+    let first = layout.bind_slot(unsafe { until_44(layout, circuit) })?;
+    // SAFETY: hosts that bind have these three functions there, of this signature.
+    Some(unsafe { CORE.function::<OverModel>(first + which)(model, circuit) })
 }
 
 /// The deck's directory from the host's function in `slot`.

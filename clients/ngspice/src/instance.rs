@@ -175,6 +175,20 @@ impl Instance {
         }
     }
 
+    /// Moves the charges of the last transient answer along their derivatives by `volts` [V], and with them what the next
+    /// step is differentiated from. False where there is nothing to move.
+    pub fn settle(&mut self, volts: &[f64]) -> bool {
+        let (answer, dq_dv, ports) = (&mut self.answer, &self.reply.dq_dv, volts.len());
+        if answer.step == 0.0 || answer.base.skipped != 0.0 || answer.charges.len() != ports {
+            return false;
+        }
+        for (n, row) in dq_dv.chunks_exact(ports.max(1)).enumerate() {
+            answer.charges[n] += row.iter().zip(volts).map(|(c, v)| c * v).sum::<f64>();
+        }
+        answer.base.charges.clone_from(&answer.charges);
+        true
+    }
+
     fn trial(
         &mut self,
         mode: Mode,

@@ -101,6 +101,43 @@ impl Layout {
         136 + 8 * usize::from(self.osdi)
     }
 
+    /// Offset of the two sizes that the host wrote; what a host with KLU calls follows them [byte].
+    pub fn sizes(&self) -> usize {
+        360 + 8 * usize::from(self.osdi) + 16 * usize::from(self.cider)
+    }
+
+    /// Where the circuit's mode may stand: the likelier place first [byte].
+    pub fn mode_offsets(&self) -> [usize; 2] {
+        match self.generation {
+            Generation::Since39 | Generation::Since42 => [392, 392],
+            Generation::Since43 => [392, 400],
+            Generation::Since47 => [400, 400],
+        }
+    }
+
+    /// Slot of the function that tells the circuit in ngspice 42 to 44, and the deck's directory from 45 on; none where
+    /// the generation tells all there is to know.
+    pub fn telling_slot(&self) -> Option<usize> {
+        (self.generation == Generation::Since43).then_some(49)
+    }
+
+    /// First of the three slots by which a host with KLU binds matrix entries; none for hosts that have no KLU.
+    /// `until_44`: what [`Self::telling_slot`] tells.
+    pub fn bind_slot(&self, until_44: bool) -> Option<usize> {
+        match self.generation {
+            Generation::Since39 => None,
+            Generation::Since42 => Some(61),
+            Generation::Since43 if until_44 => Some(61),
+            Generation::Since43 | Generation::Since47 => Some(62),
+        }
+    }
+
+    /// Offset of a port's matrix data, with its node numbers [byte]. `partial_at_80`: the host keeps a port's partials
+    /// where ngspice 39 does.
+    pub fn port_matrix(&self, partial_at_80: bool) -> usize {
+        if partial_at_80 { 144 } else { 152 }
+    }
+
     /// Offset of the connections in a call [byte].
     pub fn call_tail(&self) -> usize {
         if self.generation == Generation::Since47 { 120 } else { 104 }
@@ -111,15 +148,15 @@ impl Layout {
         self.generation >= Generation::Since43
     }
 
-    /// Slot of the host's function that tells the deck's directory, where it is known. `partial_at_80`: the host
-    /// keeps a port's partials where ngspice 39 does.
-    pub fn deck_path_slot(&self, partial_at_80: bool) -> Option<usize> {
+    /// Slot of the host's function that tells the deck's directory. `partial_at_80`: the host keeps a port's partials
+    /// where ngspice 39 does; `until_44`: what [`Self::telling_slot`] tells.
+    pub fn deck_path_slot(&self, partial_at_80: bool, until_44: bool) -> usize {
         match self.generation {
-            Generation::Since39 if partial_at_80 => Some(45),
-            Generation::Since39 => Some(47),
-            Generation::Since47 => Some(49),
-            // 42 to 44 and 45 to 46 differ here, and nothing shows which is which.
-            Generation::Since42 | Generation::Since43 => None,
+            Generation::Since39 if partial_at_80 => 45,
+            Generation::Since39 => 47,
+            Generation::Since42 => 48,
+            Generation::Since43 if until_44 => 48,
+            Generation::Since43 | Generation::Since47 => 49,
         }
     }
 }
@@ -153,6 +190,7 @@ mod tests {
             let (table, size_at) = host(offset, size);
             let layout = Layout::detect(&table, size_at, None).unwrap();
             assert_eq!((layout.generation, layout.functions(), layout.call_tail()), (generation, functions, tail));
+            assert_eq!(layout.sizes(), offset);
         }
     }
 
@@ -164,6 +202,16 @@ mod tests {
         assert_eq!(layout.generation, Generation::Since43);
         assert!(layout.new_parameters());
         assert_eq!(Layout::detect(&table, &size_at, Some(42)).unwrap().generation, Generation::Since42);
+    }
+
+    /// The functions that bind KLU's matrix stand behind all others: read from the code models that Debian's ngspice 44.2
+    /// and 47 ship, which call slots 61 to 63 and 62 to 64; 45 added a function before them.
+    #[test]
+    fn klu_is_bound_by_the_hosts_own_functions() {
+        let layout = |size, osdi| Layout::detect(&host(if osdi { 384 } else { 376 }, size).0, |_| size, None).unwrap();
+        assert_eq!(layout(152, false).bind_slot(false), None);
+        assert_eq!([layout(160, true).bind_slot(true), layout(160, true).bind_slot(false)], [Some(61), Some(62)]);
+        assert_eq!(layout(224, true).bind_slot(false), Some(62));
     }
 
     /// An unknown host is refused with the number that was not understood.

@@ -10,7 +10,8 @@
 //!
 //! # Layout
 //! What ngspice's memory looks like: `abi` the structures, [`layout`] which host this is, `table` what the plug-in
-//! declares, `exports` the symbols, `host` the host's functions, `call` one call's data. Between the two sides stand
+//! declares, `exports` the symbols, `host` the host's functions, `call` one call's data,
+//! `circuit` what it is part of. Between the two sides stand
 //! `callbacks`, `opening` and `respond`, with the `registry` of instances. What does not know ngspice: [`model_card`],
 //! [`settings`], [`deck_options`] and `names` the `.model` line, [`opener`] from line to device, [`instance`] questions and outcomes,
 //! [`companion`] charges to currents, [`history`] what an accepted point leaves behind.
@@ -23,6 +24,7 @@
 mod abi;
 mod call;
 mod callbacks;
+mod circuit;
 pub mod companion;
 pub mod deck_options;
 mod exports;

@@ -7,13 +7,14 @@ use crate::model_card::ModelCard;
 use crate::registry::register;
 use crate::table::LAYOUT;
 use crate::{host, opener, trace};
+use std::ffi::c_void;
 use std::path::{Path, PathBuf};
 
 /// Opens each instance of each model.
 ///
 /// # Safety
-/// `model` heads the host's list of models; each is set up.
-pub(crate) unsafe fn open_all(model: *mut Model) -> Result<(), String> {
+/// `model` heads the host's list of models; each is set up. `circuit` is the host's.
+pub(crate) unsafe fn open_all(model: *mut Model, circuit: *mut c_void) -> Result<(), String> {
     let remote = std::env::var("BIMORPH_REMOTE").ok();
     // SAFETY: the host's lists and strings, by contract.
     for (model, instance) in unsafe { call::instances(model) } {
@@ -25,7 +26,7 @@ pub(crate) unsafe fn open_all(model: *mut Model) -> Result<(), String> {
                 call::card(model.param, model.num_param),
                 call::size(instance.conn, PORTS),
                 call::size(instance.conn, MONITORS),
-                deck_directory(instance.conn),
+                deck_directory(instance.conn, circuit),
             )
         };
         let card = ModelCard::new(&raw, remote.clone()).and_then(|c| c.check_counts(ports, monitors).map(|()| c));
@@ -47,11 +48,15 @@ fn open(name: &str, card: &mut ModelCard, ports: usize, directory: Option<&Path>
 /// The deck's directory: from whoever started ngspice, or from the host.
 ///
 /// # Safety
-/// `conn` points to the connections of an instance that the host has set up.
-unsafe fn deck_directory(conn: *mut *mut Connection) -> Option<PathBuf> {
+/// `conn` points to the connections of an instance that the host has set up in `circuit`.
+unsafe fn deck_directory(conn: *mut *mut Connection, circuit: *mut c_void) -> Option<PathBuf> {
     if let Some(path) = std::env::var_os("BIMORPH_DECK_DIR") {
         return Some(path.into());
     }
+    let layout = LAYOUT.get()?;
     // SAFETY: by contract; the slot is that of this host.
-    unsafe { LAYOUT.get()?.deck_path_slot(call::partial_at_80(conn)).and_then(|slot| host::deck_directory(slot)) }
+    unsafe {
+        let slot = layout.deck_path_slot(call::partial_at_80(conn), host::until_44(layout, circuit));
+        host::deck_directory(slot)
+    }
 }

@@ -1,8 +1,11 @@
 //! The instances ngspice has set up, and what they share during a load.
 
+use crate::call::Wanted;
+use crate::circuit::Circuit;
 use crate::history::History;
 use crate::instance::Instance;
 use crate::trace;
+use bimorph::device::Token;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// An instance with what its calls reuse.
@@ -18,16 +21,20 @@ pub(crate) struct Entry {
     pub(crate) previous: History,
     /// Whether the host knows the charges as integrals.
     pub(crate) integrals: bool,
+    /// Positive and negative node of each port.
+    pub(crate) nodes: Vec<[i32; 2]>,
+    /// State of the last equilibrium: the operating point of a small signal.
+    pub(crate) balanced: Option<Token>,
+    /// Where the last answer's record stands: an address in the host's state memory, good until the point is accepted.
+    pub(crate) record: usize,
 }
 
 /// Every instance, and what concerns the load under way.
 pub(crate) struct Registry {
     entries: Vec<Entry>,
     epochs: u64,
-    /// The step the circuit takes in this load [s].
-    pub(crate) delta: f64,
-    /// A sweep, whose points follow each other's branch; an operating point starts from rest.
-    pub(crate) sweep: bool,
+    /// The circuit being loaded, and by which of the host's functions.
+    pub(crate) loading: Option<(Circuit, Wanted)>,
     /// Whether every instance has answered in this load.
     pub(crate) good: bool,
     /// Set when the analysis must end: no device is asked any more.
@@ -36,15 +43,8 @@ pub(crate) struct Registry {
     pub(crate) asked: usize,
 }
 
-static REGISTRY: Mutex<Registry> = Mutex::new(Registry {
-    entries: Vec::new(),
-    epochs: 0,
-    delta: 0.0,
-    sweep: false,
-    good: true,
-    stopped: false,
-    asked: 0,
-});
+static REGISTRY: Mutex<Registry> =
+    Mutex::new(Registry { entries: Vec::new(), epochs: 0, loading: None, good: true, stopped: false, asked: 0 });
 
 /// The registry, for as long as the guard lives: never while the host may call back.
 pub(crate) fn registry() -> MutexGuard<'static, Registry> {
@@ -64,6 +64,9 @@ pub(crate) fn register(key: usize, instance: Instance) {
         voltages: Vec::new(),
         previous: History::default(),
         integrals: false,
+        nodes: Vec::new(),
+        balanced: None,
+        record: 0,
     };
     match registry.find(key) {
         Some(old) => *old = entry,

@@ -1,6 +1,7 @@
 //! One call of the model: read what ngspice asks, ask the device, write the answer and what is to be remembered.
 
 use crate::call::{Call, MONITORS, PORTS};
+use crate::circuit::Circuit;
 use crate::history;
 use crate::instance::{Instance, Outcome, Question};
 use crate::registry::{Entry, Registry};
@@ -9,11 +10,13 @@ use std::ffi::c_int;
 
 /// Answers a call.
 pub(crate) fn respond(call: &Call<'_>, registry: &mut Registry) -> Outcome {
-    let (delta, sweep) = (registry.delta, registry.sweep);
     let Some(entry) = registry.find(call.key()) else {
         return Outcome::Stop("an instance was not set up".into());
     };
-    let question = call.question(delta);
+    let question = match call.question() {
+        Ok(question) => question,
+        Err(why) => return Outcome::Stop(why.into()),
+    };
     let ports = call.size(PORTS);
     let doubles = history::len(ports);
     if call.init() {
@@ -27,8 +30,11 @@ pub(crate) fn respond(call: &Call<'_>, registry: &mut Registry) -> Outcome {
         return Outcome::Stop("ngspice gave no state memory".into());
     };
     history::read(recalled, entry.epoch, &mut entry.previous);
-    if question == Question::Static && !sweep {
-        entry.previous.token = None;
+    match question {
+        Question::Static if !call.sweep() => entry.previous.token = None,
+        // A host that takes this for a transient has copied another point's record over this one's.
+        Question::SmallSignal { .. } => entry.previous.token = entry.balanced.or(entry.previous.token),
+        _ => {}
     }
     if matches!(question, Question::Transient { .. }) && !entry.integrals {
         // SAFETY: this is within a load of a transient, and the charges lie within this point's memory.
@@ -37,6 +43,9 @@ pub(crate) fn respond(call: &Call<'_>, registry: &mut Registry) -> Outcome {
     call.voltages(&mut entry.voltages);
     let outcome = entry.instance.ask(question, &entry.voltages, &entry.previous);
     if outcome == Outcome::Solved {
+        if question == Question::Static {
+            entry.balanced = entry.instance.answer().token;
+        }
         match question {
             Question::SmallSignal { .. } => write_gains(call, &entry.instance),
             _ => write_answer(call, entry, doubles),
@@ -48,8 +57,10 @@ pub(crate) fn respond(call: &Call<'_>, registry: &mut Registry) -> Outcome {
     outcome
 }
 
-fn write_answer(call: &Call<'_>, entry: &Entry, doubles: usize) {
+fn write_answer(call: &Call<'_>, entry: &mut Entry, doubles: usize) {
     let (answer, ports) = (entry.instance.answer(), call.size(PORTS));
+    entry.nodes.clear();
+    entry.nodes.extend((0..ports).map(|n| call.nodes(PORTS, n)));
     for n in 0..ports {
         call.set(PORTS, n, answer.currents[n], &answer.conductances[n * ports..(n + 1) * ports]);
     }
@@ -58,9 +69,39 @@ fn write_answer(call: &Call<'_>, entry: &Entry, doubles: usize) {
     }
     // SAFETY: this is within a load; this point's memory has the size that was reserved, and no other view of it.
     let memory = unsafe { host::memory(0).as_mut().map(|m| std::slice::from_raw_parts_mut(m, doubles)) };
+    entry.record = 0;
     if let (Some(memory), Some(token)) = (memory, answer.token) {
+        entry.record = memory.as_ptr() as usize;
         history::write(memory, entry.epoch, token, &answer.charges, &answer.base);
     }
+}
+
+/// Puts into the record what the accepted solution differs from the one that the device was asked at.
+///
+/// Newton's iteration ends when two solutions lie close together, and the device was asked at the first. Up to there its
+/// currents went on straight, along their derivatives, and so did the charge that the circuit delivered. The next step has
+/// to begin from that charge: what is left out at each point would be lost or gained for good, and always with the same
+/// sign where a charge curves one way.
+pub(crate) fn settle(entry: &mut Entry, circuit: Circuit) {
+    // SAFETY: nodes of the circuit, as the host set them up.
+    let asked_here = (entry.nodes.iter().zip(&entry.voltages))
+        .all(|(nodes, volts)| unsafe { circuit.loaded_at(*nodes) }.to_bits() == volts.to_bits());
+    if entry.record == 0 || !asked_here || entry.nodes.len() != entry.voltages.len() {
+        return;
+    }
+    // SAFETY: as above.
+    let further = entry.nodes.iter().zip(&entry.voltages).map(|(nodes, v)| unsafe { circuit.solved(*nodes) } - v);
+    let further: Vec<f64> = further.collect();
+    if entry.instance.settle(&further)
+        && let Some(token) = entry.instance.answer().token
+    {
+        let answer = entry.instance.answer();
+        // SAFETY: the memory of the point that is being accepted, written by the last load of this instance.
+        let memory =
+            unsafe { std::slice::from_raw_parts_mut(entry.record as *mut f64, history::len(answer.charges.len())) };
+        history::write(memory, entry.epoch, token, &answer.charges, &answer.base);
+    }
+    entry.record = 0;
 }
 
 fn write_gains(call: &Call<'_>, instance: &Instance) {

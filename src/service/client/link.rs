@@ -101,6 +101,10 @@ pub(super) fn reason(status: &Status) -> String {
         Code::InvalidArgument | Code::FailedPrecondition | Code::DeadlineExceeded | Code::ResourceExhausted => {
             status.message().trim_end().to_owned()
         }
+        // A status that a server sent has no source; one that was made of a broken connection has.
+        _ if std::error::Error::source(status).is_some() => {
+            format!("the connection broke: the server was stopped or killed, or crashed ({})", status.message())
+        }
         code => format!("{}: {}", code.description().to_lowercase(), status.message()),
     }
 }

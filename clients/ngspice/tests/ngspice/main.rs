@@ -1,8 +1,12 @@
 //! Decks run by ngspice with the plug-in loaded. Skipped aloud where ngspice is missing.
 
+mod analyses;
 mod analytic;
+mod charge;
 mod models;
 #[cfg(feature = "remote")]
 mod remote;
+mod steps;
 mod support;
 mod syntax;
+mod versions;

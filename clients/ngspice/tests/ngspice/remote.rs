@@ -118,6 +118,11 @@ fn stops(fate: Fate) {
         Err(CosimError::Stopped { reason, .. }) => {
             let head = format!("instance a1: server unix://{}: ", socket.display());
             assert!(reason.starts_with(&head), "{reason}");
+            let what = match fate {
+                Fate::Cut => "the connection broke: the server was stopped or killed, or crashed",
+                Fate::Mute => "no answer within 2 s",
+            };
+            assert!(reason[head.len()..].starts_with(what), "{reason}");
         }
         Err(other) => panic!("{other}"),
         Ok(_) => panic!("the run went on without its server"),

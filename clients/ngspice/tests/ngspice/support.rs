@@ -18,6 +18,48 @@ pub(crate) fn skipped() -> bool {
     missing
 }
 
+/// Every ngspice at hand: those that `scripts/ngspice-versions` laid beside the machine's own, by major version, or else
+/// the machine's own alone.
+pub(crate) fn versions() -> Vec<(u32, PathBuf)> {
+    let folder = std::env::var_os("BIMORPH_NGSPICE_VERSIONS")
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../target/ngspice"), PathBuf::from);
+    let entries = std::fs::read_dir(folder).into_iter().flatten().filter_map(Result::ok);
+    let mut found: Vec<(u32, PathBuf)> = entries
+        .filter_map(|e| Some((e.file_name().to_str()?.strip_prefix("ngspice")?.parse().ok()?, e.path())))
+        .collect();
+    found.sort();
+    if found.len() < 2 {
+        eprintln!("ONLY ONE: decks run on the machine's own ngspice alone; scripts/ngspice-versions fetches others");
+    }
+    if found.is_empty()
+        && let Some(own) = cosim::find_ngspice().filter(|p| p.is_file())
+    {
+        found.push((0, own));
+    }
+    found
+}
+
+/// A folder with every deck and netlist of the project's tests and samples, side by side.
+pub(crate) fn all_decks() -> tempfile::TempDir {
+    let all = tempfile::tempdir().unwrap();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    for folder in ["tests/decks", "examples/bank", "examples"] {
+        for entry in std::fs::read_dir(root.join(folder)).unwrap().map(Result::unwrap).filter(|e| e.path().is_file()) {
+            let text = std::fs::read_to_string(entry.path()).unwrap_or_default();
+            std::fs::write(all.path().join(entry.file_name()), text.replace("uses ../", "uses ")).unwrap();
+        }
+    }
+    all
+}
+
+/// A deck of the given text, beside copies of every deck and netlist; the columns of its raw file.
+pub(crate) fn run_text(text: &str, ngspice: &Path) -> Result<Run, CosimError> {
+    let folder = all_decks();
+    let deck = folder.path().join("deck.cir");
+    std::fs::write(&deck, text).unwrap();
+    run(CosimOptions { deck, ngspice: Some(ngspice.to_owned()), ..CosimOptions::default() })
+}
+
 /// Decks of the whole project.
 pub(crate) fn deck(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/decks").join(name)

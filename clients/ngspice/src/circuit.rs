@@ -1,0 +1,138 @@
+//! What is read of ngspice's circuit (`CKTcircuit`): the step, what is being analysed, the two solutions of Newton's
+//! iteration.
+//!
+//! Code models are told the kind of an analysis by whoever set it last, and `.noise`, `.pz`, `.tf` and `.sens` do not set
+//! it. The circuit's own mode is right at every call.
+
+use crate::layout::{Generation, Layout};
+use std::ffi::c_void;
+
+/// Offset of the state vectors, eight pointers [byte].
+const STATES: usize = 16;
+/// Offset of the present step [byte].
+const DELTA: usize = 88;
+/// Offset of the right-hand side; after a solve, of the solution [byte].
+const SOLUTION: usize = 280;
+/// Offset of the solution before it, at which the devices were loaded [byte].
+const LOADED_AT: usize = 288;
+
+/// Offset of the angular frequency up to ngspice 41 [byte].
+const OMEGA_39: usize = 568;
+
+/// Bits of the mode.
+mod bit {
+    pub(super) const TRANSIENT: u64 = 0x1;
+    pub(super) const SWEEP: u64 = 0x40;
+    /// Every kind of analysis.
+    pub(super) const KINDS: u64 = 0x73;
+    pub(super) const FIRST: u64 = 0x200;
+    pub(super) const TRANSIENT_POINT: u64 = 0x20;
+    pub(super) const GIVEN: u64 = 0x10000;
+    /// Stages of initialisation.
+    pub(super) const STAGES: u64 = 0x3f00;
+    /// All there are; from ngspice 39 on with those of S-parameters.
+    pub(super) const ALL: u64 = 0x1ff7b;
+}
+
+/// A circuit during one of the host's calls.
+#[derive(Clone, Copy)]
+pub(crate) struct Circuit {
+    /// Address.
+    base: usize,
+    layout: Layout,
+}
+
+impl Circuit {
+    /// The circuit at `at`.
+    ///
+    /// # Safety
+    /// The host passed it in the call that lasts as long as this value is used, and its layout is `layout`.
+    pub(crate) unsafe fn new(at: *mut c_void, layout: &Layout) -> Self {
+        Self { base: at as usize, layout: *layout }
+    }
+
+    /// What stands at an offset.
+    fn read<T: Copy>(self, offset: usize) -> T {
+        // SAFETY: by the contract of `new` the circuit is there; it is larger than every offset used here from 39 to 47.
+        unsafe { ((self.base + offset) as *const T).read() }
+    }
+
+    /// The present step [s].
+    pub(crate) fn delta(self) -> f64 {
+        self.read(DELTA)
+    }
+
+    /// The mode word. ngspice 45 and 46 cannot be told apart, and 46 has it one word further on: there the word that can
+    /// be a mode counts.
+    fn mode(self) -> u64 {
+        let valid = |word: u64| {
+            word & !bit::ALL == 0 && (word & bit::KINDS).is_power_of_two() && (word & bit::STAGES).is_power_of_two()
+        };
+        let words = self.layout.mode_offsets().map(|offset| self.read::<u64>(offset));
+        if valid(words[0]) { words[0] } else { words[1] }
+    }
+
+    /// Time passes in this step.
+    pub(crate) fn transient(self) -> bool {
+        self.mode() & bit::TRANSIENT != 0
+    }
+
+    /// A sweep, whose points follow each other's branch.
+    pub(crate) fn sweep(self) -> bool {
+        self.mode() & bit::KINDS == bit::SWEEP
+    }
+
+    /// The first load of an operating point, made at 0 V.
+    pub(crate) fn first(self) -> bool {
+        self.mode() & bit::FIRST != 0
+    }
+
+    /// The start of a transient from given voltages (`uic`), which is loaded once and not solved.
+    pub(crate) fn given(self) -> bool {
+        self.mode() & (bit::GIVEN | bit::TRANSIENT_POINT) == bit::GIVEN | bit::TRANSIENT_POINT
+    }
+
+    /// Angular frequency of a small-signal solution [rad/s], where it is known how this host keeps it.
+    pub(crate) fn omega(self) -> Option<f64> {
+        (self.layout.generation == Generation::Since39).then(|| self.read(OMEGA_39))
+    }
+
+    /// The state vector of this point.
+    pub(crate) fn states(self) -> *mut f64 {
+        self.read(STATES)
+    }
+
+    /// Voltage between two nodes in the newest solution [V]. During a load that vector is the right-hand side.
+    ///
+    /// # Safety
+    /// The nodes are the circuit's.
+    pub(crate) unsafe fn solved(self, [positive, negative]: [i32; 2]) -> f64 {
+        // SAFETY: by contract; a node's number is its place in the vector.
+        unsafe { difference(self.read(SOLUTION), positive, negative) }
+    }
+
+    /// Voltage between two nodes in the solution at which devices are loaded [V].
+    ///
+    /// # Safety
+    /// The nodes are the circuit's.
+    pub(crate) unsafe fn loaded_at(self, [positive, negative]: [i32; 2]) -> f64 {
+        // SAFETY: as above.
+        unsafe { difference(self.read(LOADED_AT), positive, negative) }
+    }
+
+    /// Adds to the right-hand side of an equation.
+    ///
+    /// # Safety
+    /// This is within a load, and the equation is the circuit's.
+    pub(crate) unsafe fn add(self, equation: i32, value: f64) {
+        // SAFETY: by contract.
+        unsafe { *self.read::<*mut f64>(SOLUTION).add(equation as usize) += value }
+    }
+}
+
+/// # Safety
+/// `vector` has the elements.
+unsafe fn difference(vector: *const f64, positive: i32, negative: i32) -> f64 {
+    // SAFETY: by contract.
+    unsafe { *vector.add(positive as usize) - *vector.add(negative as usize) }
+}

@@ -1,0 +1,197 @@
+//! The decks of the project, of its samples and of docs/ngspice.md on every ngspice at hand, compared with each other; and
+//! with KLU in place of Sparse where an ngspice has both.
+
+use crate::support::{Run, all_decks, complex, complex_deviation, deviation, real, run, run_text, versions};
+use bimorph::cosim::CosimOptions;
+use bimorph::results::table::{Samples, Table};
+use std::path::{Path, PathBuf};
+
+/// Columns of a transient that are compared, with the share of their range by which versions may differ: motion and
+/// temperature 1e-4, motional currents and what an amplifier makes of them 2e-3.
+const WAVES: [(&str, f64); 6] =
+    [("v(x)", 1e-4), ("v(x2)", 1e-4), ("v(y)", 1e-4), ("v(t)", 1e-4), ("i(vs)", 2e-3), ("v(out)", 2e-3)];
+
+/// Decks that run here: every `.cir` but those that want a server, and every whole deck of the documentation.
+fn decks(folder: &Path) -> Vec<PathBuf> {
+    let docs = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/ngspice.md")).unwrap();
+    let mut written: Vec<String> = Vec::new();
+    let mut inside = false;
+    for line in docs.lines() {
+        match line.strip_prefix("    ") {
+            Some(text) if inside || text.starts_with("* ") => {
+                if !inside {
+                    written.push(String::new());
+                }
+                inside = !text.starts_with(".end") || text.starts_with(".ends") || text.starts_with(".endc");
+                if let Some(deck) = written.last_mut() {
+                    *deck += &format!("{text}\n");
+                }
+            }
+            _ => inside = false,
+        }
+    }
+    written.retain(|deck| deck.contains("bimorph(") && deck.trim_end().ends_with(".end"));
+    assert!(!written.is_empty(), "docs/ngspice.md has no whole deck");
+    for (n, text) in written.iter().enumerate() {
+        std::fs::write(folder.join(format!("docs_{n}.cir")), text).unwrap();
+    }
+    let mut found: Vec<PathBuf> = (std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()))
+        .filter(|p| p.extension().is_some_and(|e| e == "cir") && !p.ends_with("comb_remote.cir"))
+        .collect();
+    found.sort();
+    found
+}
+
+fn on(deck: &Path, ngspice: &Path) -> Result<Run, String> {
+    let options = CosimOptions { deck: deck.to_owned(), ngspice: Some(ngspice.to_owned()), ..CosimOptions::default() };
+    run(options).map_err(|e| e.to_string())
+}
+
+/// Largest difference of two runs of one deck, in units of what is allowed, and where.
+fn difference(a: &Run, b: &Run) -> (f64, String) {
+    let mut worst = (0.0, String::new());
+    let mut take = |off: f64, what: String| {
+        if off.is_nan() || off > worst.0 {
+            worst = (off, what);
+        }
+    };
+    for (p, q) in a.plots.iter().zip(&b.plots) {
+        if p.plot_name.starts_with("Transient") {
+            let end = real(p, "time").last().copied().unwrap_or(0.0);
+            for (column, allowed) in WAVES.iter().filter(|(c, _)| p.column(c).is_some()) {
+                let wave = |t: &'static str, p: &Table| (real(p, t).to_vec(), real(p, column).to_vec());
+                let (x, y) = (wave("time", p), wave("time", q));
+                let off = deviation((&x.0, &x.1), (&y.0, &y.1), 0.0, end) / allowed;
+                take(off, format!("{column} in time"));
+            }
+            continue;
+        }
+        for column in p.columns() {
+            let Some(other) = q.column(&column.name) else { continue };
+            let off = match (&column.samples, &other.samples) {
+                (Samples::Complex(_), Samples::Complex(_)) => {
+                    complex_deviation(complex(p, &column.name), complex(q, &column.name))
+                }
+                (Samples::Real(x), Samples::Real(y)) => {
+                    let size = y.iter().fold(0.0f64, |m, y| m.max(y.abs()));
+                    let off = x.iter().zip(y).fold(0.0f64, |m, (x, y)| m.max((x - y).abs()));
+                    if size > 0.0 { off / size } else { off }
+                }
+                _ => f64::NAN,
+            };
+            take(off / 1e-4, format!("{} in {}", column.name, p.plot_name));
+        }
+    }
+    worst
+}
+
+/// Every deck runs on every version, and the waveforms agree with those of the first.
+#[test]
+fn every_deck_on_every_version() {
+    let folder = all_decks();
+    let versions = versions();
+    let mut table = String::from("deck");
+    versions.iter().for_each(|(v, _)| table += &format!(" | {v}"));
+    let mut wrong = Vec::new();
+    for deck in decks(folder.path()) {
+        let name = deck.file_name().unwrap().to_string_lossy().into_owned();
+        table += &format!("\n{name}");
+        let mut first: Option<Run> = None;
+        for (version, ngspice) in &versions {
+            match (on(&deck, ngspice), &first) {
+                (Err(e), _) => {
+                    table += " | fails";
+                    wrong.push(format!("{name} on {version}: {e}"));
+                }
+                (Ok(run), None) => {
+                    table += " | runs";
+                    first = Some(run);
+                }
+                (Ok(run), Some(reference)) => {
+                    let (off, what) = difference(reference, &run);
+                    table += &format!(" | {off:.3} of what is allowed, {what}");
+                    if off.is_nan() || off > 1.0 {
+                        wrong.push(format!("{name} on {version}: {what} differs by {off} of what is allowed"));
+                    }
+                }
+            }
+        }
+    }
+    println!("{table}");
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// Ten plates behind resistors, each with a monitor.
+fn ten_plates() -> String {
+    let plates: String = (1..=10).map(|n| format!("R{n} in d{n} {n}k\nA{n} %gd [d{n} 0] %v [x{n}] plate\n")).collect();
+    format!(
+        "* ten\nVin in 0 dc 2 ac 1 PULSE(2 4 1u 1u 1u 20u 40u)\n{plates}\
+         .model plate bimorph(file=\"damped_plate.net\" ports=[\"drive\"] monitors=[\"m.x:1e6\"])\n\
+         .op\n.ac dec 5 1k 100k\n.tran 0.1u 60u 0 0.1u\n.end\n"
+    )
+}
+
+/// KLU and Sparse solve the same equations: every sample of every column agrees within 1e-9 of the column's largest, with
+/// a monitor, without one, and with ten parts in one matrix.
+#[test]
+fn klu_agrees_with_sparse() {
+    let folder = all_decks();
+    let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
+    let silent: String = (ten_plates().lines())
+        .map(|line| match line.split_once(" %v ") {
+            Some((head, _)) => format!("{head} null plate\n"),
+            None => format!("{}\n", line.replace(" monitors=[\"m.x:1e6\"]", "")),
+        })
+        .collect();
+    for (version, ngspice) in versions().into_iter().filter(|(v, _)| *v >= 42) {
+        for (name, text) in
+            [("comb", read("comb.cir")), ("ten plates", ten_plates()), ("ten plates, no monitors", silent.clone())]
+        {
+            let sparse = run_text(&text, &ngspice).unwrap();
+            let with = text.replacen('\n', "\n.options klu\n", 1);
+            let klu = run_text(&with, &ngspice).unwrap_or_else(|e| panic!("{name} on {version} with KLU: {e}"));
+            assert_eq!(sparse.plots.len(), klu.plots.len());
+            let mut worst = (0.0f64, String::new());
+            for (p, q) in sparse.plots.iter().zip(&klu.plots) {
+                for column in p.columns() {
+                    let (x, y) = (column.samples.magnitudes(), q.column(&column.name).unwrap().samples.magnitudes());
+                    assert_eq!(x.len(), y.len(), "{name} on {version}: {} of {}", column.name, p.plot_name);
+                    let size = x.iter().fold(f64::MIN_POSITIVE, |m, x| m.max(x.abs()));
+                    let off = x.iter().zip(&y).fold(0.0f64, |m, (x, y)| m.max((x - y).abs())) / size;
+                    if off.is_nan() || off > worst.0 {
+                        worst = (off, format!("{} of {}", column.name, p.plot_name));
+                    }
+                }
+            }
+            println!("ngspice {version}, {name}: KLU differs from Sparse by {:e} ({})", worst.0, worst.1);
+            assert!(worst.0 < 1e-9, "{name} on {version}: {worst:?}");
+        }
+    }
+}
+
+/// Where a plate 1 N/m stiff and 1e-8 m² large stands at 2 V [um], by fixed-point iteration of k·x = ½εAV²/(g − x)².
+fn stands_at(gap: f64) -> f64 {
+    (0..200).fold(0.0, |x, _| 0.5 * 8.854e-12 * 1e-8 * 4.0 / (gap - x).powi(2)) * 1e6
+}
+
+/// Netlist parameters follow the deck's: from `.param`, as the only entry of `set` and as one of two; and geometry comes
+/// with the instance, through a subcircuit.
+#[test]
+fn settings_follow_the_deck() {
+    for (version, ngspice) in versions() {
+        let text = "* settings\n.param gdeck=3u\nVd a 0 2\n\
+            .model one bimorph(file=\"damped_plate.net\" monitors=[\"m.x:1e6\"] set=[\"g\" {gdeck}])\n\
+            A1 %gd [a 0] %v [x1] one\n\
+            .model two bimorph(file=\"damped_plate.net\" monitors=[\"m.x:1e6\"] set=[\"g\" {gdeck/2} \"spare:1\"])\n\
+            A2 %gd [a 0] %v [x2] two\n\
+            .subckt cell a x g=2u\nA1 %gd [a 0] %v [x] inner\n\
+            .model inner bimorph(file=\"damped_plate.net\" monitors=[\"m.x:1e6\"] set=[\"g\" {g}])\n.ends\n\
+            X1 a x3 cell g=2.5u\nX2 a x4 cell\n.op\n.end\n";
+        let run = run_text(text, &ngspice).unwrap_or_else(|e| panic!("ngspice {version}: {e}"));
+        let plot = run.plot("Operating");
+        for (column, gap) in [("v(x1)", 3e-6), ("v(x2)", 1.5e-6), ("v(x3)", 2.5e-6), ("v(x4)", 2e-6)] {
+            let (got, want) = (real(plot, column)[0], stands_at(gap));
+            assert!((got / want - 1.0).abs() < 1e-6, "ngspice {version}: {column} is {got}, expected {want}");
+        }
+    }
+}
