@@ -20,7 +20,7 @@ pub(super) struct ClosureShape<T> {
     second: [T; 3],
     lever: T,
     held: Vec<[T; 3]>,
-    pub(super) locked: [bool; 3],
+    pub locked: [bool; 3],
     /// Two material points coincide, whatever the turn between the bodies.
     pin: bool,
 }
@@ -28,11 +28,11 @@ pub(super) struct ClosureShape<T> {
 /// One direction of a closure: its value, rate, rows over bodies a and b, and the velocity part of its second derivative.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Strain<T> {
-    pub(super) value: T,
-    pub(super) rate: T,
-    pub(super) a: [T; 3],
-    pub(super) b: [T; 3],
-    pub(super) bias: T,
+    pub value: T,
+    pub rate: T,
+    pub a: [T; 3],
+    pub b: [T; 3],
+    pub bias: T,
 }
 
 impl<T: Real> ClosureShape<T> {

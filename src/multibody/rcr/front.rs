@@ -19,14 +19,14 @@ use super::scalar::Real;
 /// One front, in row-major order: M is k × k (lower triangle), rows are h × (k + 1) with γ last.
 #[derive(Debug)]
 pub(super) struct Front<'a, T> {
-    pub(super) freedom: usize,
-    pub(super) size: usize,
-    pub(super) rows: usize,
-    pub(super) m: &'a mut [T],
-    pub(super) g: &'a mut [T],
-    pub(super) r: &'a mut [T],
+    pub freedom: usize,
+    pub size: usize,
+    pub rows: usize,
+    pub m: &'a mut [T],
+    pub g: &'a mut [T],
+    pub r: &'a mut [T],
     /// Unit of each coordinate: what makes it a length.
-    pub(super) unit: &'a [T],
+    pub unit: &'a [T],
 }
 
 impl<T: Real> Front<'_, T> {

@@ -22,9 +22,9 @@ pub(super) type Pair<T> = [T; 2];
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Inertia<T> {
     /// [kg]
-    pub(super) mass: T,
+    pub mass: T,
     /// About the centre of mass [kg·m²].
-    pub(super) moment: T,
+    pub moment: T,
 }
 
 /// From the centres of mass of a link's parent and of itself to their joint, as drawn [m], over lanes.
@@ -97,11 +97,11 @@ pub struct Placed<T> {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Hanging<T> {
     /// From the parent's centre of mass to the pin, R_p·arm_p; where there is no pin, to this body's centre of mass [m].
-    pub(super) lever_parent: Pair<T>,
+    pub lever_parent: Pair<T>,
     /// From this body's centre of mass to the pin, R·arm; zero where there is none [m].
     lever: Pair<T>,
     /// Velocity part c of the acceleration [m/s²].
-    pub(super) bias: Pair<T>,
+    pub bias: Pair<T>,
 }
 
 /// Cosine less one and sine of an angle, from the sine and cosine of its half: nothing cancels.

@@ -11,18 +11,18 @@ use super::tree::Linkage;
 /// What does not move.
 #[derive(Debug)]
 pub(super) struct Mechanism<T> {
-    pub(super) schedule: Schedule,
+    pub schedule: Schedule,
     /// One a body, in elimination order.
-    pub(super) inertias: Vec<Inertia<T>>,
+    pub inertias: Vec<Inertia<T>>,
     /// One a body.
-    pub(super) arms: Vec<Arms<T>>,
+    pub arms: Vec<Arms<T>>,
     /// One a body, see [`super::Link::sign`].
-    pub(super) signs: Vec<T>,
+    pub signs: Vec<T>,
     /// One for each body on a joint that is no pin.
-    pub(super) joints: Vec<JointShape<T>>,
-    pub(super) closures: Vec<ClosureShape<T>>,
+    pub joints: Vec<JointShape<T>>,
+    pub closures: Vec<ClosureShape<T>>,
     /// Unit of each coordinate: what makes it a length [m, or m/m].
-    pub(super) units: Vec<T>,
+    pub units: Vec<T>,
 }
 
 impl<T: Real> Mechanism<T> {

@@ -34,13 +34,13 @@ pub(super) struct Handed<T> {
 /// A body on a pin.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Pinned<'a, T> {
-    pub(super) inertia: &'a Inertia<T>,
-    pub(super) sign: T,
-    pub(super) hanging: &'a Hanging<T>,
+    pub inertia: &'a Inertia<T>,
+    pub sign: T,
+    pub hanging: &'a Hanging<T>,
     /// Wrench on it.
-    pub(super) force: &'a [T; 3],
+    pub force: &'a [T; 3],
     /// Force on its coordinate.
-    pub(super) torque: T,
+    pub torque: T,
 }
 
 impl<T: Real> Handed<T> {

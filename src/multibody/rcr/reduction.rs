@@ -34,9 +34,9 @@ pub enum Task {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Node<T> {
     /// Inertia that outer bodies hand on: xx, xy, yy, xθ, yθ, θθ.
-    pub(super) inertia: [T; 6],
+    pub inertia: [T; 6],
     /// Wrench that they hand on.
-    pub(super) momentum: [T; 3],
+    pub momentum: [T; 3],
 }
 
 impl<T: Real> Node<T> {
@@ -46,45 +46,45 @@ impl<T: Real> Node<T> {
 /// What a reduction reads; nothing of it changes on the way.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Given<'a, T> {
-    pub(super) task: Task,
-    pub(super) mechanism: &'a Mechanism<T>,
-    pub(super) offsets: &'a Offsets<T>,
-    pub(super) placement: &'a Placement<T>,
-    pub(super) force: &'a [[T; 3]],
-    pub(super) torque: &'a [T],
+    pub task: Task,
+    pub mechanism: &'a Mechanism<T>,
+    pub offsets: &'a Offsets<T>,
+    pub placement: &'a Placement<T>,
+    pub force: &'a [[T; 3]],
+    pub torque: &'a [T],
 }
 
 /// What a reduction works in.
 #[derive(Debug, Clone)]
 pub(super) struct Workspace<T> {
-    pub(super) nodes: Vec<Node<T>>,
+    pub nodes: Vec<Node<T>>,
     /// Couplings of pairs of bodies, by [`super::schedule::Schedule::blocks`].
-    pub(super) coupling: Vec<[T; 9]>,
+    pub coupling: Vec<[T; 9]>,
     /// Constraint rows, by [`Turn::row_start`].
-    pub(super) rows: Vec<T>,
+    pub rows: Vec<T>,
     /// Acceleration of a coordinate per acceleration of the bodies of its front; a pin's per acceleration of its point.
-    pub(super) coefficients: Vec<T>,
+    pub coefficients: Vec<T>,
     /// Acceleration of a coordinate when its front rests; a pin's body's.
-    pub(super) base: Vec<T>,
+    pub base: Vec<T>,
     /// Which orthogonal combinations of a body's coordinates were taken out; none where no body has several.
-    pub(super) combined: Vec<[[T; 3]; 3]>,
+    pub combined: Vec<[[T; 3]; 3]>,
     /// What a pin has handed to the next of its run.
-    pub(super) handed: Handed<T>,
+    pub handed: Handed<T>,
     /// See [`super::Reduction::nearness`].
-    pub(super) nearness: T,
+    pub nearness: T,
     /// What an implicit step adds to each body, see [`super::stages`]; empty otherwise.
-    pub(super) added: Vec<Added<T>>,
+    pub added: Vec<Added<T>>,
     /// The same to each coupling, in the order of the pattern.
-    pub(super) added_coupling: Vec<[T; 9]>,
-    pub(super) front: Scratch<T>,
+    pub added_coupling: Vec<[T; 9]>,
+    pub front: Scratch<T>,
 }
 
 /// Room for one front at a time.
 #[derive(Debug, Clone)]
 pub(super) struct Scratch<T> {
-    pub(super) m: Vec<T>,
-    pub(super) g: Vec<T>,
-    pub(super) r: Vec<T>,
+    pub m: Vec<T>,
+    pub g: Vec<T>,
+    pub r: Vec<T>,
 }
 
 impl<T: Real> Workspace<T> {

@@ -29,31 +29,31 @@ pub(super) enum Kind {
 /// What the passes over all bodies read first.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Step {
-    pub(super) kind: Kind,
+    pub kind: Kind,
     /// A pin: its one coordinate turns it.
-    pub(super) pin: bool,
+    pub pin: bool,
     /// Other bodies than the one before in a run of pins hand something to it.
-    pub(super) gathers: bool,
+    pub gathers: bool,
     /// Its parent is the body after it, and both are of a run of pins.
-    pub(super) hands_on: bool,
+    pub hands_on: bool,
     /// Parent body; `u32::MAX`: ground or free.
     parent: u32,
     /// Its last coordinate turns it.
     turns: bool,
     /// See [`Turn::coupled`].
-    pub(super) coupled: bool,
+    pub coupled: bool,
     /// See [`Turn::freedom`].
-    pub(super) freedom: u8,
+    pub freedom: u8,
     /// First coordinate.
-    pub(super) first: u32,
+    pub first: u32,
     /// Its place among the joints that are no pins.
-    pub(super) joint: u32,
+    pub joint: u32,
     /// Where what is handed to it gathers.
-    pub(super) node: u32,
+    pub node: u32,
     /// See [`Turn::column`].
-    pub(super) column: u32,
+    pub column: u32,
     /// See [`Turn::coefficient_start`].
-    pub(super) coefficient_start: u32,
+    pub coefficient_start: u32,
 }
 
 impl Step {
@@ -74,85 +74,85 @@ impl Step {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Entry {
     /// The body.
-    pub(super) body: usize,
+    pub body: usize,
     /// First of its rows there.
-    pub(super) row: usize,
+    pub row: usize,
     /// Place of the other body in the front; none: ground.
-    pub(super) other: usize,
+    pub other: usize,
     /// Number of rows.
-    pub(super) count: usize,
+    pub count: usize,
     /// Bodies a and b of the joint; none: ground.
-    pub(super) ends: [Option<u32>; 2],
+    pub ends: [Option<u32>; 2],
 }
 
 /// What a schedule is for.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Plan {
     /// Every pair of the pattern may be coupled, not those alone that loops couple: stages of implicit methods.
-    pub(super) coupled: bool,
+    pub coupled: bool,
     /// With what is there for speed alone ([`super::fast`]).
-    pub(super) fast: bool,
+    pub fast: bool,
 }
 
 /// The whole schedule.
 #[derive(Debug, Clone)]
 pub(super) struct Schedule {
-    pub(super) plan: Plan,
+    pub plan: Plan,
     turns: Vec<Packed>,
-    pub(super) steps: Vec<Step>,
+    pub steps: Vec<Step>,
     /// Bodies of all fronts.
-    pub(super) fronts: Vec<u32>,
+    pub fronts: Vec<u32>,
     /// Where what is handed to them gathers: [`Step::node`] of each.
-    pub(super) nodes: Vec<u32>,
+    pub nodes: Vec<u32>,
     /// Where the couplings of a body to them gather.
-    pub(super) blocks: Vec<u32>,
+    pub blocks: Vec<u32>,
     /// Where the couplings gather that updates change, in the order of [`crate::multibody::Pattern::targets`].
-    pub(super) targets: Vec<u32>,
+    pub targets: Vec<u32>,
     /// Nodes in use at one time.
-    pub(super) node_count: usize,
+    pub node_count: usize,
     /// Couplings in use at one time.
-    pub(super) block_count: usize,
-    pub(super) entries: Vec<Entry>,
+    pub block_count: usize,
+    pub entries: Vec<Entry>,
     /// Place of each front body at the body the rows go to: 0 itself, 1 + slot of its front.
     maps: Vec<u32>,
-    pub(super) row_entries: usize,
-    pub(super) coefficient_entries: usize,
+    pub row_entries: usize,
+    pub coefficient_entries: usize,
     /// Rows that reach no body: more constraints than coordinates in some loop.
-    pub(super) redundant: usize,
+    pub redundant: usize,
     /// Multiplications of one reduction.
-    pub(super) multiplications: u64,
+    pub multiplications: u64,
 }
 
 /// One body's turn.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Turn {
     /// Coordinates of its joint.
-    pub(super) freedom: usize,
+    pub freedom: usize,
     /// Bodies of its front: rows of its column in the pattern.
-    pub(super) front: usize,
+    pub front: usize,
     /// Constraint rows that reach it.
-    pub(super) rows: usize,
+    pub rows: usize,
     /// Place of its parent in the front; none: ground or free.
-    pub(super) parent: usize,
+    pub parent: usize,
     /// A loop that was closed before couples it to its front.
-    pub(super) coupled: bool,
+    pub coupled: bool,
     /// Start of its front among the schedule's fronts, nodes and blocks.
-    pub(super) column: usize,
+    pub column: usize,
     /// Start of the couplings that its front's update changes.
-    pub(super) targets: usize,
+    pub targets: usize,
     /// First coordinate.
-    pub(super) first: usize,
+    pub first: usize,
     /// Start of its rows in the row arena; each row has 3 + 3·front + 1 entries.
-    pub(super) row_start: usize,
+    pub row_start: usize,
     /// Start of its coefficients in the coefficient arena: two of a pin, 3·front of any other coordinate that is alone,
     /// `freedom` rows of freedom + 3·front entries where [`Kind::Any`] takes them out.
-    pub(super) coefficient_start: usize,
+    pub coefficient_start: usize,
     /// Start of its row transformation in the transformation arena.
-    pub(super) next: usize,
+    pub next: usize,
     /// Where the rows that are left go within the next body's rows.
-    pub(super) next_row: usize,
+    pub next_row: usize,
     /// Start of the map from this front's bodies to places at the next body.
-    pub(super) map_start: usize,
+    pub map_start: usize,
 }
 
 /// What a body's turn needs besides its step; the meanings are those of [`Turn`].

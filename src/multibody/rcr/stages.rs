@@ -34,9 +34,9 @@ pub struct AddedInertia {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Added<T> {
     /// Over the coordinates of its joint, the lower triangle by rows.
-    pub(super) joint: [T; 6],
+    pub joint: [T; 6],
     /// On the body: xx, xy, yy, xθ, yθ, θθ.
-    pub(super) body: [T; 6],
+    pub body: [T; 6],
 }
 
 impl AddedInertia {
