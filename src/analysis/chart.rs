@@ -26,7 +26,7 @@ use super::modes::modes;
 use super::{AnalysisError, PortVoltages, Watch};
 use crate::compile::{CompileError, CompileOptions};
 use crate::netlist::Bundle;
-use crate::solve::linear::SolverKind;
+use crate::solve::baseline::SolverKind;
 use runs::{Progress, Request, order, precision};
 use serde::Serialize;
 use thiserror::Error;

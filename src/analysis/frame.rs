@@ -14,10 +14,10 @@ use crate::gaps::{Point, Ramp};
 use crate::multibody::factor::ZeroPivot;
 use crate::multibody::planar::Pose;
 use crate::solve::SolveError;
-use crate::solve::consistent::lowest_consistent_modes;
+use crate::solve::baseline::frame_modes::lowest_consistent_modes;
+use crate::solve::baseline::frame_motion::Newmark;
+use crate::solve::baseline::sparse::Sparse;
 use crate::solve::linear::LinearSolver;
-use crate::solve::linear::sparse::Sparse;
-use crate::solve::newmark::Newmark;
 
 /// Steps between two output times are doubled until the motion settles, up to this many.
 const MOST_STEPS: usize = 1 << 14;

@@ -86,8 +86,8 @@ impl From<crate::solve::SolveError> for AnalysisError {
     }
 }
 
-impl From<crate::solve::linear::TooLarge> for AnalysisError {
-    fn from(error: crate::solve::linear::TooLarge) -> Self {
+impl From<crate::solve::baseline::TooLarge> for AnalysisError {
+    fn from(error: crate::solve::baseline::TooLarge) -> Self {
         Self::BadRequest { what: "solver".into(), detail: error.to_string() }
     }
 }

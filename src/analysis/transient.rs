@@ -9,9 +9,9 @@ use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
 use crate::options::analysis::TRAN_POINTS;
 use crate::solve::adaptive::{Advance, Control, Observer};
+use crate::solve::baseline::{Solver, SolverKind};
 use crate::solve::dense::interpolate;
 use crate::solve::event::{Detector, Direction};
-use crate::solve::linear::{Solver, SolverKind};
 use crate::solve::method::{Motion, Work};
 use serde::Serialize;
 

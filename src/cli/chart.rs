@@ -14,7 +14,7 @@ use bimorph::options::Value;
 use bimorph::options::analysis::CHART_POINTS;
 use bimorph::results::atomic;
 use bimorph::results::format::Format;
-use bimorph::solve::linear::SolverKind;
+use bimorph::solve::baseline::SolverKind;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 use std::path::{Path, PathBuf};

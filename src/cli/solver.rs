@@ -1,6 +1,6 @@
 //! `--solver`: what solves the equations.
 
-use bimorph::solve::linear::SolverKind;
+use bimorph::solve::baseline::SolverKind;
 use clap::ValueEnum;
 use serde::Serialize;
 

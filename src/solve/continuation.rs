@@ -15,14 +15,15 @@
 //! nonlinear eigenvalue problems" (1977); W. Wagner, P. Wriggers, Eng. Comput. 5 (1988) 103, for switching along φ.
 
 mod branching;
+pub mod family;
 
 use super::SolveError;
-use super::family::Blend;
 use crate::gaps::System;
 use crate::multibody::BlockMatrix;
 use crate::multibody::factor::ZeroPivot;
 use crate::multibody::planar::Pose;
 use crate::options::analysis::PATH_POINTS;
+use family::Blend;
 
 /// Where to go at a bifurcation that takes the path's stability away.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]

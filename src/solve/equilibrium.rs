@@ -10,12 +10,14 @@
 //! Structures 15 (1979), for folds; Kelley & Keyes, "Convergence analysis of pseudo-transient continuation", SIAM J. Numer.
 //! Anal. 35 (1998), for the fall.
 
+pub mod path;
+
 use super::SolveError;
-use super::path::LoadPath;
 use crate::gaps::{Drive, System};
 use crate::multibody::BlockMatrix;
 use crate::multibody::factor::ZeroPivot;
 use crate::multibody::planar::Pose;
+use path::LoadPath;
 
 /// Corrections below this share of the displacement that no longer shrink are rounding.
 const STALLED: f64 = 1e-5;

@@ -1,73 +1,30 @@
 //! What advances or balances a system.
 //!
-//! | file | what it holds |
+//! | folder | what it holds |
 //! |---|---|
+//! | [`linear`] | what solves with the tangent: the block recursion |
 //! | [`equilibrium`] | static equilibrium along a path of loads: Newton, load stepping, folds and jumps |
 //! | [`continuation`] | equilibrium paths by arc length: folds, bifurcations, branches |
-//! | [`family`] | systems whose loads, strains and voltages depend on one number |
-//! | [`path`] | source voltages and loads along which an equilibrium is followed |
-//! | [`method`] | what every integrator is: one step, its estimated error, its work |
-//! | [`rodas4`] | the default integrator: a Rosenbrock method with one factorization a step, and its sensitivities |
-//! | [`avf`] | average vector field: keeps the energy |
-//! | [`midpoint`] | implicit midpoint rule |
-//! | [`tr_bdf2`] | TR-BDF2: order 2, L-stable |
-//! | [`sdirk4`] | a diagonally implicit Runge–Kutta method of order 4, L-stable |
-//! | [`generalized_alpha`] | generalized-α with a chosen damping of fast motions, and Newmark's rule |
-//! | [`radau5`] | Radau IIA of order 5: one real and one complex block factorization a step |
-//! | [`rk45`] | Dormand–Prince on bodies: explicit |
-//! | [`dense`] | the motion inside a step |
-//! | [`event`] | when a quantity crosses zero during a step |
-//! | [`doubling`] | error control by step doubling for methods without an estimate |
-//! | [`linear`] | what solves with the tangent: the block recursion, and the baselines it is measured against |
-//! | [`adaptive`] | drives any of them: error control, or equal steps |
-//! | `step_size` | how long the next step is |
-//! | [`dormand_prince`] | an explicit Runge–Kutta pair on flat slices, for any formulation that tells its accelerations |
-//! | [`consistent`] | natural frequencies of a linear frame with a full mass matrix, densely: a baseline |
-//! | [`newmark`] | linear motion by the trapezoidal rule: a baseline |
-//! | [`eigen`] | lowest natural frequencies: shift-invert Lanczos on the same factor |
-//! | [`fastest`] | the highest natural frequency in joint coordinates |
-//! | [`joint_loads`] | what acts on a system, for a motion in joint coordinates |
-//! | [`joint_motion`] | motion in joint coordinates, loops closed after each step |
-//! | `anderson` | acceleration of an iteration that contracts slowly |
-//! | [`joint_stage`] | the stages of implicit methods in joint coordinates |
-//! | [`joint_dirk`] | implicit methods in joint coordinates |
-//! | [`joint_adaptive`] | drives them: error control, or equal steps |
-//! | [`harmonic`] | small-signal response at one frequency: the same factorization over complex numbers |
+//! | [`frequency`] | natural frequencies, and the response at one frequency |
+//! | [`time`] | motion: integrators, what drives them, and what happens on the way |
+//! | [`baseline`] | other solvers and models, to compare with |
 
-pub mod adaptive;
-mod anderson;
-pub mod avf;
-pub mod centred;
-pub mod consistent;
+pub mod baseline;
 pub mod continuation;
-pub mod dense;
-pub mod dormand_prince;
-pub mod doubling;
-pub mod eigen;
 pub mod equilibrium;
-pub mod event;
-pub mod family;
-pub mod fastest;
-pub mod generalized_alpha;
-pub mod harmonic;
-mod implicit;
-pub mod joint_adaptive;
-pub mod joint_dirk;
-pub mod joint_loads;
-pub mod joint_motion;
-pub mod joint_stage;
+pub mod frequency;
 pub mod linear;
-pub mod method;
-pub mod midpoint;
-pub mod newmark;
-pub mod path;
-pub mod radau5;
-pub mod rk45;
-pub mod rodas4;
-pub mod sdirk4;
-mod step_size;
-pub mod subspace;
-pub mod tr_bdf2;
+pub mod time;
+
+// the same modules by the names that they had before there were folders
+pub use continuation::family;
+pub use equilibrium::path;
+pub use frequency::{eigen, fastest, harmonic, subspace};
+pub use time::interpolation as dense;
+pub use time::{
+    adaptive, avf, centred, dormand_prince, doubling, event, generalized_alpha, joint_adaptive, joint_dirk,
+    joint_loads, joint_motion, joint_stage, method, midpoint, radau5, rk45, rodas4, sdirk4, tr_bdf2,
+};
 
 use crate::multibody::factor::ZeroPivot;
 use thiserror::Error;

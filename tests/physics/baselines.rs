@@ -7,7 +7,7 @@ use bimorph::analysis::transient::{TransientOptions, transient};
 use bimorph::compile::{CompileOptions, Compiled, Junctions, compile};
 use bimorph::discretize::frame::{Elements, FrameOptions};
 use bimorph::netlist::{Bundle, Setting};
-use bimorph::solve::linear::SolverKind;
+use bimorph::solve::baseline::SolverKind;
 use std::path::Path;
 
 fn bank(band: Option<f64>) -> Compiled {

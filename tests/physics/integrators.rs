@@ -8,9 +8,10 @@ use bimorph::gaps::{Ramp, System};
 use bimorph::netlist::Setting;
 use bimorph::solve::SolveError;
 use bimorph::solve::adaptive::Control;
+use bimorph::solve::baseline::Solver;
 use bimorph::solve::equilibrium::{Equilibrium, EquilibriumOptions};
 use bimorph::solve::event::Direction;
-use bimorph::solve::linear::{Recursion, Solver};
+use bimorph::solve::linear::Recursion;
 use bimorph::solve::method::{Motion, Work};
 use bimorph::solve::path::SourcePath;
 

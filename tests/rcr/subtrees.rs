@@ -106,6 +106,15 @@ fn nothing_equal() {
     }
 }
 
+/// As drawn, loops of straight arms and rails are singular: what is not finite there is so on every way, and zeros have the
+/// same sign.
+#[test]
+fn singular_as_drawn() {
+    for (name, units) in [("ladder", 6), ("arms", 9), ("bank", 5)] {
+        same_bits(&topologies::named(name, units).pinned(), 1, 0.0);
+    }
+}
+
 /// Hangs `copies` of a random subtree on bodies of a trunk, which is drawn at `places`: up to four bodies with joints of any
 /// kind, with loops inside, to ground and to the trunk. What is random of it besides its size comes from `shape`.
 fn hang(m: &mut Mechanism, trunk: &[(BodyId, [f64; 2])], copies: usize, shape: u64, s: &mut Stream) {

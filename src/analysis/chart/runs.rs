@@ -9,7 +9,7 @@ use crate::analysis::integrator::Integrator;
 use crate::analysis::joint_transient::joint_transient;
 use crate::analysis::transient::{TransientOptions, TransientResult, transient};
 use crate::analysis::{AnalysisError, Watch};
-use crate::solve::linear::SolverKind;
+use crate::solve::baseline::SolverKind;
 use std::time::Instant;
 
 /// What integrates references.

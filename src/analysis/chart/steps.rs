@@ -10,7 +10,7 @@ use crate::analysis::AnalysisError;
 use crate::analysis::integrator::Integrator;
 use crate::analysis::statics::{operating_point, source_vector};
 use crate::gaps::Ramp;
-use crate::solve::linear::{Solver, SolverKind};
+use crate::solve::baseline::{Solver, SolverKind};
 use crate::solve::method::{Method, Motion};
 use crate::solve::rodas4::Rodas4;
 use std::time::Instant;

@@ -84,7 +84,7 @@ impl<T: Real> Workspace<T> {
                 for i in 0..3 {
                     let row = [block[3 * i], block[3 * i + 1], block[3 * i + 2]];
                     c[slot][i] = row[0] * s[0] + row[1] * s[1] + row[2] * s[2];
-                    g[slot][i] = -(row[0] * bias[0] + row[1] * bias[1]);
+                    g[slot][i] = T::ZERO - (row[0] * bias[0] + row[1] * bias[1]);
                     let shifted = [row[0], row[1], row[2] + (row[1] * dx - row[0] * dy)];
                     for p in 0..W {
                         if p == turn.parent {

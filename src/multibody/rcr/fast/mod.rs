@@ -17,4 +17,4 @@ mod pins;
 pub(super) use dispatch::{accelerate, place, reduce};
 pub(super) use kernels::Small;
 pub use lanes::Lanes;
-pub use packs::Packs;
+pub(super) use packs::Packs;

@@ -21,11 +21,11 @@
 mod ports;
 mod stages;
 
-use super::linear::{LinearSolver, Recursion};
 pub use super::method::Motion;
 use super::method::{Method, StepFailure, Work};
 use crate::gaps::{Drive, Ramp, System};
 use crate::multibody::{BlockMatrix, forces};
+use crate::solve::linear::{LinearSolver, Recursion};
 use ports::Ports;
 use stages::Stages;
 

@@ -8,11 +8,11 @@
 //! make an iteration. It ends when the next correction would be below 1e-12 of the displacement (largest translation, or
 //! rotation times the model's length scale), or when rounding lets corrections shrink no further.
 
-use super::linear::LinearSolver;
 use super::method::{Motion, StepFailure, Work};
 use crate::gaps::{Drive, Ramp, System};
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, forces};
+use crate::solve::linear::LinearSolver;
 
 /// Next correction allowed, relative to the displacement.
 const TOLERANCE: f64 = 1e-12;

@@ -10,11 +10,11 @@
 //! Reference: E. Hairer, G. Wanner, "Solving Ordinary Differential Equations II" (1996), §IV.6, table 6.5.
 
 use super::implicit::{Equation, Implicit, Sample};
-use super::linear::{LinearSolver, Recursion};
 use super::method::{Method, Motion, StepFailure, Work};
 use crate::gaps::{Ramp, System};
 use crate::multibody::forces;
 use crate::multibody::planar::Pose;
+use crate::solve::linear::{LinearSolver, Recursion};
 
 const GAMMA: f64 = 0.25;
 /// Nodes.

@@ -5,10 +5,10 @@
 
 use super::dormand_prince::{DormandPrince, SecondOrder};
 use super::method::{Method, Motion, StepFailure, Work};
-use super::{DIRECTIONS, SolveError};
 use crate::gaps::{Drive, Ramp, System};
 use crate::multibody::forces;
 use crate::multibody::planar::Pose;
+use crate::solve::{DIRECTIONS, SolveError};
 
 /// The method with its storage.
 #[derive(Debug, Clone)]

@@ -3,9 +3,9 @@
 //! The same block factorization over complex numbers; the matrix is symmetric. An undamped structure close to a local
 //! resonance of one of its branches can have a small pivot, so each solution is refined once against its own residual.
 
-use super::SolveError;
 use crate::gaps::System;
 use crate::multibody::BlockMatrix;
+use crate::solve::SolveError;
 use nalgebra::{Complex, Vector3};
 
 /// Complex displacement of one body.

@@ -9,11 +9,11 @@
 //!
 //! Reference: N. M. Newmark, "A method of computation for structural dynamics", J. Eng. Mech. Div. ASCE 85 (1959).
 
-use super::linear::LinearSolver;
 use crate::multibody::BlockMatrix;
 use crate::multibody::factor::ZeroPivot;
 use crate::multibody::linear_system::LinearSystem;
 use crate::multibody::planar::Pose;
+use crate::solve::linear::LinearSolver;
 
 /// The rule for one step length, with its factor and storage.
 #[derive(Debug)]

@@ -8,10 +8,11 @@
 //!
 //! Reference: G. H. Golub, C. F. Van Loan, "Matrix Computations" (2013), §3.4.
 
-use super::{LinearSolver, Scratch, flatten, spread, unflatten};
+use super::{Scratch, flatten, spread, unflatten};
 use crate::multibody::factor::ZeroPivot;
 use crate::multibody::planar::{DOF, Pose};
 use crate::multibody::{BlockMatrix, Pattern};
+use crate::solve::linear::LinearSolver;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::lu::partial_pivoting::{factor, solve};
 use faer::perm::PermRef;

@@ -14,11 +14,11 @@
 //! Reference: J. Chung, G. M. Hulbert, J. Appl. Mech. 60 (1993) 371–375; N. M. Newmark, J. Eng. Mech. 85 (1959) 67–94.
 
 use super::implicit::{Equation, Implicit, Sample};
-use super::linear::{LinearSolver, Recursion};
 use super::method::{Method, Motion, StepFailure, Work};
 use crate::gaps::{Ramp, System};
 use crate::multibody::forces;
 use crate::multibody::planar::Pose;
+use crate::solve::linear::{LinearSolver, Recursion};
 
 /// The method with its storage.
 #[derive(Debug, Clone)]

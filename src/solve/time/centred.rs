@@ -5,10 +5,10 @@
 //! With v₁ = 2x/h − v₀ the only unknown is x. Neither has an error estimate of its own; see [`super::doubling`].
 
 use super::implicit::{Equation, Implicit, Sample};
-use super::linear::{LinearSolver, Recursion};
 use super::method::{Method, Motion, StepFailure, Work};
 use crate::gaps::{Ramp, System};
 use crate::multibody::planar::Pose;
+use crate::solve::linear::{LinearSolver, Recursion};
 use std::fmt::Debug;
 use std::marker::PhantomData;
 

@@ -9,10 +9,11 @@
 //! Reference: P. R. Amestoy, T. A. Davis, I. S. Duff, "An approximate minimum degree ordering algorithm", SIAM J. Matrix
 //! Anal. Appl. 17 (1996).
 
-use super::{LinearSolver, Scratch, SolverKind, TooLarge, flatten, unflatten};
+use super::{Scratch, SolverKind, TooLarge, flatten, unflatten};
 use crate::multibody::factor::ZeroPivot;
 use crate::multibody::planar::{DOF, Pose};
 use crate::multibody::{BlockMatrix, Pattern};
+use crate::solve::linear::LinearSolver;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::sparse::linalg::cholesky::{
     LdltRef, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering, factorize_symbolic_cholesky,

@@ -12,11 +12,11 @@
 //! Reference: M. E. Hosea, L. F. Shampine, "Analysis and implementation of TR-BDF2", Appl. Numer. Math. 20 (1996) 21–37.
 
 use super::implicit::{Equation, Implicit, Sample};
-use super::linear::{LinearSolver, Recursion};
 use super::method::{Method, Motion, StepFailure, Work};
 use crate::gaps::{Ramp, System};
 use crate::multibody::forces;
 use crate::multibody::planar::Pose;
+use crate::solve::linear::{LinearSolver, Recursion};
 use std::f64::consts::SQRT_2;
 
 const GAMMA: f64 = 2.0 - SQRT_2;

@@ -8,9 +8,10 @@
 
 use super::method::{Method, Motion, StepFailure, Work};
 use super::rodas4::Rodas4;
-use super::{SolveError, WhyFailed, step_size};
+use super::step_size;
 use crate::gaps::{Ramp, System};
 use crate::multibody::planar::Pose;
+use crate::solve::{SolveError, WhyFailed};
 
 /// Share of the length scale below which a displacement's relative error does not count.
 const FLOOR: f64 = 1e-4;
@@ -209,7 +210,7 @@ impl<M: Method> Adaptive<M> {
             }
         }
         let body = system.model.bodies[body].name.to_string();
-        SolveError::StepTooSmall { t, dt, rejected, body, direction: super::DIRECTIONS[direction] }
+        SolveError::StepTooSmall { t, dt, rejected, body, direction: crate::solve::DIRECTIONS[direction] }
     }
 }
 
@@ -231,5 +232,5 @@ fn not_finite(motion: &Motion) -> Option<(usize, usize)> {
 
 /// √(xᵀMx).
 fn mass_norm(system: &System, x: &[Pose]) -> f64 {
-    super::eigen::mass_product(&system.model, x, x).sqrt()
+    crate::solve::frequency::eigen::mass_product(&system.model, x, x).sqrt()
 }

@@ -4,7 +4,7 @@
 //! Reference: E. Hairer, C. Lubich, G. Wanner, "Geometric Numerical Integration" (2006), §II.1.2.
 
 use super::centred::{Centred, Rule};
-use super::linear::Recursion;
+use crate::solve::linear::Recursion;
 
 /// The middle of the chord.
 #[derive(Debug, Clone)]

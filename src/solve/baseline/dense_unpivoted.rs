@@ -10,10 +10,11 @@
 //!
 //! Reference: G. H. Golub, C. F. Van Loan, "Matrix Computations" (2013), algorithm 3.2.1 (outer product LU).
 
-use super::{LinearSolver, spread};
+use super::spread;
 use crate::multibody::factor::ZeroPivot;
 use crate::multibody::planar::{DOF, Pose};
 use crate::multibody::{BlockMatrix, Pattern};
+use crate::solve::linear::LinearSolver;
 
 /// L and U of a dense matrix, row by row in one square.
 #[derive(Debug, Clone)]

@@ -11,7 +11,7 @@
 //! 41 (2008) 045206, eq. 4; E. Hairer, "Energy-preserving variant of collocation methods", JNAIAM 5 (2010).
 
 use super::centred::{Centred, Rule};
-use super::linear::Recursion;
+use crate::solve::linear::Recursion;
 
 /// Half of 1/√3.
 const HALF: f64 = 0.288_675_134_594_812_9;

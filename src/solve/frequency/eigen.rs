@@ -8,10 +8,10 @@
 //!
 //! Reference: T. Ericsson, A. Ruhe, "The spectral transformation Lanczos method", Math. Comp. 35 (1980).
 
-use super::SolveError;
 use crate::gaps::System;
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, Model, Pattern};
+use crate::solve::SolveError;
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::matrix_free::LinOp;
 use faer::matrix_free::eigen::{PartialEigenParams, partial_self_adjoint_eigen, partial_self_adjoint_eigen_scratch};

@@ -1,0 +1,262 @@
+//! Baselines that the recursion is measured against: other factorizations of the same matrix, which find the same solution to
+//! rounding, and the linear frame with its full mass matrix.
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | [`dense_unpivoted`] | dense elimination without exchanges, as a symbolic solution does |
+//! | [`dense`] | dense LU with partial pivoting |
+//! | [`sparse`] | sparse L·D·Lᵀ with an approximate minimum degree ordering |
+//! | [`frame_modes`] | natural frequencies of a linear frame, densely |
+//! | [`frame_motion`] | its motion by the trapezoidal rule |
+
+pub mod dense;
+pub mod dense_unpivoted;
+pub mod frame_modes;
+pub mod frame_motion;
+pub mod sparse;
+
+use super::linear::{LinearSolver, Recursion};
+use crate::multibody::factor::ZeroPivot;
+use crate::multibody::planar::{DOF, Pose};
+use crate::multibody::{BlockMatrix, Pattern};
+use dense::Dense;
+use dense_unpivoted::DenseUnpivoted;
+use faer::dyn_stack::MemBuffer;
+use sparse::Sparse;
+use thiserror::Error;
+
+/// Names of the linear solvers.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
+pub enum SolverKind {
+    /// The block recursion.
+    #[default]
+    Recursion,
+    /// Dense elimination without exchanges.
+    DenseUnpivoted,
+    /// Dense LU with partial pivoting.
+    Dense,
+    /// Sparse L·D·Lᵀ.
+    Sparse,
+}
+
+impl SolverKind {
+    /// All of them, the recursion first.
+    pub const ALL: [Self; 4] = [Self::Recursion, Self::DenseUnpivoted, Self::Dense, Self::Sparse];
+
+    /// Its name on the command line and in results.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Recursion => "recursion",
+            Self::DenseUnpivoted => "dense-unpivoted",
+            Self::Dense => "dense",
+            Self::Sparse => "sparse",
+        }
+    }
+}
+
+/// Dense baselines refuse more unknowns than this: their square would be larger than 1.2 GB.
+const MOST_DENSE: usize = 12_000;
+
+/// A factor that is too large to hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+#[error("the {solver} factor of {unknowns} unknowns is too large to hold")]
+pub struct TooLarge {
+    /// Name of the solver.
+    pub solver: &'static str,
+    /// Scalar unknowns, held directions included.
+    pub unknowns: usize,
+}
+
+/// A linear solver chosen at run time: one comparison for each factorization or solve.
+#[derive(Debug)]
+pub enum Solver {
+    /// See [`SolverKind::Recursion`].
+    Recursion(Recursion),
+    /// See [`SolverKind::DenseUnpivoted`].
+    DenseUnpivoted(DenseUnpivoted),
+    /// See [`SolverKind::Dense`].
+    Dense(Dense),
+    /// See [`SolverKind::Sparse`].
+    Sparse(Box<Sparse>),
+}
+
+impl Solver {
+    /// A solver for matrices on `pattern`.
+    ///
+    /// # Errors
+    /// [`TooLarge`].
+    pub fn new(kind: SolverKind, pattern: &Pattern) -> Result<Self, TooLarge> {
+        let unknowns = DOF * pattern.bodies();
+        let dense = matches!(kind, SolverKind::Dense | SolverKind::DenseUnpivoted);
+        if dense && unknowns > MOST_DENSE {
+            return Err(TooLarge { solver: kind.name(), unknowns });
+        }
+        Ok(match kind {
+            SolverKind::Recursion => Self::Recursion(Recursion),
+            SolverKind::DenseUnpivoted => Self::DenseUnpivoted(DenseUnpivoted::new(pattern)),
+            SolverKind::Dense => Self::Dense(Dense::new(pattern)),
+            SolverKind::Sparse => Self::Sparse(Box::new(Sparse::new(pattern)?)),
+        })
+    }
+}
+
+impl Solver {
+    /// Multiplications of one factorization and of one solve: work without a clock.
+    pub fn multiplications(&self, pattern: &Pattern) -> (u64, u64) {
+        let n = (DOF * pattern.bodies()) as u64;
+        match self {
+            // blocks of 3×3: 27 for a product of two, 9 for a product with a vector
+            Self::Recursion(_) => {
+                let products = 27 * pattern.multiplications() as u64 + 27 * pattern.bodies() as u64;
+                (products, 18 * pattern.off_blocks() as u64 + 9 * pattern.bodies() as u64)
+            }
+            Self::DenseUnpivoted(_) | Self::Dense(_) => (n * n * n / 3, n * n),
+            Self::Sparse(s) => s.multiplications(),
+        }
+    }
+}
+
+impl LinearSolver for Solver {
+    fn factor(&mut self, pattern: &Pattern, matrix: &mut BlockMatrix<f64, 3>) -> Result<(), ZeroPivot> {
+        match self {
+            Self::Recursion(s) => s.factor(pattern, matrix),
+            Self::DenseUnpivoted(s) => s.factor(pattern, matrix),
+            Self::Dense(s) => s.factor(pattern, matrix),
+            Self::Sparse(s) => s.factor(pattern, matrix),
+        }
+    }
+
+    fn solve(&self, pattern: &Pattern, matrix: &BlockMatrix<f64, 3>, b: &mut [Pose]) {
+        match self {
+            Self::Recursion(s) => s.solve(pattern, matrix, b),
+            Self::DenseUnpivoted(s) => s.solve(pattern, matrix, b),
+            Self::Dense(s) => s.solve(pattern, matrix, b),
+            Self::Sparse(s) => s.solve(pattern, matrix, b),
+        }
+    }
+}
+
+/// Visits every entry of the lower triangle that a matrix stores: row, column, value.
+pub(crate) fn spread(pattern: &Pattern, matrix: &BlockMatrix<f64, 3>, mut visit: impl FnMut(usize, usize, f64)) {
+    for j in 0..pattern.bodies() {
+        for c in 0..DOF {
+            for r in c..DOF {
+                visit(DOF * j + r, DOF * j + c, matrix.diagonal[j][(r, c)]);
+            }
+        }
+        for k in pattern.column(j) {
+            for c in 0..DOF {
+                for r in 0..DOF {
+                    visit(DOF * pattern.row(k) + r, DOF * j + c, matrix.below[k][(r, c)]);
+                }
+            }
+        }
+    }
+}
+
+/// A right-hand side and working memory: a solve needs both, and changes nothing that can be seen.
+struct Scratch {
+    flat: Vec<f64>,
+    memory: MemBuffer,
+}
+
+impl std::fmt::Debug for Scratch {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Scratch").field("flat", &self.flat).finish_non_exhaustive()
+    }
+}
+
+fn flatten(b: &[Pose], flat: &mut [f64]) {
+    for (to, from) in flat.chunks_exact_mut(DOF).zip(b) {
+        to.copy_from_slice(from.as_slice());
+    }
+}
+
+fn unflatten(flat: &[f64], b: &mut [Pose]) {
+    for (to, from) in b.iter_mut().zip(flat.chunks_exact(DOF)) {
+        to.copy_from_slice(from);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::compile::{CompileOptions, compile};
+    use crate::multibody::forces;
+    use crate::netlist::Bundle;
+
+    /// On the step matrix of the bank, from static (h large) to inertial (h small), every solver finds the solution of the
+    /// recursion: the residual of every row is at rounding, 1e-12 of the terms that it adds up
+    /// (1e-10 with exchanges).
+    #[test]
+    fn all_solvers_agree_on_step_matrices() {
+        let bundle = Bundle::read(std::path::Path::new("examples/bank/bank.net"), &[]).unwrap();
+        let options = CompileOptions { segments: Some(4), ..CompileOptions::default() };
+        let system = compile(&bundle, &options).unwrap().parts.system;
+        let pattern = &system.model.pattern;
+        let n = system.bodies();
+        let zeros = vec![Pose::zeros(); n];
+        let mut r = zeros.clone();
+        for h in [1e-3, 1e-6, 1e-9] {
+            let mut a = BlockMatrix::new(pattern);
+            system.tangent(&zeros, &system.electrics.drive(), &mut a, &mut r);
+            forces::add_inertia(&system.model, 1.0 / (h * h), 1.0 / h, &mut a);
+            system.model.project_matrix(&mut a);
+            let mut b: Vec<Pose> = (0..n)
+                .map(|k| {
+                    let s = ((k * 7919) % 101) as f64 / 101.0 - 0.5;
+                    Pose::new(s * 1e-6, (0.3 - s) * 1e-6, s * s * 1e-11)
+                })
+                .collect();
+            system.model.project(&mut b);
+            for kind in SolverKind::ALL {
+                // an exchange of rows compares newtons with newton metres, which costs the rows of moments digits
+                let share = if kind == SolverKind::Dense { 1e-10 } else { 1e-12 };
+                let mut solver = Solver::new(kind, pattern).unwrap();
+                let (mut matrix, mut x) = (a.clone(), b.clone());
+                solver.factor(pattern, &mut matrix).unwrap();
+                solver.solve(pattern, &matrix, &mut x);
+                let mut back = zeros.clone();
+                a.multiply_add(pattern, &x, &mut back);
+                // what rounding may leave in a row is a share of the terms that the row adds up
+                let mut sizes = a.clone();
+                sizes.diagonal.iter_mut().chain(&mut sizes.below).for_each(|block| *block = block.abs());
+                let magnitudes: Vec<Pose> = x.iter().map(|x| x.abs()).collect();
+                let mut terms = zeros.clone();
+                sizes.multiply_add(pattern, &magnitudes, &mut terms);
+                for (k, (got, want)) in back.iter().zip(&b).enumerate() {
+                    for (i, term) in terms[k].iter().enumerate() {
+                        let room = share * term;
+                        assert!((got - want)[i].abs() <= room, "{} {h} {k} {i}: {got} {want} {room:e}", kind.name());
+                    }
+                }
+            }
+        }
+    }
+
+    /// The sparse solver's analysis is done on the couplings, without the recursion's fill, and its factor of a tree-like
+    /// bank is no larger than the recursion's by a half.
+    #[test]
+    fn sparse_factor_is_small() {
+        let bundle = Bundle::read(std::path::Path::new("examples/bank/bank.net"), &[]).unwrap();
+        let options = CompileOptions { band: Some(1.3e6), ..CompileOptions::default() };
+        let system = compile(&bundle, &options).unwrap().parts.system;
+        let pattern = &system.model.pattern;
+        let blocks = 6 * pattern.bodies() + 9 * pattern.off_blocks();
+        let entries = Sparse::new(pattern).unwrap().entries();
+        assert!(entries < blocks * 3 / 2, "{entries} {blocks}");
+    }
+
+    /// A matrix without an inverse is refused by every solver, not divided by.
+    #[test]
+    fn a_singular_matrix_is_refused() {
+        let pattern = Pattern::new(2, &[(0, 1)]);
+        for kind in SolverKind::ALL {
+            let mut a = BlockMatrix::<f64, 3>::new(&pattern);
+            a.diagonal.fill(nalgebra::Matrix3::identity());
+            a.below[0] = nalgebra::Matrix3::identity();
+            let mut solver = Solver::new(kind, &pattern).unwrap();
+            assert!(solver.factor(&pattern, &mut a).is_err(), "{}", kind.name());
+        }
+    }
+}
