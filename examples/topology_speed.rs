@@ -40,13 +40,13 @@ fn measure(name: &str, count: usize, topology: &Topology) {
     let mut serial = Reduction::<f64>::new(&[linkage]);
     serial.force.fill([1e-9, -1e-8, 0.0]);
     let t = best(|| {
-        serial.accelerate(linkage, black_box(&q), black_box(&v), &mut out);
+        serial.accelerate(black_box(&q), black_box(&v), &mut out);
     });
     println!("serial,{name},{count},{:.1}", t / count as f64);
     let mut apart = out.clone();
     let mut single = Reduction::<f64>::without_packs(&[linkage]);
     single.force.fill([1e-9, -1e-8, 0.0]);
-    let t = best(|| single.accelerate(linkage, black_box(&q), black_box(&v), &mut apart));
+    let t = best(|| single.accelerate(black_box(&q), black_box(&v), &mut apart));
     println!("single,{name},{count},{:.1}", t / count as f64);
     let same = out.iter().zip(&apart).all(|(a, b)| a.to_bits() == b.to_bits());
     assert!(same, "equal subtrees side by side change the bits");
@@ -55,7 +55,7 @@ fn measure(name: &str, count: usize, topology: &Topology) {
     let (ql, vl): (Vec<Lanes<8>>, Vec<Lanes<8>>) =
         (q.iter().map(|&x| Lanes::splat(x)).collect(), v.iter().map(|&x| Lanes::splat(x)).collect());
     let mut outl = vec![Lanes::ZERO; n];
-    let t = best(|| lanes.accelerate(linkage, black_box(&ql), black_box(&vl), &mut outl));
+    let t = best(|| lanes.accelerate(black_box(&ql), black_box(&vl), &mut outl));
     println!("lanes,{name},{count},{:.1}", t / (8 * count) as f64);
     let equal = out.iter().zip(&outl).all(|(a, b)| (0..8).all(|k| b.lane(k).to_bits() == a.to_bits()));
     assert!(equal, "a lane's bits differ from the serial run's");

@@ -133,7 +133,7 @@ impl Carrier for InJoints<'_> {
         let mut reduction = Reduction::new(&[&self.linkage]);
         loads.place(0.0, &self.q, &self.v, &mut reduction);
         let mut change = self.q.clone();
-        self.report.largest_gap_m = reduction.project_positions(&self.linkage, &mut self.q, &self.v, &mut change);
+        self.report.largest_gap_m = reduction.project_positions(&mut self.q, &self.v, &mut change);
         poses(&reduction, &mut motion.q, &mut motion.v);
         Ok(())
     }

@@ -154,7 +154,7 @@ fn rotary_bank_keeps_its_energy() {
     let mut motion =
         JointMotion::new(&linkage, |t, q: &[f64], v: &[f64], r: &mut Reduction<f64>| loads.add(t, q, v, r));
     let (mut q, mut v, mut change) = (vec![0.0; n], vec![2e3; n], vec![0.0; n]);
-    motion.reduction.project_rates(&linkage, &q, &mut v, &mut change);
+    motion.reduction.project_rates(&q, &mut v, &mut change);
     let energy =
         |r: &Reduction<f64>, q: &[f64]| r.kinetic_energy(&linkage) + r.strain_energy(&linkage, q, &drive.rest());
     let before = energy(&motion.reduction, &q);
@@ -162,7 +162,7 @@ fn rotary_bank_keeps_its_energy() {
     let mut method = DormandPrince::new(n);
     let mut h = 0.0;
     method.integrate(&mut motion, (0.0, 2e-6), &mut q, &mut v, &mut h, &bounds, 1_000_000, &mut |_| true).unwrap();
-    motion.reduction.place(&linkage, &q, &v);
+    motion.reduction.place(&q, &v);
     let after = energy(&motion.reduction, &q);
     assert!(motion.reduction.strain_energy(&linkage, &q, &drive.rest()) > 1e-2 * before);
     assert!((after / before - 1.0).abs() < 1e-6, "{before:e} -> {after:e}");

@@ -43,16 +43,16 @@ fn compare(m: &Mechanism, seed: u64) -> Option<(f64, f64)> {
     let q: Vec<f64> = (0..linkage.coordinates).map(|_| 0.2 * s.next()).collect();
     let v: Vec<f64> = (0..linkage.coordinates).map(|_| s.next()).collect();
     let mut reduction = Reduction::<f64>::new(&[&linkage]);
-    reduction.place(&linkage, &q, &v);
+    reduction.place(&q, &v);
     for f in &mut reduction.force {
         *f = [s.next(), s.next(), s.next()];
     }
     let force = reduction.force.clone();
     let mut a = vec![0.0; linkage.coordinates];
-    reduction.reduce(&linkage, Task::Accelerations, &mut a);
+    reduction.reduce(Task::Accelerations, &mut a);
     let (fast, near) = (reduction.accelerations.clone(), reduction.nearness);
     let judge = dense::accelerations(&model, &dense::joints(&model), &reduction, &force)?;
-    reduction.reduce_singular(&linkage, Task::Accelerations, &mut a);
+    reduction.reduce_singular(Task::Accelerations, &mut a);
     let general = dense::difference(&reduction.accelerations, &judge, 1.0);
     assert!(general < 1e-12, "general path: {general:e}, nearness {near:e}");
     Some((dense::difference(&fast, &judge, 1.0), near))

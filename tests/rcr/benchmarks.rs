@@ -67,7 +67,7 @@ fn n_four_bar() {
             .integrate(&mut motion, (t, end), &mut q, &mut v, &mut h, &tolerances(5, 1e-12), 1_000_000, &mut |_| true)
             .unwrap();
         t = end;
-        motion.reduction.place(&linkage, &q, &v);
+        motion.reduction.place(&q, &v);
         let [x, y, theta] = motion.reduction.pose(place[0]);
         // the upper end of the first upright: half a metre above its centre as drawn
         let at = [x - 0.5 * theta.sin(), 0.5 + y + 0.5 * theta.cos()];
@@ -137,7 +137,7 @@ fn andrews_squeezer() {
     let mut bounds = tolerances(n, 1e-13);
     bounds.atol_v = vec![1e-10; n];
     method.integrate(&mut motion, (0.0, 0.03), &mut q, &mut v, &mut h, &bounds, 1_000_000, &mut |_| true).unwrap();
-    motion.reduction.place(&linkage, &q, &v);
+    motion.reduction.place(&q, &v);
     let angle = |k: usize| motion.reduction.pose(place[k])[2];
     let rate = |k: usize| motion.reduction.rate(place[k])[2];
     let relative = |f: &dyn Fn(usize) -> f64| [f(0), f(1) - f(0), f(2), f(3) - f(4), f(4), f(5) - f(6), f(6)];

@@ -28,13 +28,13 @@ fn shuttle(kinks: &[f64]) -> ([f64; 3], [f64; 3], Singularity) {
     let linkage = Linkage::new(&model);
     let mut out = vec![0.0; linkage.coordinates];
     let mut r = Reduction::<f64>::new(&[&linkage]);
-    r.place(&linkage, &out.clone(), &out.clone());
+    r.place(&out.clone(), &out.clone());
     for (k, &p) in place.iter().enumerate() {
         r.force[p] = [0.3 + 0.1 * k as f64, 1.0 - 0.2 * k as f64, 0.5 * (k as f64 - 3.0)];
     }
-    r.reduce(&linkage, Task::Accelerations, &mut out);
+    r.reduce(Task::Accelerations, &mut out);
     let local = r.accelerations[place[0]];
-    let met = r.reduce_singular(&linkage, Task::Accelerations, &mut out);
+    let met = r.reduce_singular(Task::Accelerations, &mut out);
     (local, r.accelerations[place[0]], met)
 }
 
@@ -74,9 +74,9 @@ fn what_is_not_finite_stays_so() {
         let mut r = Reduction::<f64>::new(&[&linkage]);
         for wrong in [f64::NAN, f64::INFINITY] {
             let q = vec![if wrong.is_nan() { wrong } else { 0.0 }; linkage.coordinates];
-            r.place(&linkage, &q, &q);
+            r.place(&q, &q);
             r.force[place[0]] = [wrong, 1.0, 0.0];
-            r.reduce_singular(&linkage, Task::Accelerations, &mut out);
+            r.reduce_singular(Task::Accelerations, &mut out);
             assert!(!out.iter().all(|x| x.is_finite()));
         }
     }

@@ -37,14 +37,14 @@ fn a_lane_has_the_bits_of_its_variant() {
     let mut lanes = Reduction::<Lanes<8>>::new(&variants.iter().collect::<Vec<_>>());
     lanes.force.fill([Lanes::splat(0.1), Lanes::splat(-1.0), Lanes::ZERO]);
     let mut together = q.clone();
-    lanes.accelerate(&variants[0], &q, &q, &mut together);
+    lanes.accelerate(&q, &q, &mut together);
     for (lane, variant) in variants.iter().enumerate() {
         let q: Vec<f64> = (0..n).map(|k| wave(k, lane)).collect();
         let mut alone = Reduction::<f64>::new(&[variant]);
         alone.force.fill([0.1, -1.0, 0.0]);
         let mut out = vec![0.0; n];
-        alone.place(variant, &q, &q);
-        alone.reduce(variant, Task::Accelerations, &mut out);
+        alone.place(&q, &q);
+        alone.reduce(Task::Accelerations, &mut out);
         for (a, b) in out.iter().zip(&together) {
             assert_eq!(a.to_bits(), b.lane(lane).to_bits());
         }

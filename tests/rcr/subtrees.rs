@@ -54,22 +54,22 @@ fn seen(
     r.torque.copy_from_slice(torque);
     for task in [Task::Accelerations, Task::Rates, Task::Positions, Task::Accelerations] {
         let mut keep = |what: &str, bits: Vec<u64>| seen.push((format!("{what} {task:?}"), bits));
-        r.place(linkage, q, v);
-        r.reduce(linkage, task, &mut out);
+        r.place(q, v);
+        r.reduce(task, &mut out);
         keep("coordinates", bits(&out));
         keep("bodies", shown(&r, count));
         keep("largest", bits(&[r.largest(task), r.kinetic_energy(linkage)]));
-        let met = r.solve(linkage, task, &mut out);
+        let met = r.solve(task, &mut out);
         keep(&format!("{met:?} solve"), bits(&out));
-        let met = r.reduce_singular(linkage, task, &mut out);
+        let met = r.reduce_singular(task, &mut out);
         keep(&format!("{met:?} singular"), bits(&out));
         keep("singular bodies", shown(&r, count));
     }
-    r.accelerate(linkage, q, v, &mut out);
+    r.accelerate(q, v, &mut out);
     seen.push(("at one go".into(), bits(&out)));
     let (mut q, mut v) = (q.to_vec(), v.to_vec());
-    let gap = r.project_positions(linkage, &mut q, &v, &mut out);
-    r.project_rates(linkage, &q, &mut v, &mut out);
+    let gap = r.project_positions(&mut q, &v, &mut out);
+    r.project_rates(&q, &mut v, &mut out);
     seen.push(("projection".into(), [bits(&q), bits(&v), bits(&[gap]), shown(&r, count)].concat()));
     seen
 }

@@ -66,14 +66,14 @@ impl SecondOrder for Feedback<'_> {
 
     fn accelerations(&mut self, _: f64, q: &[f64], v: &[f64], a: &mut [f64]) -> Result<(), ()> {
         let (r, linkage) = (&mut self.reduction, &self.of.linkage);
-        r.place(linkage, q, v);
+        r.place(q, v);
         r.force.fill([0.0; 3]);
         gravity(&self.of.masses, r);
-        r.reduce(linkage, Task::Accelerations, a);
+        r.reduce(Task::Accelerations, a);
         // the smallest change of the accelerations that adds the feedback to the rows
         for (task, gain) in [(Task::Rates, 2.0 * self.alpha), (Task::Positions, self.alpha * self.alpha)] {
             if gain > 0.0 {
-                r.reduce(linkage, task, &mut self.change);
+                r.reduce(task, &mut self.change);
                 a.iter_mut().zip(&self.change).for_each(|(a, d)| *a += gain * d);
             }
         }
@@ -98,11 +98,11 @@ fn run<P: SecondOrder>(of: &FourBar, rtol: f64, problem: &mut P) -> Passage {
     let (mut at, mut rate, mut gap) = (vec![0.0; n], vec![0.0; n], Vec::new());
     let ended = method.integrate(problem, (0.0, 10.0), &mut q, &mut v, &mut h, &bounds, 20_000, &mut |dense| {
         dense.at(dense.t + dense.h, &mut at, &mut rate);
-        placed.place(&of.linkage, &at, &rate);
+        placed.place(&at, &rate);
         gap.push([dense.t + dense.h, placed.largest(Task::Positions)]);
         true
     });
-    placed.place(&of.linkage, &q, &v);
+    placed.place(&q, &v);
     let [x, y, theta] = placed.pose(of.first);
     let end = [x - 0.5 * theta.sin(), 0.5 + y + 0.5 * theta.cos()];
     let apart = if ended.is_ok() { (end[0] - AT_10_S[0]).hypot(end[1] - AT_10_S[1]) } else { f64::INFINITY };

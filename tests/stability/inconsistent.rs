@@ -28,11 +28,11 @@ pub(crate) fn projected(size: f64) -> [f64; 3] {
     let mut q: Vec<f64> = (0..n).map(|_| size * s.next()).collect();
     let mut v: Vec<f64> = (0..n).map(|_| size * s.next()).collect();
     let mut r = Reduction::<f64>::new(&[&linkage]);
-    r.place(&linkage, &q, &v);
+    r.place(&q, &v);
     let before = r.largest(Task::Positions);
     let mut change = vec![0.0; n];
-    let after = r.project_positions(&linkage, &mut q, &v, &mut change);
-    r.project_rates(&linkage, &q, &mut v, &mut change);
+    let after = r.project_positions(&mut q, &v, &mut change);
+    r.project_rates(&q, &mut v, &mut change);
     [before, after, r.largest(Task::Rates)]
 }
 
@@ -81,7 +81,7 @@ pub(crate) fn kept(end: f64) -> [f64; 2] {
             integrate(&mut motion, &mut q, &mut v, end);
         }
         let mut r = Reduction::<f64>::new(&[&linkage]);
-        r.place(&linkage, &q, &v);
+        r.place(&q, &v);
         *gap = r.largest(Task::Positions);
     }
     gaps
@@ -103,7 +103,7 @@ pub(crate) fn swung(bars: usize) -> ([f64; 3], Singularity, u64) {
     let mut motion = JointMotion::new(&linkage, loads);
     integrate(&mut motion, &mut q, &mut v, 0.5);
     let mut r = Reduction::<f64>::new(&[&linkage]);
-    r.place(&linkage, &q, &v);
+    r.place(&q, &v);
     (r.pose(place[0]), motion.met, motion.singular)
 }
 
@@ -113,10 +113,10 @@ pub(crate) fn local(bars: usize) -> f64 {
     let linkage = Linkage::new(&model);
     let zeros = vec![0.0; linkage.coordinates];
     let mut r = Reduction::<f64>::new(&[&linkage]);
-    r.place(&linkage, &zeros, &zeros);
+    r.place(&zeros, &zeros);
     gravity(&model, &mut r);
     let mut out = zeros.clone();
-    r.reduce(&linkage, Task::Accelerations, &mut out);
+    r.reduce(Task::Accelerations, &mut out);
     let all = r.accelerations.iter().flatten();
     all.fold(0.0, |m: f64, x| if x.is_nan() || m.is_nan() { f64::NAN } else { m.max(x.abs()) })
 }

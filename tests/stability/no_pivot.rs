@@ -39,12 +39,7 @@ impl Case {
                 q[link.first + 1] *= LEVER;
             }
         }
-        Reduction::<f64>::new(&[&self.linkage]).project_positions(
-            &self.linkage,
-            &mut q,
-            &vec![0.0; n],
-            &mut vec![0.0; n],
-        );
+        Reduction::<f64>::new(&[&self.linkage]).project_positions(&mut q, &vec![0.0; n], &mut vec![0.0; n]);
         q
     }
 
@@ -69,12 +64,12 @@ pub(crate) fn errors(chosen: Chosen, count: usize, bent: f64) -> (f64, f64) {
     let case = Case::new(count);
     let n = case.linkage.coordinates;
     let mut r = Reduction::<f64>::new(&[&case.linkage]);
-    r.place(&case.linkage, &case.bent(bent), &vec![0.0; n]);
+    r.place(&case.bent(bent), &vec![0.0; n]);
     for (k, &p) in case.place.iter().enumerate() {
         r.force[p] = [1e-6 * (k as f64).sin(), 1e-6 * (k as f64).cos(), 1e-11];
     }
     let symbolic = case.symbolic(chosen, &r, &r.force);
-    r.solve(&case.linkage, Task::Accelerations, &mut vec![0.0; n]);
+    r.solve(Task::Accelerations, &mut vec![0.0; n]);
     let (judge, blind) = (symbolic.judge(), symbolic.accelerations());
     let ours = |i: usize| r.accelerations[case.place[i / 3]][i % 3];
     (apart(&|i| blind[i], &|i| judge[i], judge.len()), apart(&ours, &|i| judge[i], judge.len()))
@@ -102,7 +97,7 @@ impl SecondOrder for Blind<'_> {
 
     fn accelerations(&mut self, _: f64, q: &[f64], v: &[f64], a: &mut [f64]) -> Result<(), ()> {
         let (r, case) = (&mut self.reduction, self.case);
-        r.place(&case.linkage, q, v);
+        r.place(q, v);
         r.force.fill([0.0; 3]);
         r.torque.fill(0.0);
         push(case, q, r);
@@ -135,8 +130,8 @@ impl SecondOrder for Blind<'_> {
 
     fn project(&mut self, _: f64, q: &mut [f64], v: &mut [f64]) -> Result<(), ()> {
         let mut change = vec![0.0; q.len()];
-        self.reduction.project_positions(&self.case.linkage, q, v, &mut change);
-        self.reduction.project_rates(&self.case.linkage, q, v, &mut change);
+        self.reduction.project_positions(q, v, &mut change);
+        self.reduction.project_rates(q, v, &mut change);
         Ok(())
     }
 }
@@ -171,7 +166,7 @@ fn integrate<P: SecondOrder>(case: &Case, problem: &mut P, q: &mut [f64]) -> Run
     let mut rate = vec![0.0; n];
     let _ = method.integrate(problem, (0.0, END), q, &mut v, &mut h, &bounds, MOST_STEPS, &mut |dense| {
         dense.at(dense.t + dense.h, &mut last, &mut rate);
-        placed.place(&case.linkage, &last, &rate);
+        placed.place(&last, &rate);
         run.reached = dense.t + dense.h;
         run.track.push([run.reached, placed.pose(case.place[9])[1]]);
         true

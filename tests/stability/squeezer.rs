@@ -111,7 +111,7 @@ fn run<P: SecondOrder<Error = NotFinite>>(of: &Squeezer, end: f64, problem: &mut
     let (mut q, mut v, mut h) = (vec![0.0; n], vec![0.0; n], 0.0);
     let bounds = Tolerances { rtol: 1e-6, atol_q: vec![1e-6; n], atol_v: vec![1e-3; n] };
     let mut placed = Reduction::<f64>::new(&[&of.linkage]);
-    placed.place(&of.linkage, &q, &v);
+    placed.place(&q, &v);
     let first = of.energy(&placed);
     let (mut at, mut rate, mut drift) = (vec![0.0; n], vec![0.0; n], Drift::default());
     let mut method = DormandPrince::new(n);
@@ -119,7 +119,7 @@ fn run<P: SecondOrder<Error = NotFinite>>(of: &Squeezer, end: f64, problem: &mut
         .integrate(problem, (0.0, end), &mut q, &mut v, &mut h, &bounds, 100_000, &mut |dense| {
             let t = dense.t + dense.h;
             dense.at(t, &mut at, &mut rate);
-            placed.place(&of.linkage, &at, &rate);
+            placed.place(&at, &rate);
             drift.gap.push([t, placed.largest(Task::Positions)]);
             drift.energy.push([t, (of.energy(&placed) - first).abs()]);
             drift.work = TORQUE * placed.pose(of.motor)[2];

@@ -67,7 +67,7 @@ fn loaded(kinks: &[f64]) -> (Model, Vec<usize>, Linkage, Reduction<f64>) {
     let linkage = Linkage::new(&model);
     let zeros = vec![0.0; linkage.coordinates];
     let mut r = Reduction::<f64>::new(&[&linkage]);
-    r.place(&linkage, &zeros, &zeros);
+    r.place(&zeros, &zeros);
     for (k, &p) in place.iter().enumerate() {
         let k = (k % 13) as f64;
         r.force[p] = [0.3 + 0.1 * k, 1.0 - 0.2 * k, 0.5 * (k - 3.0)];
@@ -79,9 +79,9 @@ fn loaded(kinks: &[f64]) -> (Model, Vec<usize>, Linkage, Reduction<f64>) {
 pub(crate) fn shuttle(size: f64, shape: &[f64; 6]) -> Shuttle {
     let (model, place, linkage, mut r) = loaded(&shape.map(|x| x * size));
     let mut out = vec![0.0; linkage.coordinates];
-    r.reduce(&linkage, Task::Accelerations, &mut out);
+    r.reduce(Task::Accelerations, &mut out);
     let local = r.accelerations[place[0]];
-    let met = r.reduce_singular(&linkage, Task::Accelerations, &mut out);
+    let met = r.reduce_singular(Task::Accelerations, &mut out);
     Shuttle { local, ours: r.accelerations[place[0]], dense: dense(&model, &r.force, place[0]), met }
 }
 
@@ -125,7 +125,7 @@ pub(crate) fn crowded(count: usize) -> (Singularity, f64) {
     let (mut met, mut best) = (Singularity::default(), f64::INFINITY);
     for _ in 0..5 {
         let started = std::time::Instant::now();
-        met = r.reduce_singular(&linkage, Task::Accelerations, &mut out);
+        met = r.reduce_singular(Task::Accelerations, &mut out);
         best = best.min(started.elapsed().as_secs_f64());
     }
     (met, best)

@@ -97,12 +97,12 @@ pub(crate) fn by_recursion(u: Units) -> [Vec<[f64; 3]>; 2] {
     let linkage = Linkage::new(&model);
     let zeros = vec![0.0; linkage.coordinates];
     let mut r = Reduction::<f64>::new(&[&linkage]);
-    r.place(&linkage, &zeros, &zeros);
+    r.place(&zeros, &zeros);
     r.force = push(&model, u);
     let mut out = zeros.clone();
-    r.reduce(&linkage, Task::Accelerations, &mut out);
+    r.reduce(Task::Accelerations, &mut out);
     let local = in_si(&r.accelerations, u);
-    r.reduce_singular(&linkage, Task::Accelerations, &mut out);
+    r.reduce_singular(Task::Accelerations, &mut out);
     [local, in_si(&r.accelerations, u)]
 }
 

@@ -109,20 +109,20 @@ impl<T: Real> Reduction<T> {
     }
 
     /// Places all bodies for coordinates `q` and rates `v`.
-    pub fn place(&mut self, _: &Linkage, q: &[T], v: &[T]) {
+    pub fn place(&mut self, q: &[T], v: &[T]) {
         fast::place(self, q, v);
     }
 
     /// Solves for `task` at the placed configuration; `out` receives q̈, or the change of the rates or coordinates.
     ///
     /// The result is right to rounding times the square of [`Reduction::nearness`].
-    pub fn reduce(&mut self, _: &Linkage, task: Task, out: &mut [T]) {
+    pub fn reduce(&mut self, task: Task, out: &mut [T]) {
         fast::reduce(self, task, out);
     }
 
     /// Places the bodies at `q`, `v` and finds q̈ in `out`, with the forces that [`Reduction::force`] and
     /// [`Reduction::torque`] hold: [`Reduction::place`] and [`Reduction::reduce`] at one go.
-    pub fn accelerate(&mut self, _: &Linkage, q: &[T], v: &[T], out: &mut [T]) {
+    pub fn accelerate(&mut self, q: &[T], v: &[T], out: &mut [T]) {
         fast::accelerate(self, q, v, out);
     }
 

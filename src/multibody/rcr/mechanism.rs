@@ -23,6 +23,10 @@ pub(super) struct Mechanism<T> {
     pub closures: Vec<ClosureShape<T>>,
     /// Unit of each coordinate: what makes it a length [m, or m/m].
     pub units: Vec<T>,
+    /// What makes a rotation of each body comparable with a displacement [m].
+    pub levers: Vec<T>,
+    /// Loop constraints m.
+    pub constraints: usize,
 }
 
 impl<T: Real> Mechanism<T> {
@@ -47,6 +51,8 @@ impl<T: Real> Mechanism<T> {
             joints: (0..count).filter(|&b| !linkage.links[b].pin).map(|b| JointShape::new(&of(b))).collect(),
             closures: closures.collect(),
             units,
+            levers: (0..count).map(|b| lane(&of(b), &|link| link.lever)).collect(),
+            constraints: linkage.constraints,
         }
     }
 

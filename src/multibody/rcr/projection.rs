@@ -6,11 +6,11 @@
 //!
 //! Reference: E. Hairer, G. Wanner, "Solving Ordinary Differential Equations II" (1996), §VII.2 (projection methods).
 
+use super::Real;
 use super::data::Reduction;
 use super::reduction::Task;
 use super::singular::Singularity;
 use super::traversal::Traversal;
-use super::{Linkage, Real};
 
 /// A loop's pivot below 1/100 of its lever loses more than 1e-12: the path for singular configurations is taken instead.
 const NEAR: f64 = 1e2;
@@ -20,30 +20,30 @@ const MOST: usize = 30;
 impl Reduction<f64> {
     /// [`Reduction::reduce`], or [`Reduction::reduce_singular`] where that is too near to a singular configuration; then
     /// says what was met.
-    pub fn solve(&mut self, linkage: &Linkage, task: Task, out: &mut [f64]) -> Option<Singularity> {
+    pub fn solve(&mut self, task: Task, out: &mut [f64]) -> Option<Singularity> {
         if self.mechanism.schedule.redundant == 0 {
-            self.reduce(linkage, task, out);
+            self.reduce(task, out);
             if self.nearness <= NEAR && out.iter().all(|x| x.is_finite()) {
                 return None;
             }
         }
-        Some(self.reduce_singular(linkage, task, out))
+        Some(self.reduce_singular(task, out))
     }
 
     /// Moves `q` onto the loops, by the shortest way in the mass norm; `change` is scratch of the same length. Leaves the
     /// bodies placed there at rates `v`. Returns the largest gap left [m].
-    pub fn project_positions(&mut self, linkage: &Linkage, q: &mut [f64], v: &[f64], change: &mut [f64]) -> f64 {
-        self.place(linkage, q, v);
+    pub fn project_positions(&mut self, q: &mut [f64], v: &[f64], change: &mut [f64]) -> f64 {
+        self.place(q, v);
         let mut gap = self.largest(Task::Positions);
         for _ in 0..MOST {
-            if gap == 0.0 || linkage.constraints == 0 {
+            if gap == 0.0 || self.mechanism.constraints == 0 {
                 break;
             }
-            self.solve(linkage, Task::Positions, change);
+            self.solve(Task::Positions, change);
             for (q, d) in q.iter_mut().zip(change.iter()) {
                 *q += d;
             }
-            self.place(linkage, q, v);
+            self.place(q, v);
             let now = self.largest(Task::Positions);
             // rounding is reached when a step no longer helps
             if now >= 0.25 * gap {
@@ -51,7 +51,7 @@ impl Reduction<f64> {
                     for (q, d) in q.iter_mut().zip(change.iter()) {
                         *q -= d;
                     }
-                    self.place(linkage, q, v);
+                    self.place(q, v);
                     return gap;
                 }
                 return now;
@@ -62,18 +62,18 @@ impl Reduction<f64> {
     }
 
     /// Makes the rates `v` fulfil the loops at the placed configuration.
-    pub fn project_rates(&mut self, linkage: &Linkage, q: &[f64], v: &mut [f64], change: &mut [f64]) {
-        if linkage.constraints == 0 {
+    pub fn project_rates(&mut self, q: &[f64], v: &mut [f64], change: &mut [f64]) {
+        if self.mechanism.constraints == 0 {
             return;
         }
         for _ in 0..2 {
-            self.place(linkage, q, v);
-            self.solve(linkage, Task::Rates, change);
+            self.place(q, v);
+            self.solve(Task::Rates, change);
             for (v, d) in v.iter_mut().zip(change.iter()) {
                 *v += d;
             }
         }
-        self.place(linkage, q, v);
+        self.place(q, v);
     }
 
     /// Largest residual of the loops [m, or m/s].

@@ -95,7 +95,6 @@ impl Room {
         let taken_start: Vec<usize> = starts.collect();
         let width = schedule.turns().map(|turn| 3 + 3 * turn.front + 1).max().unwrap_or(0);
         let rows = schedule.entries.iter().map(|e| e.count).sum::<usize>() + 3;
-        let list = Vec::with_capacity(rows);
         Self {
             entries: vec![0.0; rows * width],
             width,
@@ -103,10 +102,10 @@ impl Room {
             free: (0..rows as u32).rev().collect(),
             waiting: vec![[NOWHERE; 2]; taken_start.len()],
             after: vec![NOWHERE; rows],
-            hard: list.clone(),
-            soft: list.clone(),
+            hard: Vec::with_capacity(rows),
+            soft: Vec::with_capacity(rows),
             left: Vec::with_capacity(width),
-            kept: list,
+            kept: Vec::with_capacity(rows),
             sizes: Vec::with_capacity(rows),
             spare: vec![0.0; width],
             taken: vec![0.0; start],

@@ -139,7 +139,7 @@ impl Reduction<f64> {
             }
         }
         self.lay(added);
-        let met = self.solve(linkage, Task::Accelerations, out);
+        let met = self.solve(Task::Accelerations, out);
         self.work.added.clear();
         self.work.added_coupling.clear();
         met

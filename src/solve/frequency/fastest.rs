@@ -39,11 +39,11 @@ pub fn fastest(linkage: &Linkage, scale: &[f64], groups: usize) -> Option<Fastes
         for x in &mut x {
             *x *= SMALL / size;
         }
-        reduction.place(linkage, &x, &zeros);
+        reduction.place(&x, &zeros);
         reduction.force.fill([0.0; 3]);
         reduction.torque.fill(0.0);
         reduction.add_elastic(linkage, &x, &rest);
-        reduction.solve(linkage, Task::Accelerations, &mut a);
+        reduction.solve(Task::Accelerations, &mut a);
         omega2 = norm(&a, scale) / SMALL;
         if !omega2.is_finite() || omega2 == 0.0 {
             return None;

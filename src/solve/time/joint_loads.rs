@@ -48,7 +48,7 @@ impl<'a> JointLoads<'a> {
     /// Places the bodies at time `t` [s] of the ramp, locked directions at their prescribed lengths.
     pub fn place(&mut self, t: f64, q: &[f64], v: &[f64], reduction: &mut Reduction<f64>) {
         self.prescribe(t, reduction);
-        reduction.place(self.linkage, q, v);
+        reduction.place(q, v);
     }
 
     /// [`Loads::add`] at what is prescribed at that time, where the bodies are placed anew if anything is.

@@ -56,11 +56,11 @@ impl<F: FnMut(f64, &[f64], &[f64], &mut Reduction<f64>)> SecondOrder for JointMo
 
     fn accelerations(&mut self, t: f64, q: &[f64], v: &[f64], a: &mut [f64]) -> Result<(), NotFinite> {
         let reduction = &mut self.reduction;
-        reduction.place(self.linkage, q, v);
+        reduction.place(q, v);
         reduction.force.fill([0.0; 3]);
         reduction.torque.fill(0.0);
         (self.loads)(t, q, v, reduction);
-        if let Some(met) = reduction.solve(self.linkage, Task::Accelerations, a) {
+        if let Some(met) = reduction.solve(Task::Accelerations, a) {
             self.singular += 1;
             self.met = met;
         }
@@ -72,9 +72,9 @@ impl<F: FnMut(f64, &[f64], &[f64], &mut Reduction<f64>)> SecondOrder for JointMo
     }
 
     fn project(&mut self, _: f64, q: &mut [f64], v: &mut [f64]) -> Result<(), NotFinite> {
-        let gap = self.reduction.project_positions(self.linkage, q, v, &mut self.change);
+        let gap = self.reduction.project_positions(q, v, &mut self.change);
         self.gap = self.gap.max(gap);
-        self.reduction.project_rates(self.linkage, q, v, &mut self.change);
+        self.reduction.project_rates(q, v, &mut self.change);
         Ok(())
     }
 }

@@ -141,7 +141,7 @@ impl<'a, L: Loads> ImplicitMotion<'a, L> {
         self.q.copy_from_slice(q);
         self.v.copy_from_slice(v);
         self.act(t);
-        let met = self.reduction.solve(self.linkage, Task::Accelerations, a);
+        let met = self.reduction.solve(Task::Accelerations, a);
         self.count(met);
         self.finite(a, t)
     }
@@ -204,7 +204,7 @@ impl<'a, L: Loads> ImplicitMotion<'a, L> {
         for ((v, e), w) in self.v.iter_mut().zip(error_q.iter()).zip(error_v.iter()) {
             *v = e + gamma * w;
         }
-        self.reduction.place(self.linkage, q, &self.zeros);
+        self.reduction.place(q, &self.zeros);
         self.reduction.accelerations_of(self.linkage, &self.v, &mut self.bodies);
         for ((force, body), link) in self.reduction.force.iter_mut().zip(&self.bodies).zip(&self.linkage.links) {
             *force = [link.mass * body[0], link.mass * body[1], link.inertia * body[2]];
@@ -224,9 +224,9 @@ impl<'a, L: Loads> ImplicitMotion<'a, L> {
     /// Takes a motion back to the loops as they are at time `t` [s].
     pub fn project(&mut self, t: f64, q: &mut [f64], v: &mut [f64]) {
         self.loads.prescribe(t, &mut self.reduction);
-        let gap = self.reduction.project_positions(self.linkage, q, v, &mut self.next);
+        let gap = self.reduction.project_positions(q, v, &mut self.next);
         self.gap = self.gap.max(gap);
-        self.reduction.project_rates(self.linkage, q, v, &mut self.next);
+        self.reduction.project_rates(q, v, &mut self.next);
     }
 
     fn take(&mut self, stage: &Stage<'_>, a: &[f64]) {
@@ -239,7 +239,7 @@ impl<'a, L: Loads> ImplicitMotion<'a, L> {
     /// Places the bodies and lays what acts on them.
     fn act(&mut self, t: f64) {
         self.loads.prescribe(t, &mut self.reduction);
-        self.reduction.place(self.linkage, &self.q, &self.v);
+        self.reduction.place(&self.q, &self.v);
         self.reduction.force.fill([0.0; 3]);
         self.reduction.torque.fill(0.0);
         self.loads.add(t, &self.q, &self.v, &mut self.reduction);

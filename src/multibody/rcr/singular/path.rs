@@ -5,12 +5,11 @@ use crate::multibody::rcr::data::Reduction;
 use crate::multibody::rcr::reduction::{Given, Task, Workspace};
 use crate::multibody::rcr::schedule::NONE;
 use crate::multibody::rcr::traversal::Traversal;
-use crate::multibody::rcr::tree::Linkage;
 
 impl Reduction<f64> {
     /// [`Reduction::reduce`] for any configuration: in a singular one too it gives the accelerations of least constraint.
     /// Slower by a factor; meant for when [`Reduction::nearness`] is large. Nothing is allocated.
-    pub fn reduce_singular(&mut self, linkage: &Linkage, task: Task, out: &mut [f64]) -> Singularity {
+    pub fn reduce_singular(&mut self, task: Task, out: &mut [f64]) -> Singularity {
         if let Some(traversal) = &self.traversal {
             traversal.spread(&mut self.placement);
         }
@@ -19,8 +18,8 @@ impl Reduction<f64> {
         work.write_rows(given, 0..mechanism.closures.len());
         let mut report = Singularity::default();
         room.enter(given, work);
-        for (body, link) in linkage.links.iter().enumerate() {
-            room.inward(given, work, (body, link.lever), &mut report);
+        for body in 0..mechanism.bodies() {
+            room.inward(given, work, body, &mut report);
         }
         for body in (0..mechanism.bodies()).rev() {
             room.outward(given, body, accelerations, out);
@@ -45,16 +44,11 @@ impl Room {
         }
     }
 
-    /// Takes the coordinates of a body out and passes the rows on; `length` is the body's lever [m].
-    fn inward(
-        &mut self,
-        given: Given<'_, f64>,
-        work: &mut Workspace<f64>,
-        (body, length): (usize, f64),
-        report: &mut Singularity,
-    ) {
+    /// Takes the coordinates of a body out and passes the rows on.
+    fn inward(&mut self, given: Given<'_, f64>, work: &mut Workspace<f64>, body: usize, report: &mut Singularity) {
         let Given { task, mechanism, placement, .. } = given;
         let turn = mechanism.schedule.turn(body);
+        let length = mechanism.levers[body];
         let (nd, w) = (turn.freedom, turn.front);
         let k = nd + 3 * w;
         self.call(body);
