@@ -65,7 +65,7 @@ impl SecondOrder for Feedback<'_> {
     }
 
     fn accelerations(&mut self, _: f64, q: &[f64], v: &[f64], a: &mut [f64]) -> Result<(), ()> {
-        let (r, linkage) = (&mut self.reduction, &self.of.linkage);
+        let r = &mut self.reduction;
         r.place(q, v);
         r.force.fill([0.0; 3]);
         gravity(&self.of.masses, r);
