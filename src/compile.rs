@@ -1,10 +1,13 @@
 //! From netlist text to a ready model: netlist → structure → discretize.
 
 use crate::discretize::{DiscretizeError, Discretized, discretize_with, order};
+use crate::equations::Joints;
+use crate::multibody::relative::Unfit;
 use crate::netlist::{Bundle, Diagnostics, Setting};
 use crate::options::Refused;
 use crate::refine::model_order::{self, ModelOrder};
 use crate::structure::Structure;
+use std::sync::Arc;
 use thiserror::Error;
 
 pub use crate::options::{CompileOptions, Formulation, Junctions, Scheme};
@@ -24,6 +27,18 @@ pub struct Compiled {
     pub parts: Discretized,
     /// Segments of each beam, and the error estimated for them where a band was given.
     pub order: ModelOrder,
+    /// The system in joint coordinates where the formulation has them; or why they cannot be had.
+    pub joints: Option<Result<Arc<Joints>, Unfit>>,
+}
+
+impl Compiled {
+    /// Mechanical unknowns of the formulation.
+    pub fn unknowns(&self) -> usize {
+        match &self.joints {
+            Some(Ok(joints)) => joints.tree.coordinates,
+            _ => self.parts.system.model.unknowns(),
+        }
+    }
 }
 
 /// Why no model came out.
@@ -56,7 +71,12 @@ pub fn compile(bundle: &Bundle, options: &CompileOptions) -> Result<Compiled, Co
         }
     };
     let parts = discretize_with(&loaded.structure, options, &order.segments)?;
+    let joints = match options.formulation {
+        Formulation::Rcr | Formulation::RcrElastic => Some(Joints::elastic(&parts.system).map(Arc::new)),
+        _ => None,
+    };
     Ok(Compiled {
+        joints,
         structure: loaded.structure,
         parameters: loaded.parameters,
         warnings: loaded.warnings,

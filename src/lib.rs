@@ -16,6 +16,7 @@ pub mod compile;
 pub mod cosim;
 pub mod device;
 pub mod discretize;
+pub mod equations;
 pub mod gaps;
 pub mod jobs;
 pub mod multibody;

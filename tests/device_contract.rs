@@ -1,6 +1,6 @@
 //! The electrical contract of [`bimorph::device::Device`] on a mechanism with heaters, a comb and a plate gap.
 
-use bimorph::compile::{CompileOptions, Compiled, Junctions, compile};
+use bimorph::compile::{CompileOptions, Compiled, Formulation, Junctions, compile};
 use bimorph::device::local::LocalDevice;
 use bimorph::device::{Device, DeviceError, Mode, OpenRequest, SmallSignal, Status, Token, Trial, TrialReply};
 use bimorph::netlist::Bundle;
@@ -27,8 +27,11 @@ heat port * [a] []
 shake port * [s] []
 ";
 
-fn compiled() -> Arc<Compiled> {
-    let options = CompileOptions { junctions: Junctions::Centreline, ..CompileOptions::default() };
+/// The formulations that a device steps in; the contract is the same in each.
+const FORMULATIONS: [Formulation; 2] = [Formulation::Compliant, Formulation::Rcr];
+
+fn compiled(formulation: Formulation) -> Arc<Compiled> {
+    let options = CompileOptions { formulation, junctions: Junctions::Centreline, ..CompileOptions::default() };
     Arc::new(compile(&Bundle::from_text("shuttle.net", SHUTTLE), &options).unwrap_or_else(|e| panic!("{e}")))
 }
 
@@ -50,80 +53,86 @@ fn ask(device: &mut LocalDevice, mode: Mode, parent: Option<Token>, dt: f64, vol
 /// Asking again gives the same token and the same bits, whatever was asked in between: a rejected trial leaves no trace.
 #[test]
 fn trials_are_pure() {
-    let compiled = compiled();
-    let mut device = opened(&compiled);
-    let rest = ask(&mut device, Mode::Static, None, 0.0, &[1.0, 5.0]);
-    let first = ask(&mut device, Mode::Transient, rest.token, 2e-7, &[1.4, 5.5]);
-    for dt in [3e-7, 1e-6, 1e-9] {
-        ask(&mut device, Mode::Transient, rest.token, dt, &[0.3, 9.0]);
-        ask(&mut device, Mode::Static, rest.token, 0.0, &[2.0, 1.0]);
+    for formulation in FORMULATIONS {
+        let compiled = compiled(formulation);
+        let mut device = opened(&compiled);
+        let rest = ask(&mut device, Mode::Static, None, 0.0, &[1.0, 5.0]);
+        let first = ask(&mut device, Mode::Transient, rest.token, 2e-7, &[1.4, 5.5]);
+        for dt in [3e-7, 1e-6, 1e-9] {
+            ask(&mut device, Mode::Transient, rest.token, dt, &[0.3, 9.0]);
+            ask(&mut device, Mode::Static, rest.token, 0.0, &[2.0, 1.0]);
+        }
+        let again = ask(&mut device, Mode::Transient, rest.token, 2e-7, &[1.4, 5.5]);
+        assert_eq!(first, again);
+        // a device that was never asked anything else agrees too
+        let mut fresh = opened(&compiled);
+        let rest = ask(&mut fresh, Mode::Static, None, 0.0, &[1.0, 5.0]);
+        assert_eq!(ask(&mut fresh, Mode::Transient, rest.token, 2e-7, &[1.4, 5.5]), first);
     }
-    let again = ask(&mut device, Mode::Transient, rest.token, 2e-7, &[1.4, 5.5]);
-    assert_eq!(first, again);
-    // a device that was never asked anything else agrees too
-    let mut fresh = opened(&compiled);
-    let rest = ask(&mut fresh, Mode::Static, None, 0.0, &[1.0, 5.0]);
-    assert_eq!(ask(&mut fresh, Mode::Transient, rest.token, 2e-7, &[1.4, 5.5]), first);
 }
 
 /// Accepting a state frees its rivals and changes no answer.
 #[test]
 fn accept_is_advisory() {
-    let compiled = compiled();
-    let (mut silent, mut told) = (opened(&compiled), opened(&compiled));
-    let mut parents = [None, None];
-    for step in 0..20 {
-        let v = [1.0 + 0.05 * f64::from(step), 4.0];
-        let mut replies = Vec::new();
-        for (device, parent) in [&mut silent, &mut told].into_iter().zip(parents) {
-            let mode = if step == 0 { Mode::Static } else { Mode::Transient };
-            ask(device, mode, parent, 1.3e-7, &[v[0], 7.0]);
-            replies.push(ask(device, mode, parent, 1e-7, &v));
+    for formulation in FORMULATIONS {
+        let compiled = compiled(formulation);
+        let (mut silent, mut told) = (opened(&compiled), opened(&compiled));
+        let mut parents = [None, None];
+        for step in 0..20 {
+            let v = [1.0 + 0.05 * f64::from(step), 4.0];
+            let mut replies = Vec::new();
+            for (device, parent) in [&mut silent, &mut told].into_iter().zip(parents) {
+                let mode = if step == 0 { Mode::Static } else { Mode::Transient };
+                ask(device, mode, parent, 1.3e-7, &[v[0], 7.0]);
+                replies.push(ask(device, mode, parent, 1e-7, &v));
+            }
+            assert_eq!(replies[0], replies[1]);
+            parents = [replies[0].token, replies[1].token];
+            told.accept(replies[1].token.unwrap());
         }
-        assert_eq!(replies[0], replies[1]);
-        parents = [replies[0].token, replies[1].token];
-        told.accept(replies[1].token.unwrap());
+        assert!(told.state_bytes() < silent.state_bytes());
     }
-    assert!(told.state_bytes() < silent.state_bytes());
 }
 
 /// Central differences of charges, currents and outputs agree with the partials: to 1e-6 of the largest entry of each row
 /// for a single internal step, where the partials are exact, and to 1e-3 when a trial takes several.
 #[test]
 fn partials_match_finite_differences() {
-    let compiled = compiled();
-    let mut device = opened(&compiled);
-    let base = [1.5, 8.0];
-    let rest = ask(&mut device, Mode::Static, None, 0.0, &[1.2, 6.0]);
-    let moving = ask(&mut device, Mode::Transient, rest.token, 3e-7, &[1.3, 7.0]);
-    let cases = [
-        (Mode::Static, rest.token, 0.0, 1e-3, 1e-6),
-        (Mode::Transient, moving.token, 5e-9, 1e-2, 1e-6),
-        (Mode::Transient, moving.token, 1e-7, 1e-2, 1e-3),
-    ];
-    for (mode, parent, dt, step, tolerance) in cases {
-        let at = ask(&mut device, mode, parent, dt, &base);
-        for port in 0..2 {
-            let mut v = base;
-            v[port] += step;
-            let hi = ask(&mut device, mode, parent, dt, &v);
-            v[port] -= 2.0 * step;
-            let lo = ask(&mut device, mode, parent, dt, &v);
-            let check = |what: &str, hi: &[f64], lo: &[f64], partial: &[f64]| {
-                for (row, (hi, lo)) in hi.iter().zip(lo).enumerate() {
-                    let difference = (hi - lo) / (2.0 * step);
-                    let exact = partial[2 * row + port];
-                    let scale = partial[2 * row].abs().max(partial[2 * row + 1].abs());
-                    let error = (difference - exact).abs();
-                    assert!(
-                        error <= tolerance * scale,
-                        "{mode:?} dt={dt:e} {what}[{row}]/V{port}: {difference:e} {exact:e}"
-                    );
-                }
-            };
-            check("charge", &hi.charges, &lo.charges, &at.dq_dv);
-            check("current", &hi.currents, &lo.currents, &at.di_dv);
-            check("output", &hi.outputs, &lo.outputs, &at.doutputs_dv);
+    for formulation in FORMULATIONS {
+        let compiled = compiled(formulation);
+        let mut device = opened(&compiled);
+        let base = [1.5, 8.0];
+        let rest = ask(&mut device, Mode::Static, None, 0.0, &[1.2, 6.0]);
+        let moving = ask(&mut device, Mode::Transient, rest.token, 3e-7, &[1.3, 7.0]);
+        let cases = [
+            (Mode::Static, rest.token, 0.0, 1e-3, 1e-6),
+            (Mode::Transient, moving.token, 5e-9, 1e-3, 1e-6),
+            (Mode::Transient, moving.token, 1e-7, 1e-2, 1e-3),
+        ];
+        for (mode, parent, dt, step, tolerance) in cases {
+            let at = ask(&mut device, mode, parent, dt, &base);
+            for port in 0..2 {
+                let mut v = base;
+                v[port] += step;
+                let hi = ask(&mut device, mode, parent, dt, &v);
+                v[port] -= 2.0 * step;
+                let lo = ask(&mut device, mode, parent, dt, &v);
+                let check = |what: &str, hi: &[f64], lo: &[f64], partial: &[f64]| {
+                    for (row, (hi, lo)) in hi.iter().zip(lo).enumerate() {
+                        let difference = (hi - lo) / (2.0 * step);
+                        let exact = partial[2 * row + port];
+                        let scale = partial[2 * row].abs().max(partial[2 * row + 1].abs());
+                        let error = (difference - exact).abs();
+                        assert!(
+                            error <= tolerance * scale,
+                            "{mode:?} dt={dt:e} {what}[{row}]/V{port}: {difference:e} {exact:e}"
+                        );
+                    }
+                };
+                check("charge", &hi.charges, &lo.charges, &at.dq_dv);
+                check("current", &hi.currents, &lo.currents, &at.di_dv);
+                check("output", &hi.outputs, &lo.outputs, &at.doutputs_dv);
+            }
         }
     }
 }
@@ -131,24 +140,27 @@ fn partials_match_finite_differences() {
 /// At a very low frequency the small-signal answer is the static one: capacitances and outputs per volt.
 #[test]
 fn low_frequency_is_static() {
-    let compiled = compiled();
-    let mut device = opened(&compiled);
-    let rest = ask(&mut device, Mode::Static, None, 0.0, &[1.2, 6.0]);
-    let mut small = SmallSignal::default();
-    let omega = 1.0;
-    device.linearize(rest.token.unwrap(), omega, &mut small).unwrap();
-    for k in 0..4 {
-        let (y, g, c) = (small.admittance[k], rest.di_dv[k], rest.dq_dv[k]);
-        assert!((y[0] - g).abs() <= 1e-6 * g.abs() + 1e-4 * omega * c.abs());
-        assert!((y[1] - omega * c).abs() <= 1e-4 * c.abs(), "{k}: {} {}", y[1], c);
-    }
-    // displacements share the scale of the larger one: x is what an unsymmetric heating leaves of y
-    for (rows, tolerance) in [(&[0, 1, 6][..], 1e-7), (&[3, 4], 1e-9), (&[5], 1e-7)] {
-        let scale = rows.iter().flat_map(|&r| &rest.doutputs_dv[2 * r..2 * r + 2]).fold(0.0f64, |m, s| m.max(s.abs()));
-        for &row in rows {
-            for p in 0..2 {
-                let (x, s) = (small.outputs[2 * row + p][0], rest.doutputs_dv[2 * row + p]);
-                assert!((x - s).abs() <= tolerance * scale, "{row} {p}: {x:e} {s:e}");
+    for formulation in FORMULATIONS {
+        let compiled = compiled(formulation);
+        let mut device = opened(&compiled);
+        let rest = ask(&mut device, Mode::Static, None, 0.0, &[1.2, 6.0]);
+        let mut small = SmallSignal::default();
+        let omega = 1.0;
+        device.linearize(rest.token.unwrap(), omega, &mut small).unwrap();
+        for k in 0..4 {
+            let (y, g, c) = (small.admittance[k], rest.di_dv[k], rest.dq_dv[k]);
+            assert!((y[0] - g).abs() <= 1e-6 * g.abs() + 1e-4 * omega * c.abs());
+            assert!((y[1] - omega * c).abs() <= 1e-4 * c.abs(), "{k}: {} {}", y[1], c);
+        }
+        // displacements share the scale of the larger one: x is what an unsymmetric heating leaves of y
+        for (rows, tolerance) in [(&[0, 1, 6][..], 1e-7), (&[3, 4], 1e-9), (&[5], 1e-7)] {
+            let scale =
+                rows.iter().flat_map(|&r| &rest.doutputs_dv[2 * r..2 * r + 2]).fold(0.0f64, |m, s| m.max(s.abs()));
+            for &row in rows {
+                for p in 0..2 {
+                    let (x, s) = (small.outputs[2 * row + p][0], rest.doutputs_dv[2 * row + p]);
+                    assert!((x - s).abs() <= tolerance * scale, "{row} {p}: {x:e} {s:e}");
+                }
             }
         }
     }
@@ -157,7 +169,7 @@ fn low_frequency_is_static() {
 /// Bad requests are refused with the field and the reason, and change nothing.
 #[test]
 fn bad_requests_are_refused() {
-    let compiled = compiled();
+    let compiled = compiled(Formulation::Compliant);
     let mut device = LocalDevice::new(Arc::clone(&compiled));
     let mut reply = TrialReply::default();
     fn trial(voltages: &[f64]) -> Trial<'_> {

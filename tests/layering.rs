@@ -8,7 +8,7 @@ const FLOORS: [&[&str]; 10] = [
     &["sets"],
     &["structure", "multibody"],
     &["netlist", "layout", "gaps", "results"],
-    &["options"],
+    &["options", "equations"],
     &["discretize", "solve"],
     &["refine"],
     &["compile", "device", "analysis"],

@@ -73,8 +73,8 @@ impl Formulation {
         match self {
             Self::Compliant => asked.to_vec(),
             Self::Rcr | Self::RcrElastic => {
-                let own = |m: &&Integrator| **m != Integrator::Rk45 && Integrator::IN_JOINTS.contains(&m.name());
-                [Integrator::Rk45].into_iter().chain(asked.iter().filter(own).copied()).collect()
+                let own = |m: &&Integrator| **m != Integrator::Rodas4 && Integrator::IN_JOINTS.contains(&m.name());
+                [Integrator::Rodas4].into_iter().chain(asked.iter().filter(own).copied()).collect()
             }
             Self::Frame => Vec::new(),
         }

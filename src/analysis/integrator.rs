@@ -2,16 +2,16 @@
 
 use crate::gaps::{Ramp, System};
 use crate::solve::SolveError;
-use crate::solve::adaptive::{Adaptive, Advance, Control, Observer};
+use crate::solve::time::adaptive::{Adaptive, Advance, Control, Observer};
 use crate::solve::avf::AverageField;
 use crate::solve::baseline::Solver;
 use crate::solve::doubling::Doubling;
 use crate::solve::generalized_alpha::GeneralizedAlpha;
-use crate::solve::method::{Method, Motion, Work};
-use crate::solve::midpoint::Midpoint;
+use crate::solve::time::method::{Method, Motion, Work};
+use crate::solve::time::midpoint::Midpoint;
 use crate::solve::radau5::Radau5;
 use crate::solve::rk45::Rk45;
-use crate::solve::rodas4::Rodas4;
+use crate::solve::time::rodas4::Rodas4;
 use crate::solve::sdirk4::Sdirk4;
 use crate::solve::tr_bdf2::TrBdf2;
 
@@ -51,9 +51,10 @@ impl Integrator {
     pub const NAMES: [&str; 9] =
         ["rodas4", "avf", "midpoint", "tr-bdf2", "generalized-alpha", "newmark", "radau5", "rk45", "sdirk4"];
 
-    /// Names of those that joint coordinates have. Rodas4 and Radau5 need the exact Jacobian, which a tree of joints does
-    /// not offer as cheaply, and average vector field coordinates with constant inertia.
-    pub const IN_JOINTS: [&str; 6] = ["rk45", "tr-bdf2", "sdirk4", "midpoint", "newmark", "generalized-alpha"];
+    /// Names of those that joint coordinates have: rodas4 with loops closed by springs, the others with constraints reduced
+    /// in the recursion. Radau5 couples its stages, and average vector field needs coordinates with constant inertia.
+    pub const IN_JOINTS: [&str; 7] =
+        ["rodas4", "rk45", "tr-bdf2", "sdirk4", "midpoint", "newmark", "generalized-alpha"];
 
     /// The integrator of a name, generalized-α with [`Integrator::RHO`].
     pub fn named(name: &str) -> Option<Self> {

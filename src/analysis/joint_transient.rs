@@ -11,22 +11,26 @@
 
 use super::formulation::{Formulation, coordinate_scales};
 use super::integrator::Integrator;
-use super::transient::{Carrier, STEP_SHARE, TransientOptions, TransientResult, record};
+use super::transient::{Carrier, STEP_SHARE, TransientOptions, TransientResult, first_step, record};
 use super::{AnalysisError, Watch};
 use crate::compile::Compiled;
+use crate::equations::Joints;
 use crate::gaps::{Ramp, System};
 use crate::multibody::rcr::{Linkage, Reduction};
-use crate::solve::adaptive::{Advance, Control, Observer};
+use crate::solve::time::adaptive::{Adaptive, Advance, Control, Observer};
 use crate::solve::dormand_prince::{Dense, DormandPrince, IntegrationError, Pair, SecondOrder, Tolerances};
 use crate::solve::fastest::{Fastest, fastest};
 use crate::solve::joint_adaptive::{JointAdaptive, JointStepError};
 use crate::solve::joint_dirk::{JointMethod, Rule};
 use crate::solve::joint_loads::{JointLoads, poses};
 use crate::solve::joint_motion::{JointMotion, NotFinite};
+use crate::solve::time::joint_rodas4::JointRodas4;
 use crate::solve::joint_stage::ImplicitMotion;
-use crate::solve::method::{Motion, Work};
+use crate::solve::linear::SolverKind;
+use crate::solve::time::method::{Motion, Work};
 use serde::Serialize;
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 /// Steps beyond which a run is refused before it begins.
 pub const MOST_STEPS: f64 = 2e7;
@@ -68,6 +72,9 @@ pub fn joint_transient(
     sample: &mut dyn FnMut(f64, &[f64]),
     watch: Watch<'_>,
 ) -> Result<(TransientResult, JointReport), AnalysisError> {
+    if options.method == Integrator::Rodas4 {
+        return on_tree(compiled, formulation, options, sample, watch);
+    }
     let rule = rule(formulation, options)?;
     let system = &compiled.parts.system;
     let linkage = formulation.linkage(system)?;
@@ -108,6 +115,71 @@ pub fn joint_transient(
     let mut result = record(compiled, &options, &mut carrier, sample, watch)?;
     result.unknowns = carrier.linkage.coordinates.saturating_sub(carrier.linkage.constraints);
     Ok((result, carrier.report))
+}
+
+/// Loops closed by springs: one factorization a step, no constraint and no singular configuration.
+fn on_tree(
+    compiled: &Compiled,
+    formulation: Formulation,
+    options: &TransientOptions<'_>,
+    sample: &mut dyn FnMut(f64, &[f64]),
+    watch: Watch<'_>,
+) -> Result<(TransientResult, JointReport), AnalysisError> {
+    let system = &compiled.parts.system;
+    let joints = match &compiled.joints {
+        Some(joints) => joints.clone(),
+        None => Joints::elastic(system).map(Arc::new),
+    };
+    let joints = joints.map_err(|unfit| AnalysisError::BadRequest {
+        what: format!("formulation {}", formulation.name()),
+        detail: unfit.to_string(),
+    })?;
+    let counts = system.model.counts();
+    let mut result = record(compiled, options, &mut OnTree { system, joints: &joints, options }, sample, watch)?;
+    result.unknowns = joints.tree.coordinates;
+    let report = JointReport {
+        coordinates: joints.tree.coordinates,
+        constraints: 0,
+        coordinates_uncut: counts.coordinates,
+        constraints_uncut: counts.constraints,
+        accelerations: result.counters.forces,
+        singular_evaluations: 0,
+        largest_gap_m: 0.0,
+        highest_frequency_hz: None,
+    };
+    Ok((result, report))
+}
+
+/// Joint coordinates whose loops close by springs.
+struct OnTree<'a> {
+    system: &'a System,
+    joints: &'a Arc<Joints>,
+    options: &'a TransientOptions<'a>,
+}
+
+impl Carrier for OnTree<'_> {
+    fn advance(
+        &mut self,
+        ramp: &Ramp<'_>,
+        motion: &mut Motion,
+        observe: Observer<'_>,
+    ) -> Result<(Advance, Work), AnalysisError> {
+        let options = self.options;
+        if options.solver != SolverKind::Recursion {
+            return Err(AnalysisError::BadRequest {
+                what: "solver".into(),
+                detail: format!(
+                    "joint coordinates have the recursion only; the {} solver cannot",
+                    options.solver.name()
+                ),
+            });
+        }
+        let mut h = first_step(self.system, options.stop);
+        let control = options.step.map_or(Control::Tolerance(STEP_SHARE * options.tol), Control::Fixed);
+        let mut stepper = Adaptive::new(self.system, JointRodas4::new(Arc::clone(self.joints), h, &[]));
+        let end = stepper.advance(self.system, ramp, motion, &mut h, control, usize::MAX, observe)?;
+        Ok((end, stepper.work()))
+    }
 }
 
 /// Joint coordinates on the way.

@@ -1,5 +1,6 @@
 //! Motion in time.
 use super::integrator::Integrator;
+use super::joint_transient::joint_transient;
 use super::signal::{Signal, View};
 use super::statics::{operating_point, source_vector};
 use super::{AnalysisError, Watch};
@@ -8,11 +9,11 @@ use crate::gaps::{Ramp, System, contact};
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
 use crate::options::analysis::TRAN_POINTS;
-use crate::solve::adaptive::{Advance, Control, Observer};
+use crate::solve::time::adaptive::{Advance, Control, Observer};
 use crate::solve::baseline::{Solver, SolverKind};
 use crate::solve::dense::interpolate;
-use crate::solve::event::{Detector, Direction};
-use crate::solve::method::{Motion, Work};
+use crate::solve::time::event::{Detector, Direction};
+use crate::solve::time::method::{Motion, Work};
 use serde::Serialize;
 
 /// What a transient may be told.
@@ -164,7 +165,7 @@ impl Carrier for Compliant<'_> {
     }
 }
 
-/// Integrates the motion. Each finished sample also goes to `sample` (t, values in signal order), for streaming.
+/// Integrates the motion in the formulation of the model. Each finished sample also goes to `sample` (t, values in signal order), for streaming.
 ///
 /// # Errors
 /// See [`AnalysisError`].
@@ -174,8 +175,11 @@ pub fn transient(
     sample: &mut dyn FnMut(f64, &[f64]),
     watch: Watch<'_>,
 ) -> Result<TransientResult, AnalysisError> {
-    let mut carrier = Compliant { system: &compiled.parts.system, options };
-    record(compiled, options, &mut carrier, sample, watch)
+    let system = &compiled.parts.system;
+    match &compiled.joints {
+        None => record(compiled, options, &mut Compliant { system, options }, sample, watch),
+        Some(_) => joint_transient(compiled, compiled.options.formulation, options, sample, watch).map(|(r, _)| r),
+    }
 }
 
 /// Lets `carrier` go from the start to the end of a run, and takes samples and events on the way.
@@ -217,7 +221,7 @@ pub(super) fn record(
             .map(|(name, s)| (name.clone(), s.unit().to_owned(), Vec::with_capacity(options.points)))
             .collect(),
         counters: Counters::default(),
-        unknowns: system.model.unknowns(),
+        unknowns: compiled.unknowns(),
         events: Vec::new(),
     };
     let mut watched = watched(compiled, options)?;
@@ -321,7 +325,7 @@ fn watched(compiled: &Compiled, options: &TransientOptions<'_>) -> Result<Vec<Wa
 }
 
 /// A cautious first step: the error control corrects it within a few steps either way.
-pub(crate) fn first_step(system: &System, interval: f64) -> f64 {
+pub fn first_step(system: &System, interval: f64) -> f64 {
     // a tenth of a radian of the fastest translation that a body and its own joints would make
     let model = &system.model;
     let mut tangent = BlockMatrix::new(&model.pattern);

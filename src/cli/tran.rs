@@ -6,7 +6,6 @@ use super::output::OutputArgs;
 use super::solver::SolverChoice;
 use super::{draw_motion, progress, report, value};
 use bimorph::analysis::chart::released;
-use bimorph::analysis::formulation::Formulation;
 use bimorph::analysis::frame::{frame, frame_transient};
 use bimorph::analysis::integrator::Integrator;
 use bimorph::analysis::joint_transient::{JointReport, joint_transient};
@@ -18,7 +17,7 @@ use bimorph::results::plot::axis::quantity;
 use bimorph::results::plot::chart::{self, Chart, Panel, Series};
 use bimorph::results::plot::svg::Picture;
 use bimorph::results::table::Table;
-use bimorph::solve::event::Direction;
+use bimorph::solve::time::event::Direction;
 use clap::Args;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -40,8 +39,9 @@ use std::path::PathBuf;
     newmark (2)            average acceleration; may gain energy when steps are long\n  \
     sdirk4 (4)             five implicit stages; fast motions die out\n  \
     rk45 (5)               explicit: tiny steps, and needs inertia in every direction\n\
-Joint coordinates (--formulation rcr, rcr-elastic) have rk45, their default, and tr-bdf2, sdirk4, midpoint, newmark and\n\
-generalized-alpha: take one of these where stiff directions make explicit steps tiny.\n\n\
+Joint coordinates (--formulation rcr, rcr-elastic) have rodas4, the default, with loops closed by springs; and rk45, tr-bdf2,\n\
+sdirk4, midpoint, newmark and generalized-alpha with constraints reduced in the recursion: the paper's model of joints that\n\
+only turn, and mechanisms of rigid loops, where rk45 is the default.\n\n\
 Examples:\n  \
     bimorph tran bank.net --stop 300u --port heat=2.2 --signals yoke.y,b1.hot.T --out heat.svg\n  \
     bimorph tran stage.net --set F=100u --release F --stop 30u --undamped --signals c.x --json\n      \
@@ -49,7 +49,7 @@ Examples:\n  \
     bimorph tran stage.net --set F=100u --release F --stop 1m --undamped --method avf --step 0.5u --event c.x=0\n      \
     keeps the energy over many swings and tells each passage through the middle\n  \
     bimorph tran stage.net --set F=100u --release F --stop 30u --draw motion.html\n  \
-    bimorph tran stage.net --set F=100u --release F --stop 30u --undamped --formulation rcr --signals c.x --json\n      \
+    bimorph tran stage.net --set F=100u --release F --stop 30u --undamped --formulation rcr --method rk45 --signals c.x --json\n      \
     the model of the paper: joints that only turn, in joint coordinates; \"joint_coordinates\" tells n, m and the gaps\n  \
     bimorph tran stage.net --set F=100u --release F --stop 10u --formulation rcr-elastic --rotary-inertia --method tr-bdf2\n      \
     every elastic direction a coordinate, in implicit steps by the same recursion")]
@@ -136,7 +136,6 @@ impl Tran {
         TRAN_STEP.check(&self.step.map_or(Value::Unset, Value::Number))?;
         TRAN_RHO.check(&Value::Number(self.rho.unwrap_or(TRAN_RHO.number())))?;
         let formulation = self.model.options()?.formulation;
-        let method = self.integrator(formulation)?;
         let initial = match self.solver {
             SolverChoice::Frame => self.model.compile_frame()?,
             _ => self.model.compile()?,
@@ -146,6 +145,7 @@ impl Tran {
             None => None,
         };
         let compiled = released.as_ref().unwrap_or(&initial);
+        let method = self.integrator(compiled)?;
         let mut signals = if self.signals.is_empty() { free_nodes(compiled) } else { value::names(&self.signals) };
         let wanted = signals.len();
         if self.draw.is_some() {
@@ -169,9 +169,7 @@ impl Tran {
             (SolverChoice::Frame, _) => {
                 frame(compiled).and_then(|frame| frame_transient(compiled, &frame, &options, watch)).map(|r| (r, None))
             }
-            (_, Formulation::Compliant | Formulation::Auto) => {
-                transient(compiled, &options, &mut |_, _| (), watch).map(|r| (r, None))
-            }
+            _ if compiled.joints.is_none() => transient(compiled, &options, &mut |_, _| (), watch).map(|r| (r, None)),
             _ => joint_transient(compiled, formulation, &options, &mut |_, _| (), watch).map(|(r, j)| (r, Some(j))),
         };
         bar.finish_and_clear();
@@ -209,9 +207,13 @@ impl Tran {
         )
     }
 
-    fn integrator(&self, formulation: Formulation) -> Result<Integrator, Failure> {
-        let implicit = matches!(formulation, Formulation::Compliant | Formulation::Auto);
-        let name = self.method.as_deref().unwrap_or(if implicit { "rodas4" } else { "rk45" });
+    fn integrator(&self, compiled: &Compiled) -> Result<Integrator, Failure> {
+        let implicit = compiled.joints.is_none();
+        // mechanisms of rigid loops have explicit steps
+        let name = self.method.as_deref().unwrap_or(match &compiled.joints {
+            Some(Err(_)) => "rk45",
+            _ => "rodas4",
+        });
         let unknown = || Failure::bad("--method", "the name of an integrator", name.to_owned());
         let method = Integrator::named(name).ok_or_else(unknown)?;
         if !implicit && !Integrator::IN_JOINTS.contains(&method.name()) {

@@ -15,10 +15,11 @@ use crate::compile::Compiled;
 use crate::gaps::Drive;
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
-use crate::solve::adaptive::Adaptive;
+use crate::solve::time::adaptive::Adaptive;
 use crate::solve::equilibrium::{Equilibrium, EquilibriumOptions};
+use crate::solve::time::formulated::Formulated;
 use crate::solve::harmonic::{ComplexPose, Harmonic};
-use crate::solve::rodas4::{Motion, Rodas4};
+use crate::solve::time::method::Motion;
 use std::sync::Arc;
 
 /// A [`Device`] over a compiled model.
@@ -38,7 +39,7 @@ pub(super) struct Session {
     pub(super) first_step: f64,
     pub(super) equilibrium: Equilibrium,
     /// Carries ∂motion/∂(final voltage), one for each opened port.
-    pub(super) stepper: Adaptive,
+    pub(super) stepper: Adaptive<Formulated>,
     pub(super) motion: Motion,
     pub(super) rise: Vec<f64>,
     pub(super) rise_slope: Vec<f64>,
@@ -140,16 +141,28 @@ impl Session {
             signals: (request.signals.iter().zip(&signals))
                 .map(|(name, s)| SignalInfo { name: name.clone(), unit: s.unit().into() })
                 .collect(),
-            unknowns: system.model.unknowns(),
+            unknowns: compiled.unknowns(),
         };
         let n = system.bodies();
         let heaters = electrics.heating.heaters.len();
+        let first_step = first_step(system, f64::INFINITY);
+        let joints = match &compiled.joints {
+            Some(Ok(joints)) => Some(Arc::clone(joints)),
+            Some(Err(unfit)) => {
+                return Err(DeviceError::BadRequest {
+                    what: "formulation",
+                    expected: format!("one that suits this mechanism ({unfit})"),
+                    got: compiled.options.formulation.name().into(),
+                });
+            }
+            None => None,
+        };
         let session = Self {
-            stepper: Adaptive::new(system, Rodas4::new(system, &ports)),
+            stepper: Adaptive::new(system, Formulated::new(system, joints.as_ref(), first_step, &ports)),
             ports,
             signals,
             states: States::default(),
-            first_step: first_step(system, f64::INFINITY),
+            first_step,
             equilibrium: Equilibrium::new(system, EquilibriumOptions::default()),
             motion: Motion::zeros(n),
             rise: vec![0.0; heaters],

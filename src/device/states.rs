@@ -3,6 +3,7 @@
 use super::shown::Shown;
 use super::{Mode, Token, Trial};
 use crate::multibody::planar::Pose;
+use crate::solve::time::method::Motion;
 use serde::{Deserialize, Serialize};
 use std::collections::{HashMap, VecDeque};
 use std::sync::Arc;
@@ -27,6 +28,8 @@ pub struct Snapshot {
     pub next_step: f64,
     /// What the circuit has seen.
     pub shown: Shown,
+    /// What a formulation carries from step to step beside the bodies' motion.
+    pub carried: Vec<Motion>,
 }
 
 /// Held states, in order of last use.
@@ -79,6 +82,7 @@ impl States {
     pub fn bytes(&self) -> usize {
         let size = |s: &Snapshot| {
             (s.q.len() + s.v.len()) * size_of::<Pose>()
+                + s.carried.iter().map(|m| m.q.len() + m.v.len()).sum::<usize>() * size_of::<Pose>()
                 + (s.rise.len() + s.sources.len() + s.shown.doubles()) * 8
                 + size_of::<Snapshot>()
         };

@@ -9,7 +9,7 @@ use crate::analysis::signal::{Signal, View};
 use crate::compile::Compiled;
 use crate::gaps::Ramp;
 use crate::multibody::planar::Pose;
-use crate::solve::adaptive::{Advance, Control};
+use crate::solve::time::adaptive::{Advance, Control};
 use crate::solve::path::SourcePath;
 
 /// Share of the compilation's tolerance that one internal step may use.
@@ -56,7 +56,7 @@ impl Session {
             self.unit.fill(0.0);
             self.unit[port] = 1.0;
             electrics.steady_slope(&self.sources, &self.unit, &mut self.change);
-            let s = &mut self.stepper.method.sensitivity[p];
+            let s = &mut self.stepper.method.sensitivity_mut()[p];
             system.drive_force(&self.motion.q, &self.drive, &self.change, &mut s.q);
             for x in &mut s.q {
                 *x = -*x;
@@ -91,10 +91,7 @@ impl Session {
                 vec![0.0; self.sources.len()]
             }
         };
-        for s in &mut self.stepper.method.sensitivity {
-            s.q.fill(Pose::zeros());
-            s.v.fill(Pose::zeros());
-        }
+        self.stepper.method.begin(parent.map_or(&[], |p| &p.carried));
         let electrics = &system.electrics;
         let ramp = Ramp { electrics, from: &from, to: &self.sources, rise: &self.rise, dt: request.dt };
         let mut h = parent.map_or(self.first_step, |p| p.next_step);
@@ -161,7 +158,7 @@ impl Session {
         reply.doutputs_dv.clear();
         reply.doutputs_dv.resize(self.signals.len() * ports, 0.0);
         for (p, &port) in self.ports.iter().enumerate() {
-            let s = &self.stepper.method.sensitivity[p];
+            let s = &self.stepper.method.sensitivity()[p];
             let gap_row: Vec<f64> = (0..gaps).map(|g| electrics.gap_rows[(g, port)]).collect();
             for k in 0..self.rise_slope.len() {
                 self.rise_slope[k] = match from {
@@ -214,6 +211,7 @@ impl Session {
             rise: self.rise.clone(),
             sources: self.sources.clone(),
             next_step,
+            carried: if from.is_some() { self.stepper.method.state().to_vec() } else { Vec::new() },
         };
         reply.token = Some(self.states.insert(request, snapshot));
     }

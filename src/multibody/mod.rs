@@ -15,6 +15,7 @@
 //! | [`section`] | joints as they are stored: what those of one beam share, and where their couplings lie |
 //! | [`model`] | bodies, joints, dampers: the immutable model and the mutable state |
 //! | [`rcr`] | the same graph in relative joint coordinates, loops reduced inside the recursion |
+//! | [`relative`] | joint coordinates on a spanning tree, loops closed by springs |
 //! | [`linear_system`] | K, M and C of a linear frame on one pattern |
 //! | [`forces`] | elastic forces, energy and tangent of a model at a configuration |
 
@@ -27,6 +28,7 @@ pub mod order;
 pub mod pattern;
 pub mod planar;
 pub mod rcr;
+pub mod relative;
 pub mod section;
 pub mod sine;
 

@@ -128,6 +128,19 @@ pub struct JointFrame {
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Symmetric(pub [f64; 6]);
 
+impl Symmetric {
+    /// A column of it.
+    #[inline]
+    pub fn column(&self, i: usize) -> Vector3<f64> {
+        let [uu, ug, up, gg, gp, pp] = self.0;
+        match i {
+            0 => Vector3::new(uu, ug, up),
+            1 => Vector3::new(ug, gg, gp),
+            _ => Vector3::new(up, gp, pp),
+        }
+    }
+}
+
 impl std::ops::Mul<Vector3<f64>> for Symmetric {
     type Output = Vector3<f64>;
 

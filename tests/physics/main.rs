@@ -12,6 +12,7 @@ mod joint_integrators;
 mod junctions;
 mod motion;
 mod paths;
+mod relative;
 mod scenes;
 mod schemes;
 

@@ -4,9 +4,10 @@
 use crate::gaps::{Ramp, System};
 use crate::multibody::factor::ZeroPivot;
 use crate::multibody::planar::Pose;
+use serde::{Deserialize, Serialize};
 
 /// Displacements and rates, or changes of them.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Motion {
     /// Displacements.
     pub q: Vec<Pose>,

@@ -11,6 +11,7 @@
 //! | [`interpolation`] | the motion inside a step |
 //! | [`event`] | when a quantity crosses zero during a step |
 //! | [`rodas4`] | the default: a Rosenbrock method with one factorization a step, and its sensitivities |
+//! | [`formulated`] | it in the formulation of a model |
 //! | [`radau5`] | Radau IIA of order 5: one real and one complex block factorization a step |
 //! | `implicit` | the equation that a step with one unknown displacement comes to |
 //! | [`centred`] | steps that are symmetric about their middle: [`midpoint`], and [`avf`], which keeps the energy |
@@ -24,6 +25,7 @@
 //! | file | what it holds |
 //! |---|---|
 //! | [`dormand_prince`] | an explicit Runge–Kutta pair for any formulation that tells its accelerations |
+//! | [`joint_rodas4`] | Rodas4 with loops closed by springs: one factorization a step, and its sensitivities |
 //! | [`joint_motion`] | motion in joint coordinates, loops closed after each step |
 //! | [`joint_loads`] | what acts on a system there |
 //! | [`joint_stage`] | the stages of implicit methods |
@@ -38,6 +40,7 @@ pub mod centred;
 pub mod dormand_prince;
 pub mod doubling;
 pub mod event;
+pub mod formulated;
 pub mod generalized_alpha;
 mod implicit;
 pub mod interpolation;
@@ -45,6 +48,7 @@ pub mod joint_adaptive;
 pub mod joint_dirk;
 pub mod joint_loads;
 pub mod joint_motion;
+pub mod joint_rodas4;
 pub mod joint_stage;
 pub mod method;
 pub mod midpoint;

@@ -1,0 +1,121 @@
+//! Steps, work and time of both formulations on scenes as they are drawn, one line each, in one run:
+//! `scene,formulation,tol,bodies,coordinates,loops,steps,rejected,ms,deviation`.
+//!
+//!     taskset -c 0 cargo run --release --no-default-features --example formulations
+//!
+//! `deviation` is the largest distance of the bodies from a run of the same formulation at a hundredth of the tolerance, at
+//! the end, as a share of the largest displacement. Thread CPU time, the least of several runs.
+
+use bimorph::compile::{CompileOptions, compile};
+use bimorph::equations::Joints;
+use bimorph::gaps::{Ramp, System};
+use bimorph::multibody::planar::Pose;
+use bimorph::netlist::{Bundle, Setting};
+use bimorph::solve::time::adaptive::{Adaptive, Control};
+use bimorph::solve::equilibrium::{Equilibrium, EquilibriumOptions};
+use bimorph::solve::time::joint_rodas4::JointRodas4;
+use bimorph::solve::time::method::{Method, Motion, Work};
+use bimorph::solve::path::SourcePath;
+use bimorph::solve::time::rodas4::Rodas4;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// A scene: file, parameters, parameters of the start, port voltages, duration [s].
+type Scene<'a> = (&'a str, &'a [(&'a str, f64)], &'a [(&'a str, f64)], &'a [f64], f64);
+
+fn main() {
+    let scenes: [Scene<'_>; 4] = [
+        ("examples/bank/bank.net", &[], &[], &[1.0, 0.0], 5e-6),
+        ("examples/quarter_stage/quarter_stage.net", &[], &[("F", 20e-6)], &[], 10e-6),
+        ("examples/rotary_stage/rotary_stage.net", &[], &[], &[1.0], 20e-6),
+        ("examples/comb_resonator/comb_resonator.net", &[], &[], &[5.0, 5.0, 0.0, 0.0], 20e-6),
+    ];
+    println!("scene,formulation,tol,bodies,coordinates,loops,steps,rejected,ms,deviation");
+    for scene in &scenes {
+        for tol in [1e-2, 1e-3, 1e-4] {
+            measure(scene, tol);
+        }
+    }
+}
+
+fn measure((file, set, start, volts, stop): &Scene<'_>, tol: f64) {
+    let build = |extra: &[(&str, f64)]| {
+        let bundle = Bundle::read(Path::new(file), &[]).unwrap();
+        let named = |&(n, v): &(&str, f64)| (n.to_owned(), Setting::Number(v));
+        let set = set.iter().chain(extra).map(named).collect();
+        compile(&bundle, &CompileOptions { tol, set, ..CompileOptions::default() }).unwrap()
+    };
+    let compiled = build(&[]);
+    let system = &compiled.parts.system;
+    let electrics = &system.electrics;
+    let mut sources = vec![0.0; electrics.sources()];
+    for (to, from) in sources.iter_mut().zip(*volts) {
+        *to = *from;
+    }
+    let mut at = Motion::zeros(system.bodies());
+    if !start.is_empty() {
+        let start = build(start);
+        let zeros = vec![0.0; sources.len()];
+        let path = SourcePath::new(&start.parts.system.electrics, &zeros, &zeros, [0.0, 1.0]);
+        Equilibrium::new(&start.parts.system, EquilibriumOptions::default())
+            .follow(&start.parts.system, &path, &mut at.q)
+            .unwrap();
+    }
+    let rise = vec![0.0; electrics.heating.heaters.len()];
+    let ramp = Ramp { electrics, from: &sources, to: &sources, rise: &rise, dt: *stop };
+    let first = bimorph::analysis::transient::first_step(system, *stop);
+    let equations = Arc::new(Joints::elastic(system).unwrap());
+    let tree = &equations.tree;
+    let (bodies, loops, n) = (system.bodies(), tree.closures.len(), tree.coordinates);
+    let name = file.split('/').nth(1).unwrap_or(file);
+    let fine = run(system, &ramp, &at, first, tol * 1e-2, || Rodas4::new(system, &[]), 1).0;
+    let print = |formulation: &str, coordinates: usize, (end, work, ms): (Motion, Work, f64)| {
+        let reach = largest(&fine.q, &vec![Pose::zeros(); bodies]);
+        let deviation = largest(&end.q, &fine.q) / reach;
+        println!(
+            "{name},{formulation},{tol:e},{bodies},{coordinates},{loops},{},{},{ms:.3},{deviation:.2e}",
+            work.steps, work.rejected
+        );
+    };
+    print("compliant", system.model.unknowns(), run(system, &ramp, &at, first, tol, || Rodas4::new(system, &[]), 5));
+    let joints = || JointRodas4::new(Arc::clone(&equations), first, &[]);
+    print("rcr", n, run(system, &ramp, &at, first, tol, joints, 5));
+}
+
+fn run<M: Method>(
+    system: &System,
+    ramp: &Ramp<'_>,
+    at: &Motion,
+    first: f64,
+    tol: f64,
+    method: impl Fn() -> M,
+    times: usize,
+) -> (Motion, Work, f64) {
+    let (mut motion, mut work, mut best) = (at.clone(), Work::default(), f64::INFINITY);
+    for _ in 0..times {
+        motion.clone_from(at);
+        let mut stepper = Adaptive::new(system, method());
+        let begin = Instant::now();
+        let mut h = first;
+        let end = stepper.advance(
+            system,
+            ramp,
+            &mut motion,
+            &mut h,
+            Control::Tolerance(1e-2 * tol),
+            usize::MAX,
+            &mut |_, _, _, _| true,
+        );
+        best = best.min(begin.elapsed().as_secs_f64() * 1e3);
+        work = stepper.work();
+        if let Err(e) = end {
+            println!("{e}");
+        }
+    }
+    (motion, work, best)
+}
+
+fn largest(a: &[Pose], b: &[Pose]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b).xy().amax()).fold(0.0, f64::max)
+}

@@ -1,0 +1,274 @@
+//! Rodas4 in relative joint coordinates: one factorization a step, stages by inverse dynamics and one back-substitution.
+//!
+//! With q the coordinates of a [`Tree`](crate::multibody::relative::Tree), v their rates and z their accelerations, the motion is the differential-algebraic
+//! system q̇ = v, v̇ = z, 0 = R(q, v, z, t): R is the force that the motion would take, inertia included. The accelerations are
+//! carried from step to step, so that no stage needs a reduction of its own. In the variables U of a Rosenbrock method
+//! ```text
+//! r₁ = v_i + Σ c_ij/h·Uq_j          r₂ = z_i + Σ c_ij/h·Uv_j
+//! W·Uq = −R(q_i, v_i, z_i, t_i) − γ_i·h·∂R/∂t + M·(r₁/(γh) + r₂) + C·r₁          W = M/(γh)² + C/(γh) + K
+//! Uv = Uq/(γh) − r₁                 Uz = Uv/(γh) − r₂
+//! ```
+//! with M, C and K at the start of the step. K holds the springs of the tree's joints and the exact tangent of closures and
+//! gaps; the stiffness that forces bring to the tree's joints is left out, since the number of steps does not depend on it.
+//!
+//! To whoever drives it the motion is that of the bodies, as with every other method; coordinates are what it carries.
+//!
+//! Reference: E. Hairer, G. Wanner, "Solving Ordinary Differential Equations II" (1996), §IV.7 (RODAS) and §VI.3 (the direct
+//! approach to differential-algebraic systems).
+
+mod ports;
+mod stages;
+
+use super::method::{Method, Motion, StepFailure, Work};
+use super::rodas4::{ALPHA, GAMMA, GAMMA_I};
+use crate::equations::Joints;
+use crate::gaps::{Drive, Ramp, System};
+use crate::multibody::forces;
+use crate::multibody::planar::Pose;
+use crate::multibody::relative::JointMatrix;
+use crate::multibody::relative::kinematics::Placed;
+use ports::Ports;
+use stages::{STILL, Stages};
+use std::sync::Arc;
+
+/// Share of the shortest time at which accelerations are made consistent: directions without inertia follow their springs,
+/// all others their inertia.
+const CONSISTENT: f64 = 1e-3;
+
+/// The method with its storage.
+#[derive(Debug, Clone)]
+pub struct JointRodas4 {
+    joints: Arc<Joints>,
+    w: JointMatrix<f64>,
+    placed: Placed<f64>,
+    /// Coordinates and rates, and accelerations (with nothing beside them); then the same of each sensitivity.
+    carried: Vec<Motion>,
+    stages: Stages,
+    ports: Ports,
+    /// ∂(bodies' motion)/∂(final voltage of a source), one for each source given to [`JointRodas4::new`].
+    pub sensitivity: Vec<Motion>,
+    damped: Vec<Pose>,
+    poses: Vec<Pose>,
+    force: Vec<Pose>,
+    share: Vec<Pose>,
+    wrench: Vec<Pose>,
+    forcing: Vec<Pose>,
+    drive: Drive,
+    rate: Drive,
+    /// Something drags on bodies or between them.
+    drags: bool,
+    /// Accelerations are those of the motion to come.
+    resumed: bool,
+    /// About the shortest time in which something moves [s].
+    shortest: f64,
+    work: Work,
+}
+
+impl JointRodas4 {
+    /// Storage for a tree, with sensitivities to the final voltages of `sources`; `shortest` is about the shortest time in
+    /// which something moves [s].
+    pub fn new(joints: Arc<Joints>, shortest: f64, sources: &[usize]) -> Self {
+        let Joints { tree, closures } = &*joints;
+        let count = tree.links.len();
+        let zeros = vec![Pose::zeros(); count];
+        let (electrics, model) = (&closures.electrics, &closures.model);
+        Self {
+            w: JointMatrix::new(tree),
+            placed: Placed::new(tree),
+            carried: vec![Motion::zeros(count); 2 + 2 * sources.len()],
+            stages: Stages::new(count),
+            ports: Ports::new(&joints, sources),
+            sensitivity: vec![Motion::zeros(count); sources.len()],
+            damped: zeros.clone(),
+            poses: zeros.clone(),
+            force: zeros.clone(),
+            share: zeros.clone(),
+            wrench: zeros.clone(),
+            forcing: zeros,
+            drive: electrics.drive(),
+            rate: electrics.drive(),
+            drags: model.bodies.iter().any(|b| b.drag.amount != 0.0) || !model.dampers.is_empty(),
+            resumed: false,
+            shortest,
+            work: Work::default(),
+            joints,
+        }
+    }
+
+    /// Coordinates, rates and accelerations, to go on from with [`JointRodas4::resume`].
+    pub fn state(&self) -> &[Motion] {
+        &self.carried[..2]
+    }
+
+    /// Goes on from a state: the next start takes it as it is.
+    pub fn resume(&mut self, state: &[Motion]) {
+        for (to, from) in self.carried.iter_mut().zip(state) {
+            to.copy(from);
+        }
+        self.resumed = true;
+    }
+
+    /// Forgets what the motion depends on.
+    pub fn forget_sensitivities(&mut self) {
+        self.carried[2..].iter_mut().chain(&mut self.sensitivity).for_each(Motion::clear);
+    }
+
+    /// Places the bodies at the argument of the stage at hand and puts R into `share`. The first stage also begins W.
+    fn residual(&mut self, first: bool) {
+        let Self { joints, w, placed, stages, ports, poses, force, share, drive, .. } = self;
+        let Joints { tree, closures } = &**joints;
+        let model = &closures.model;
+        let argument = &stages.argument;
+        placed.place_at(tree, |j| &argument[j].q, |j| &argument[j].v, |j| &argument[j].z);
+        for (j, (poses, force)) in poses.iter_mut().zip(force.iter_mut()).enumerate() {
+            *poses = placed.pose(j);
+            let body = &model.bodies[j];
+            *force = body.mass_diagonal().component_mul(&placed.pushed(j)) + body.drag.force(&placed.speed(j));
+        }
+        if !model.dampers.is_empty() {
+            forces::add_dampers(model, |k| placed.speed(k), force);
+        }
+        if first {
+            closures.add_tangent(poses, drive, &mut w.bodies, force);
+            if !ports.is_empty() {
+                ports.tangent.diagonal.copy_from_slice(&w.bodies.diagonal);
+                ports.tangent.below.copy_from_slice(&w.bodies.below);
+            }
+        } else if ports.is_empty() {
+            closures.add_residual(poses, drive, force);
+        } else {
+            closures.add_tangent(poses, drive, &mut ports.tangent, force);
+        }
+        if !ports.is_empty() {
+            ports.force.copy_from_slice(force);
+        }
+        placed.gather(tree, force, share);
+        let rest = drive.rest();
+        for ((share, link), argument) in share.iter_mut().zip(&tree.links).zip(argument) {
+            *share += link.stress(&argument.q, &rest);
+        }
+        self.work.forces += 1;
+    }
+
+    fn factor(&mut self, gh: f64) -> Result<(), StepFailure> {
+        forces::add_inertia(&self.joints.closures.model, 1.0 / (gh * gh), 1.0 / gh, &mut self.w.bodies);
+        self.w.factor(&self.joints.tree, &self.placed.maps, 1.0, None, Err)?;
+        self.work.factorizations += 1;
+        Ok(())
+    }
+
+    /// Completes the right side of a stage: `share` holds R and becomes the joints' part, `wrench` the bodies'. `rate` is
+    /// γ_i·h.
+    fn inertia(&mut self, rate: f64) {
+        let Self { joints, w, stages, damped, wrench, forcing, share, drags, .. } = self;
+        let Joints { tree, closures } = &**joints;
+        let model = &closures.model;
+        if *drags {
+            w.both_motions(tree, (&stages.push, &stages.r1), (wrench, damped));
+        } else {
+            w.motions(tree, |j| &stages.push[j], wrench);
+        }
+        for (j, body) in model.bodies.iter().enumerate() {
+            wrench[j] = body.mass_diagonal().component_mul(&wrench[j]) - forcing[j] * rate;
+            if *drags {
+                wrench[j] += body.drag.force(&damped[j]);
+            }
+        }
+        if !model.dampers.is_empty() {
+            forces::add_dampers(model, |k| damped[k], wrench);
+        }
+        let rest = self.rate.rest();
+        for (share, link) in share.iter_mut().zip(&tree.links) {
+            *share = -*share;
+            // ∂R/∂t of a heated joint is −K·ė₀
+            if link.expansion.is_some() {
+                *share += link.stiffness.column(0) * (rate * link.offset(&rest));
+            }
+        }
+    }
+}
+
+impl Method for JointRodas4 {
+    fn error_order(&self) -> f64 {
+        4.0
+    }
+
+    fn start(&mut self, _: &System, ramp: &Ramp<'_>, motion: &Motion) -> Result<(), StepFailure> {
+        if std::mem::take(&mut self.resumed) {
+            return Ok(());
+        }
+        ramp.at(0.0, &mut self.drive);
+        self.drive.load = 1.0;
+        let now = &mut self.carried[0];
+        self.joints.tree.coordinates_at(&motion.q, &mut now.q);
+        self.joints.tree.rates_at(&motion.q, &motion.v, &mut now.v);
+        for ((argument, q), v) in self.stages.argument.iter_mut().zip(&now.q).zip(&now.v) {
+            *argument = STILL;
+            (argument.q, argument.v) = (*q, *v);
+        }
+        self.residual(true);
+        let gh = CONSISTENT * self.shortest;
+        self.factor(gh)?;
+        let z = &mut self.carried[1].q;
+        for (x, r) in z.iter_mut().zip(&self.share) {
+            *x = -r;
+        }
+        self.wrench.fill(Pose::zeros());
+        self.w.solve(&self.joints.tree, &mut self.wrench, z);
+        z.iter_mut().for_each(|z| *z /= gh * gh);
+        self.work.solves += 1;
+        Ok(())
+    }
+
+    fn step(
+        &mut self,
+        _: &System,
+        ramp: &Ramp<'_>,
+        s: f64,
+        h: f64,
+        motion: &mut Motion,
+        error: &mut Motion,
+    ) -> Result<(), StepFailure> {
+        let gh = GAMMA * h;
+        for i in 0..6 {
+            let (at, rate) = (s + ALPHA[i] * h, GAMMA_I[i] * h);
+            ramp.at(at, &mut self.drive);
+            self.drive.load = 1.0;
+            self.stages.begin(i, h, &self.carried[0], &self.carried[1]);
+            self.residual(i == 0);
+            if i == 0 {
+                self.factor(gh)?;
+                ramp.rate(s, &mut self.rate);
+                self.joints.closures.drive_force(&self.poses, &self.drive, &self.rate, &mut self.forcing);
+                self.ports.begin(&self.joints, ramp, s, &self.poses, (&self.drive, &self.rate));
+            }
+            self.inertia(rate);
+            self.w.solve(&self.joints.tree, &mut self.wrench, &mut self.share);
+            let stage = (&self.stages, self.poses.as_slice(), &self.drive);
+            let solves = self.ports.stage(&self.joints, ramp, (i, at, h, rate), stage, &self.w, &self.carried[2..]);
+            self.stages.keep(i, gh, &self.share);
+            self.work.solves += 1 + solves;
+        }
+        // stiffly accurate: the last argument plus its increment is the new value, the increment the error; the last solve
+        // left the bodies' share of the displacements
+        error.q.copy_from_slice(&self.wrench);
+        self.w.motions(&self.joints.tree, |j| &self.stages.r1[j], &mut error.v);
+        let (own, sensitivities) = self.carried.split_at_mut(2);
+        if let [now, push] = own {
+            self.stages.finish(now, push);
+            self.placed.move_on(&self.joints.tree, &now.q, &now.v, &push.q);
+        }
+        self.placed.poses(&mut motion.q);
+        self.placed.rates(&mut motion.v);
+        self.ports.finish(&self.joints.tree, &self.stages, sensitivities, &mut self.sensitivity);
+        Ok(())
+    }
+
+    fn carried(&mut self) -> &mut [Motion] {
+        &mut self.carried
+    }
+
+    fn work(&self) -> Work {
+        self.work
+    }
+}

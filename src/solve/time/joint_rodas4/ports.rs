@@ -1,0 +1,164 @@
+//! Sensitivities with respect to final source voltages: the same stages, with the exact change of each stage's force.
+//!
+//! Where the bodies are is a function of the coordinates that curves; its change comes from the same kinematics run over
+//! values with their derivatives, so that partials are those of the numbers that the step returns.
+
+use super::stages::Stages;
+use crate::equations::Joints;
+use crate::gaps::{Drive, Ramp};
+use crate::multibody::planar::Pose;
+use crate::multibody::relative::kinematics::Placed;
+use crate::multibody::relative::number::Dual;
+use crate::multibody::relative::{JointMatrix, Tree};
+use crate::multibody::{BlockMatrix, Pattern, forces};
+use crate::solve::time::method::Motion;
+
+/// Sources whose final voltages the motion is differentiated by.
+#[derive(Debug, Clone)]
+pub(super) struct Ports {
+    sources: Vec<usize>,
+    stages: Vec<Stages>,
+    /// ∂r/∂q of closures and gaps in the stage at hand; without sources on an empty pattern.
+    pub(super) tangent: BlockMatrix<f64, 3>,
+    /// Wrenches of the stage at hand, not summed.
+    pub(super) force: Vec<Pose>,
+    /// Change of ∂R/∂t with each voltage: bodies, then joints.
+    forcing: Vec<(Vec<Pose>, Vec<Pose>)>,
+    placed: Placed<Dual>,
+    share: Vec<Pose>,
+    wrench: Vec<Pose>,
+    damped: Vec<Pose>,
+    change: Drive,
+}
+
+impl Ports {
+    pub(super) fn new(joints: &Joints, sources: &[usize]) -> Self {
+        let Joints { tree, closures } = joints;
+        let count = tree.links.len();
+        let zeros = vec![Pose::zeros(); count];
+        let nothing = Pattern::new(0, &[]);
+        let pattern = &tree.pattern;
+        Self {
+            sources: sources.to_vec(),
+            stages: sources.iter().map(|_| Stages::new(count)).collect(),
+            tangent: BlockMatrix::new(if sources.is_empty() { &nothing } else { pattern }),
+            force: zeros.clone(),
+            forcing: sources.iter().map(|_| (zeros.clone(), zeros.clone())).collect(),
+            placed: Placed::new(tree),
+            share: zeros.clone(),
+            wrench: zeros.clone(),
+            damped: zeros,
+            change: closures.electrics.drive(),
+        }
+    }
+
+    /// True where nothing is to be differentiated.
+    pub(super) fn is_empty(&self) -> bool {
+        self.sources.is_empty()
+    }
+
+    /// ∂(∂R/∂t)/∂(final voltage) of each source at the start of a step, at `poses`.
+    pub(super) fn begin(
+        &mut self,
+        joints: &Joints,
+        ramp: &Ramp<'_>,
+        s: f64,
+        poses: &[Pose],
+        (drive, rate): (&Drive, &Drive),
+    ) {
+        let Joints { tree, closures } = joints;
+        for ((bodies, springs), &source) in self.forcing.iter_mut().zip(&self.sources) {
+            ramp.rate_sensitivity(s, source, &mut self.change);
+            closures.drive_force(poses, drive, &self.change, bodies);
+            let rest = self.change.rest();
+            for (out, link) in springs.iter_mut().zip(&tree.links) {
+                *out = link.stiffness.column(0) * -link.offset(&rest);
+            }
+            // forces are quadratic in gap voltages: the voltage that rate acts on changes too
+            ramp.sensitivity(s, source, &mut self.change);
+            self.change.expansion.fill(0.0);
+            closures.add_drive_force(poses, rate, &self.change, bodies);
+        }
+    }
+
+    /// Stage `i` at time `s` [s] of the ramp, of a step of length `h` [s]. `at` is the motion's own stage, `start` the
+    /// sensitivities of coordinates, rates and accelerations, two motions for each source. Returns the number of solves.
+    #[allow(clippy::too_many_arguments)]
+    pub(super) fn stage(
+        &mut self,
+        joints: &Joints,
+        ramp: &Ramp<'_>,
+        (i, s, h, rate): (usize, f64, f64, f64),
+        (at, poses, drive): (&Stages, &[Pose], &Drive),
+        w: &JointMatrix<f64>,
+        start: &[Motion],
+    ) -> u64 {
+        let Joints { tree, closures } = joints;
+        let model = &closures.model;
+        let gh = crate::solve::time::rodas4::GAMMA * h;
+        for (p, &source) in self.sources.iter().enumerate() {
+            let stages = &mut self.stages[p];
+            stages.begin(i, h, &start[2 * p], &start[2 * p + 1]);
+            let own = &stages.argument;
+            self.placed.place_with(
+                tree,
+                |j| (&at.argument[j].q, &own[j].q),
+                |j| (&at.argument[j].v, &own[j].v),
+                |j| (&at.argument[j].z, &own[j].z),
+            );
+            // change of the wrenches
+            for (j, (wrench, poses)) in self.wrench.iter_mut().zip(&mut self.share).enumerate() {
+                let body = &model.bodies[j];
+                let (place, speed, push) = self.placed.changes(j);
+                *wrench = body.mass_diagonal().component_mul(&push) + body.drag.force(&speed);
+                *poses = place;
+            }
+            if !model.dampers.is_empty() {
+                forces::add_dampers(model, |k| self.placed.changes(k).1, &mut self.wrench);
+            }
+            self.tangent.multiply_add(&model.pattern, &self.share, &mut self.wrench);
+            ramp.sensitivity(s, source, &mut self.change);
+            closures.add_drive_force(poses, drive, &self.change, &mut self.wrench);
+            self.placed.gather_changes(tree, &self.force, &self.wrench, &mut self.share);
+            let rest = self.change.rest();
+            let (forcing, springs) = &self.forcing[p];
+            for (j, (share, link)) in self.share.iter_mut().zip(&tree.links).enumerate() {
+                let mut strain = own[j].q;
+                strain.x -= link.offset(&rest);
+                *share = -(*share + link.stiffness * strain) - springs[j] * rate;
+            }
+            // inertia and damping at the start of the step
+            w.motions(tree, |j| &stages.r1[j], &mut self.damped);
+            w.motions(tree, |j| &stages.push[j], &mut self.wrench);
+            for (j, body) in model.bodies.iter().enumerate() {
+                let wrench = &mut self.wrench[j];
+                *wrench =
+                    body.mass_diagonal().component_mul(wrench) + body.drag.force(&self.damped[j]) - forcing[j] * rate;
+            }
+            if !model.dampers.is_empty() {
+                forces::add_dampers(model, |k| self.damped[k], &mut self.wrench);
+            }
+            w.solve(tree, &mut self.wrench, &mut self.share);
+            stages.keep(i, gh, &self.share);
+        }
+        self.sources.len() as u64
+    }
+
+    /// After the last stage: the new sensitivities, and those of the bodies, whose coordinates are at `at`.
+    pub(super) fn finish(&mut self, tree: &Tree, at: &Stages, carried: &mut [Motion], bodies: &mut [Motion]) {
+        for ((stages, carried), bodies) in self.stages.iter().zip(carried.chunks_exact_mut(2)).zip(bodies) {
+            let [now, push] = carried else { continue };
+            stages.finish(now, push);
+            let own = &stages.argument;
+            self.placed.place_with(
+                tree,
+                |j| (&at.argument[j].q, &own[j].q),
+                |j| (&at.argument[j].v, &own[j].v),
+                |j| (&at.argument[j].z, &own[j].z),
+            );
+            for (j, (q, v)) in bodies.q.iter_mut().zip(&mut bodies.v).enumerate() {
+                (*q, *v, _) = self.placed.changes(j);
+            }
+        }
+    }
+}

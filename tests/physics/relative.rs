@@ -1,0 +1,295 @@
+//! Relative joint coordinates whose loops close by springs, against the bodies' own coordinates, dense algebra and
+//! differences.
+
+use crate::model;
+use bimorph::analysis::transient::{TransientOptions, TransientResult, transient};
+use bimorph::compile::{CompileOptions, Compiled, Formulation, compile};
+use bimorph::equations::Joints;
+use bimorph::gaps::Ramp;
+use bimorph::multibody::planar::Pose;
+use bimorph::multibody::relative::kinematics::Placed;
+use bimorph::multibody::relative::{JointMatrix, Parent, Tree, Unfit};
+use bimorph::netlist::{Bundle, Setting};
+use bimorph::solve::time::joint_rodas4::JointRodas4;
+use bimorph::solve::time::method::{Method, Motion};
+use nalgebra::{DMatrix, DVector, Matrix3};
+use std::path::Path;
+use std::sync::Arc;
+
+/// Two arms between anchors and a yoke, bent by a beam across: trees, loops, a root of its own.
+const FRAME: &str = "
+anchor p1 [a] [l=10u w=10u]
+anchor p1 [b] [l=10u w=10u]
+anchor p1 [c] [l=10u w=10u]
+beam2d p1 [a k] [l=90u w=2u oz=0.3]
+beam2d p1 [k t] [l=60u w=3u oz=-0.2]
+beam2d p1 [b t] [l=110u w=2u oz=2.1]
+beam2d p1 [t s] [l=40u w=5u oz=1.2]
+beam2d p1 [c s] [l=70u w=2u oz=-1.4]
+";
+
+/// Numbers between −0.5 and 0.5, the same in every run.
+fn noise(seed: &mut u64) -> f64 {
+    *seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+    (*seed >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+}
+
+/// Coordinates of some size: metres for displacements, radians for rotations.
+fn coordinates(tree: &Tree, size: f64, seed: &mut u64) -> Vec<Pose> {
+    let one = |_: &_| Pose::new(noise(seed) * size * 1e-6, noise(seed) * size * 1e-6, noise(seed) * size * 0.3);
+    let mut q: Vec<Pose> = tree.links.iter().map(one).collect();
+    tree.project(&mut q);
+    q
+}
+
+fn framed() -> Compiled {
+    model(FRAME, &CompileOptions { segments: Some(3), ..CompileOptions::default() })
+}
+
+/// Coordinates of the poses that coordinates lead to are those coordinates, and rates likewise, to rounding at rotations of
+/// some tenths of a radian.
+#[test]
+fn poses_lead_back_to_coordinates() {
+    let compiled = framed();
+    let tree = Tree::elastic(&compiled.parts.system.model).unwrap();
+    assert!(tree.links.iter().any(|l| matches!(l.parent, Parent::Body(_))) && !tree.closures.is_empty());
+    let mut seed = 5;
+    let (q, v) = (coordinates(&tree, 1.0, &mut seed), coordinates(&tree, 1e6, &mut seed));
+    let zeros = vec![Pose::zeros(); q.len()];
+    let mut placed = Placed::<f64>::new(&tree);
+    placed.move_on(&tree, &q, &v, &zeros);
+    let (mut x, mut rate, mut back) = (zeros.clone(), zeros.clone(), zeros.clone());
+    placed.poses(&mut x);
+    placed.rates(&mut rate);
+    tree.coordinates_at(&x, &mut back);
+    for (back, q) in back.iter().zip(&q) {
+        let apart = back - q;
+        assert!(apart.xy().amax() < 1e-18 && apart.z.abs() < 1e-13, "{apart}");
+    }
+    tree.rates_at(&x, &rate, &mut back);
+    for (back, v) in back.iter().zip(&v) {
+        let apart = back - v;
+        assert!(apart.xy().amax() < 1e-10 && apart.z.abs() < 1e-7, "{apart}");
+    }
+}
+
+/// Rates and accelerations of the bodies are the first and second derivatives of their poses along q + v·t + z·t²/2 (central
+/// differences: 1e-7 of the largest rate, 1e-5 of the largest acceleration).
+#[test]
+fn motion_is_the_derivative_of_place() {
+    let compiled = framed();
+    let tree = Tree::elastic(&compiled.parts.system.model).unwrap();
+    let mut seed = 11;
+    let [q, v, z] = [1.0, 1.0, 1.0].map(|size| coordinates(&tree, size, &mut seed));
+    let zeros = vec![Pose::zeros(); q.len()];
+    let mut placed = Placed::<f64>::new(&tree);
+    let mut at = |t: f64| {
+        let q: Vec<Pose> = (0..q.len()).map(|j| q[j] + v[j] * t + z[j] * (0.5 * t * t)).collect();
+        placed.put(&tree, &q);
+        let mut x = zeros.clone();
+        placed.poses(&mut x);
+        x
+    };
+    let step = 1e-4;
+    let (before, now, after) = (at(-step), at(0.0), at(step));
+    let mut placed = Placed::<f64>::new(&tree);
+    placed.move_on(&tree, &q, &v, &z);
+    let (mut rate, mut push) = (zeros.clone(), zeros.clone());
+    placed.rates(&mut rate);
+    placed.accelerations(&mut push);
+    let largest = |x: &[Pose]| x.iter().map(|x| x.xy().amax()).fold(0.0, f64::max);
+    for j in 0..q.len() {
+        let first = (after[j] - before[j]) / (2.0 * step) - rate[j];
+        let second = (after[j] - now[j] * 2.0 + before[j]) / (step * step) - push[j];
+        assert!(first.xy().amax() < 1e-7 * largest(&rate) && first.z.abs() < 1e-9, "{first}");
+        assert!(second.xy().amax() < 1e-5 * largest(&push) && second.z.abs() < 1e-6, "{second}");
+    }
+}
+
+/// Factor and solve agree with dense elimination of the same form over the coordinates (1e-9), bodies' right sides included;
+/// the bodies' motions come with the solution.
+#[test]
+fn factor_agrees_with_dense_elimination() {
+    let compiled = framed();
+    let model = &compiled.parts.system.model;
+    let tree = Tree::new(model, |k| [k % 3 == 0, false, false]);
+    let (count, mut seed) = (tree.links.len(), 3);
+    let q = coordinates(&tree, 1.0, &mut seed);
+    let mut placed = Placed::<f64>::new(&tree);
+    placed.put(&tree, &q);
+    let mut form = JointMatrix::<f64>::new(&tree);
+    let scale = Matrix3::from_diagonal(&nalgebra::Vector3::new(1.0, 1.0, 1e-6));
+    for block in &mut form.bodies.diagonal {
+        let raw = Matrix3::from_fn(|_, _| noise(&mut seed));
+        *block = scale * (raw + raw.transpose() + Matrix3::identity() * 4.0) * scale;
+    }
+    for k in 0..form.bodies.below.len() {
+        if !tree.pattern.is_fill(k) {
+            form.bodies.below[k] = scale * Matrix3::from_fn(|_, _| 0.3 * noise(&mut seed)) * scale;
+        }
+    }
+    // dense: columns of the map from coordinates to motions
+    let mut free = Vec::new();
+    for (j, link) in tree.links.iter().enumerate() {
+        free.extend((0..3).filter(|&i| link.moving[i]).map(|i| (j, i)));
+    }
+    let zeros = vec![Pose::zeros(); count];
+    let column = |&(j, i): &(usize, usize)| {
+        let (mut s, mut out) = (zeros.clone(), zeros.clone());
+        s[j][i] = 1.0;
+        placed.spread(&tree, &s, &mut out);
+        out
+    };
+    let columns: Vec<Vec<Pose>> = free.iter().map(column).collect();
+    let product = |a: &[Pose], b: &[Pose]| a.iter().zip(b).map(|(a, b)| a.dot(b)).sum::<f64>();
+    let mut dense = DMatrix::<f64>::zeros(free.len(), free.len());
+    for c in 0..free.len() {
+        let mut force = zeros.clone();
+        form.bodies.multiply_add(&tree.pattern, &columns[c], &mut force);
+        for r in 0..free.len() {
+            dense[(r, c)] = product(&columns[r], &force);
+            let ((jr, ir), (jc, ic)) = (free[r], free[c]);
+            if jr == jc {
+                dense[(r, c)] += 1e-6 * tree.links[jr].stiffness.column(ic)[ir];
+            }
+        }
+    }
+    let wrench: Vec<Pose> = (0..count).map(|_| scale * Pose::from_fn(|_, _| noise(&mut seed))).collect();
+    let mut right: Vec<Pose> = (0..count).map(|_| scale * Pose::from_fn(|_, _| noise(&mut seed))).collect();
+    tree.project(&mut right);
+    let flat = DVector::from_iterator(
+        free.len(),
+        free.iter().zip(&columns).map(|(&(j, i), column)| right[j][i] + product(column, &wrench)),
+    );
+    // equal units, so that exchanges of rows cost no digits
+    let unit = DVector::from_iterator(free.len(), (0..free.len()).map(|i| dense[(i, i)].sqrt().recip()));
+    let scaled = DMatrix::from_fn(free.len(), free.len(), |r, c| unit[r] * dense[(r, c)] * unit[c]);
+    let expected = scaled.lu().solve(&flat.component_mul(&unit)).unwrap().component_mul(&unit);
+    form.factor(&tree, placed.maps(), 1e-6, None, Err).unwrap();
+    let (mut motions, mut x) = (wrench, right);
+    form.solve(&tree, &mut motions, &mut x);
+    let reach = expected.amax();
+    let spread = expected.component_div(&unit).amax();
+    for (k, &(j, i)) in free.iter().enumerate() {
+        assert!((x[j][i] - expected[k]).abs() < 1e-9 * spread * unit[k], "{j} {i}: {} {}", x[j][i], expected[k]);
+    }
+    let mut again = zeros.clone();
+    placed.spread(&tree, &x, &mut again);
+    for (a, b) in again.iter().zip(&motions) {
+        assert!((a - b).amax() <= 1e-12 * reach, "{a} {b}");
+    }
+}
+
+/// A loop of rigid joints and small displacements are refused with the reason.
+#[test]
+fn what_does_not_fit_is_told() {
+    let linear = model(FRAME, &CompileOptions { linear: true, ..CompileOptions::default() });
+    assert_eq!(Tree::elastic(&linear.parts.system.model).err(), Some(Unfit::Linear));
+}
+
+fn scene(file: &str, formulation: Formulation, tol: f64, set: &[(&str, f64)]) -> Compiled {
+    let bundle = Bundle::read(Path::new(file), &[]).unwrap();
+    let set = set.iter().map(|&(n, v)| (n.to_owned(), Setting::Number(v))).collect();
+    compile(&bundle, &CompileOptions { formulation, tol, set, ..CompileOptions::default() })
+        .unwrap_or_else(|e| panic!("{file}: {e}"))
+}
+
+fn run(compiled: &Compiled, volts: &[(&str, f64)], stop: f64, signal: &str) -> TransientResult {
+    let options = TransientOptions {
+        stop,
+        signals: vec![signal.to_owned()],
+        points: 101,
+        tol: compiled.options.tol,
+        voltages: volts.iter().map(|&(n, v)| (n.to_owned(), v)).collect(),
+        ..TransientOptions::default()
+    };
+    transient(compiled, &options, &mut |_, _| (), &mut |_| true).unwrap_or_else(|e| panic!("{signal}: {e}"))
+}
+
+/// On scenes as they are drawn, heated or loaded at once, both formulations move alike: within the tolerance of the larger
+/// excursion, in as many steps within a tenth, with as many unknowns, no constraint and no singular evaluation.
+#[test]
+fn formulations_move_alike() {
+    type Case<'a> = (&'a str, &'a [(&'a str, f64)], &'a [(&'a str, f64)], f64, &'a str);
+    let cases: [Case<'_>; 5] = [
+        ("examples/bank/bank.net", &[], &[("heat", 1.0)], 5e-6, "yoke.y"),
+        ("examples/quarter_stage/quarter_stage.net", &[("F", 20e-6)], &[], 10e-6, "c.x"),
+        ("examples/rotary_stage/rotary_stage.net", &[], &[("clockwise", 1.0)], 3e-6, "rotor.rz"),
+        ("examples/chevron/chevron.net", &[], &[("heat", 1.0)], 5e-6, "apex.y"),
+        ("examples/comb_resonator/comb_resonator.net", &[], &[("drive", 20.0)], 20e-6, "shuttle.x"),
+    ];
+    for (file, set, volts, stop, signal) in cases {
+        for tol in [1e-2, 1e-3, 1e-4] {
+            let [bodies, joints] = [Formulation::Compliant, Formulation::Rcr]
+                .map(|formulation| run(&scene(file, formulation, tol, set), volts, stop, signal));
+            let (a, b) = (&bodies.signals[0].2, &joints.signals[0].2);
+            let reach = a.iter().fold(0.0f64, |m, x| m.max(x.abs()));
+            let apart = a.iter().zip(b).fold(0.0f64, |m, (a, b)| m.max((a - b).abs()));
+            assert!(reach > 0.0 && apart <= tol * reach, "{file} at {tol:e}: {apart:e} of {reach:e}");
+            assert_eq!(bodies.unknowns, joints.unknowns, "{file}");
+            let steps = joints.counters.steps as f64 / bodies.counters.steps as f64;
+            assert!((0.9..1.1).contains(&steps), "{file} at {tol:e}: {steps} times the steps");
+        }
+    }
+}
+
+/// A heated arm pushes a plate that a voltage pulls at.
+const HEATED: &str = "
+anchor p1 [a] [l=10u w=10u oz=pi]
+anchor p1 [b] [l=10u w=10u]
+anchor p1 [e] [l=10u w=10u]
+left  beam2det p1 [a c] [l=120u w=2u oz=0.1 tau=20u]
+right beam2det p1 [c b] [l=120u w=2u oz=-0.1]
+rod beam2d p1 [c s] [l=40u w=4u oz=pi/2]
+mass2d * [s] [m=2e-11 J=1e-20]
+plategap2d p1 [s e] [A=4e-10 gap=1.5u oz=0]
+eground * [b] []
+eground * [e] []
+heat port * [a] []
+pull port * [s] []
+";
+
+/// Sensitivities of a single step are the derivatives of its result, for both ports: 1e-6 of the largest change of a body
+/// (central differences of a thousandth).
+#[test]
+fn sensitivities_of_a_step_are_exact() {
+    let compiled = model(HEATED, &CompileOptions { segments: Some(2), ..CompileOptions::default() });
+    let system = &compiled.parts.system;
+    let joints = Arc::new(Joints::elastic(system).unwrap());
+    let electrics = &system.electrics;
+    let count = system.bodies();
+    let rise = vec![0.0; electrics.heating.heaters.len()];
+    let from = [1.0, 9.0];
+    let shortest = 1e-10;
+    let after = |to: [f64; 2]| {
+        let before = Ramp { electrics, from: &[0.5, 3.0], to: &from, rise: &rise, dt: 3e-7 };
+        let mut method = JointRodas4::new(Arc::clone(&joints), shortest, &[0, 1]);
+        let (mut motion, mut error) = (Motion::zeros(count), Motion::zeros(count));
+        method.start(system, &before, &motion).unwrap();
+        for k in 0..15 {
+            method.step(system, &before, f64::from(k) * 2e-8, 2e-8, &mut motion, &mut error).unwrap();
+        }
+        // a moving start, from which the step that is differentiated goes on
+        let rise: Vec<f64> = (0..rise.len()).map(|k| before.rise_at(k, 3e-7)).collect();
+        let ramp = Ramp { electrics, from: &from, to: &to, rise: &rise, dt: 2e-8 };
+        method.forget_sensitivities();
+        method.step(system, &ramp, 0.0, 2e-8, &mut motion, &mut error).unwrap();
+        (motion, method.sensitivity.clone())
+    };
+    let at = [3.0, 12.0];
+    let (_, sensitivity) = after(at);
+    for port in 0..2 {
+        let step = 1e-3 * at[port];
+        let (mut hi, mut lo) = (at, at);
+        hi[port] += step;
+        lo[port] -= step;
+        let (hi, lo) = (after(hi).0, after(lo).0);
+        for (hi, lo, exact) in [(&hi.q, &lo.q, &sensitivity[port].q), (&hi.v, &lo.v, &sensitivity[port].v)] {
+            let reach = exact.iter().map(|x| x.xy().amax()).fold(0.0, f64::max);
+            for j in 0..count {
+                let apart = (hi[j] - lo[j]) / (2.0 * step) - exact[j];
+                assert!(apart.xy().amax() < 1e-6 * reach, "port {port} body {j}: {apart} of {reach:e}");
+            }
+        }
+    }
+}
