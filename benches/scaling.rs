@@ -17,8 +17,8 @@ use bimorph::multibody::planar::Pose;
 use bimorph::multibody::rcr::{Linkage, Reduction};
 use bimorph::multibody::{BlockMatrix, BodyId, Model, forces};
 use bimorph::solve::joint_stage::{ImplicitMotion, Stage};
-use bimorph::solve::time::method::{Method, Motion};
-use bimorph::solve::time::rodas4::Rodas4;
+use bimorph::solve::method::{Method, Motion};
+use bimorph::solve::rodas4::Rodas4;
 use std::hint::black_box;
 use std::time::Instant;
 

@@ -7,8 +7,8 @@ use bimorph::gaps::drive::Electrics;
 use bimorph::gaps::{Drive, Ramp, System};
 use bimorph::multibody::planar::Pose;
 use bimorph::multibody::{BlockMatrix, Model, forces};
-use bimorph::solve::time::method::{Method, Motion};
-use bimorph::solve::time::rodas4::Rodas4;
+use bimorph::solve::method::{Method, Motion};
+use bimorph::solve::rodas4::Rodas4;
 use topologies::{NAMES, bodies_per_unit, named};
 
 /// A mechanism with nothing but joints: no gaps, no loads, no sources.

@@ -9,8 +9,8 @@ use bimorph::multibody::rcr::{Linkage, Reduction, Task};
 use bimorph::solve::dormand_prince::Pair;
 use bimorph::solve::joint_dirk::{JointMethod, Rule};
 use bimorph::solve::joint_stage::ImplicitMotion;
-use bimorph::solve::time::method::Motion;
-use bimorph::solve::time::rodas4::Rodas4;
+use bimorph::solve::method::Motion;
+use bimorph::solve::rodas4::Rodas4;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 #[global_allocator]

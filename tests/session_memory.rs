@@ -5,8 +5,8 @@ use bimorph::device::local::LocalDevice;
 use bimorph::device::{Device, Mode, OpenRequest, Trial, TrialReply};
 use bimorph::gaps::Ramp;
 use bimorph::netlist::Bundle;
-use bimorph::solve::time::method::{Method, Motion};
-use bimorph::solve::time::rodas4::Rodas4;
+use bimorph::solve::method::{Method, Motion};
+use bimorph::solve::rodas4::Rodas4;
 use std::path::Path;
 use std::sync::Arc;
 

@@ -2,16 +2,16 @@
 
 use crate::gaps::{Ramp, System};
 use crate::solve::SolveError;
-use crate::solve::time::adaptive::{Adaptive, Advance, Control, Observer};
+use crate::solve::adaptive::{Adaptive, Advance, Control, Observer};
 use crate::solve::avf::AverageField;
 use crate::solve::baseline::Solver;
 use crate::solve::doubling::Doubling;
 use crate::solve::generalized_alpha::GeneralizedAlpha;
-use crate::solve::time::method::{Method, Motion, Work};
-use crate::solve::time::midpoint::Midpoint;
+use crate::solve::method::{Method, Motion, Work};
+use crate::solve::midpoint::Midpoint;
 use crate::solve::radau5::Radau5;
 use crate::solve::rk45::Rk45;
-use crate::solve::time::rodas4::Rodas4;
+use crate::solve::rodas4::Rodas4;
 use crate::solve::sdirk4::Sdirk4;
 use crate::solve::tr_bdf2::TrBdf2;
 

@@ -15,10 +15,10 @@ use crate::compile::Compiled;
 use crate::gaps::Drive;
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
-use crate::solve::time::adaptive::Adaptive;
 use crate::solve::equilibrium::{Equilibrium, EquilibriumOptions};
-use crate::solve::time::formulated::Formulated;
 use crate::solve::harmonic::{ComplexPose, Harmonic};
+use crate::solve::time::adaptive::Adaptive;
+use crate::solve::time::formulated::Formulated;
 use crate::solve::time::method::Motion;
 use std::sync::Arc;
 

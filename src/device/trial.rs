@@ -9,8 +9,8 @@ use crate::analysis::signal::{Signal, View};
 use crate::compile::Compiled;
 use crate::gaps::Ramp;
 use crate::multibody::planar::Pose;
-use crate::solve::time::adaptive::{Advance, Control};
 use crate::solve::path::SourcePath;
+use crate::solve::time::adaptive::{Advance, Control};
 
 /// Share of the compilation's tolerance that one internal step may use.
 const STEP_SHARE: f64 = 1e-2;

@@ -7,12 +7,12 @@ use bimorph::compile::{CompileOptions, Compiled};
 use bimorph::gaps::{Ramp, System};
 use bimorph::netlist::Setting;
 use bimorph::solve::SolveError;
-use bimorph::solve::time::adaptive::Control;
+use bimorph::solve::adaptive::Control;
 use bimorph::solve::baseline::Solver;
 use bimorph::solve::equilibrium::{Equilibrium, EquilibriumOptions};
-use bimorph::solve::time::event::Direction;
+use bimorph::solve::event::Direction;
 use bimorph::solve::linear::Recursion;
-use bimorph::solve::time::method::{Motion, Work};
+use bimorph::solve::method::{Motion, Work};
 use bimorph::solve::path::SourcePath;
 
 /// A plate on a spring and a damper that a ramp of 2 V to 4 V pulls at (k = 1 N/m, m = 1e-10 kg, A = 1e-8 m², g = 2 µm).

@@ -10,7 +10,7 @@ use bimorph::analysis::transient::{TransientOptions, TransientResult, transient}
 use bimorph::compile::{CompileOptions, Compiled};
 use bimorph::gaps::Ramp;
 use bimorph::netlist::Setting;
-use bimorph::solve::time::adaptive::Control;
+use bimorph::solve::adaptive::Control;
 use bimorph::solve::dormand_prince::Pair;
 use bimorph::solve::joint_adaptive::JointAdaptive;
 use bimorph::solve::joint_dirk::{JointMethod, Rule};

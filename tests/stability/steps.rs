@@ -4,14 +4,14 @@ use super::frame::{bank, quiet};
 use bimorph::gaps::System;
 use bimorph::multibody::BodyId;
 use bimorph::multibody::planar::Pose;
-use bimorph::solve::time::adaptive::{Adaptive, Control};
+use bimorph::solve::adaptive::{Adaptive, Control};
 use bimorph::solve::avf::AverageField;
 use bimorph::solve::equilibrium::{Equilibrium, EquilibriumOptions};
 use bimorph::solve::generalized_alpha::GeneralizedAlpha;
-use bimorph::solve::time::method::{Method, Motion};
+use bimorph::solve::method::{Method, Motion};
 use bimorph::solve::path::SourcePath;
 use bimorph::solve::rk45::Rk45;
-use bimorph::solve::time::rodas4::Rodas4;
+use bimorph::solve::rodas4::Rodas4;
 
 /// Three bimorphs, bent by `force` [N] on the first yoke, or free.
 fn three(force: f64) -> (System, usize) {

@@ -3,12 +3,12 @@
 use super::frame::{cantilever, quiet};
 use bimorph::gaps::System;
 use bimorph::multibody::planar::Pose;
-use bimorph::solve::time::adaptive::{Adaptive, Control};
+use bimorph::solve::adaptive::{Adaptive, Control};
 use bimorph::solve::equilibrium::{Equilibrium, EquilibriumOptions};
-use bimorph::solve::time::method::{Method, Motion, Work};
+use bimorph::solve::method::{Method, Motion, Work};
 use bimorph::solve::path::SourcePath;
 use bimorph::solve::rk45::Rk45;
-use bimorph::solve::time::rodas4::Rodas4;
+use bimorph::solve::rodas4::Rodas4;
 
 /// Segments of the cantilever.
 const SEGMENTS: usize = 6;

@@ -11,8 +11,8 @@ use crate::analysis::integrator::Integrator;
 use crate::analysis::statics::{operating_point, source_vector};
 use crate::gaps::Ramp;
 use crate::solve::baseline::{Solver, SolverKind};
-use crate::solve::time::method::{Method, Motion};
-use crate::solve::time::rodas4::Rodas4;
+use crate::solve::method::{Method, Motion};
+use crate::solve::rodas4::Rodas4;
 use std::time::Instant;
 
 /// A repeat makes as many steps as fit into this many multiplications, at least one and at most [`MOST_STEPS`].

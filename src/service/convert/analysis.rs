@@ -6,7 +6,7 @@ use crate::analysis::pull_in::PullInResult;
 use crate::analysis::statics::{NodeMotion, StaticResult};
 use crate::analysis::transient::{Counters, Event, TransientResult};
 use crate::service::proto;
-use crate::solve::time::event::Direction;
+use crate::solve::event::Direction;
 
 fn size(n: u64) -> usize {
     usize::try_from(n).unwrap_or(usize::MAX)

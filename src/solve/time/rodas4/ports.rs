@@ -5,7 +5,7 @@ use crate::gaps::{Drive, Ramp, System};
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, Model, Pattern};
 use crate::solve::linear::LinearSolver;
-use crate::solve::time::method::Motion;
+use crate::solve::method::Motion;
 
 /// Sources whose final voltages the motion is differentiated by, with the stages of each derivative.
 #[derive(Debug, Clone)]

@@ -9,7 +9,7 @@
 use super::{A, C, GAMMA, GAMMA_I};
 use crate::multibody::planar::Pose;
 use crate::multibody::{Body, Model, forces};
-use crate::solve::time::method::Motion;
+use crate::solve::method::Motion;
 
 /// Bodies of a tile.
 const TILE: usize = 16;
