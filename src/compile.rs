@@ -85,3 +85,26 @@ pub fn compile(bundle: &Bundle, options: &CompileOptions) -> Result<Compiled, Co
         order,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    //! What cannot be laid out is refused before anything is.
+    use super::*;
+
+    #[test]
+    fn options_are_bounded_before_anything_is_laid_out() {
+        let mut text = "process p = [Youngsmodulus=165e9 density=2300 h=2u]\nanchor p [n0] [l=1u w=1u]\n".to_owned();
+        for k in 0..21 {
+            text += &format!("beam2d p [n{k} n{}] [l=100u w=2u]\n", k + 1);
+        }
+        let bundle = Bundle::from_text("chain.net", &text);
+        let asked = |options: CompileOptions| compile(&bundle, &options).map(|_| ());
+        let refused = asked(CompileOptions { tol: 2.0, ..CompileOptions::default() });
+        assert!(matches!(&refused, Err(CompileError::Option(r)) if r.option == "tol"), "{refused:?}");
+        // 21 beams of 100 000 segments each, every one of them within its own range
+        let fine = asked(CompileOptions { segments: Some(100_000), ..CompileOptions::default() });
+        assert_eq!(fine, Err(DiscretizeError::TooFine { segments: 2_100_000 }.into()));
+        let sharp = asked(CompileOptions { band: Some(1e12), tol: 1e-300, ..CompileOptions::default() });
+        assert!(matches!(sharp, Err(CompileError::Structure(DiscretizeError::TooFine { .. }))), "{sharp:?}");
+    }
+}

@@ -94,7 +94,7 @@ fn fields() -> String {
 
 fn python() -> String {
     let mut text = String::from(
-        "\"\"\"Options of a model. Written from the table in src/options/model.rs by ``BIMORPH_WRITE=1 cargo test --test options``.\"\"\"\n\n\
+        "\"\"\"Options of a model. Written from src/options/model.rs by ``BIMORPH_WRITE=1 cargo test --test options``.\"\"\"\n\n\
          from __future__ import annotations\n\nfrom typing import Literal, TypedDict\n\n\n\
          class Options(TypedDict, total=False):\n    \"\"\"Keywords of ``compile`` and ``sweep``; those left out, or None, have their defaults.\"\"\"\n",
     );

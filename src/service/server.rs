@@ -22,7 +22,9 @@ use thiserror::Error;
 use tokio::sync::{Semaphore, mpsc};
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::transport::Server;
-use tracing_subscriber::EnvFilter;
+use tracing_subscriber::filter::{LevelFilter, Targets};
+use tracing_subscriber::layer::SubscriberExt;
+use tracing_subscriber::util::SubscriberInitExt;
 
 /// What a server may be told.
 pub struct ServeOptions {
@@ -193,11 +195,12 @@ pub async fn run_with(
 /// # Errors
 /// [`ServeError`].
 pub fn run_until_signal(options: ServeOptions) -> Result<(), ServeError> {
-    let filter = EnvFilter::try_from_env("BIMORPH_LOG").unwrap_or_else(|_| EnvFilter::new("warn"));
+    let wanted = std::env::var("BIMORPH_LOG").ok().and_then(|text| text.parse::<Targets>().ok());
+    let filter = wanted.unwrap_or_else(|| Targets::new().with_default(LevelFilter::WARN));
     // A host program that logs already goes on as it does.
     let ansi = std::io::stderr().is_terminal();
-    let log = tracing_subscriber::fmt().with_env_filter(filter).with_ansi(ansi).with_writer(std::io::stderr);
-    let _ = log.try_init();
+    let log = tracing_subscriber::fmt().with_max_level(LevelFilter::TRACE).with_ansi(ansi).with_writer(std::io::stderr);
+    let _ = log.finish().with(filter).try_init();
     let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build().map_err(ServeError::Runtime)?;
     let outcome = runtime.block_on(async {
         use tokio::signal::unix::{SignalKind, signal};
