@@ -11,8 +11,8 @@
 //! that fails is a point with its reason and without numbers.
 //!
 //! The reference is Radau5 at a hundredth of the tightest tolerance. It is itself checked: Rodas4 at ten times its tolerance
-//! gives the same motion but for a difference that is part of the result. In joint coordinates, which have explicit steps
-//! alone, both are Dormand and Prince's. Errors below it mean nothing.
+//! gives the same motion but for a difference that is part of the result. In joint coordinates both are Rodas4's. Errors below
+//! it mean nothing.
 
 pub mod error;
 mod runs;
@@ -45,7 +45,7 @@ pub enum Formulation {
     Compliant,
     /// A linear frame of cubic beams, integrated by Newmark's rule: a baseline.
     Frame,
-    /// Relative joint coordinates, joints of beams that only turn, explicit steps.
+    /// Relative joint coordinates, loops closed by springs.
     Rcr,
     /// The same with every elastic direction as a coordinate.
     RcrElastic,
@@ -54,8 +54,8 @@ pub enum Formulation {
 impl Formulation {
     /// All of them, the product's own first.
     pub const ALL: [Self; 4] = [Self::Compliant, Self::Frame, Self::Rcr, Self::RcrElastic];
-    /// What is charted unless said otherwise; explicit steps in joint coordinates can be millions.
-    pub const DEFAULT: [Self; 2] = [Self::Compliant, Self::Frame];
+    /// What is charted unless said otherwise; with constraints steps can be millions.
+    pub const DEFAULT: [Self; 3] = [Self::Compliant, Self::Frame, Self::Rcr];
 
     /// Its name on the command line and in results.
     pub fn name(self) -> &'static str {
@@ -67,12 +67,13 @@ impl Formulation {
         }
     }
 
-    /// The methods that it can be integrated by, of those asked for; joint coordinates always have their explicit one, a
-    /// frame has none.
+    /// The methods that it can be integrated by, of those asked for; joint coordinates always have Rodas4, and
+    /// where every direction is elastic those that reduce constraints; a frame has none.
     fn methods(self, asked: &[Integrator]) -> Vec<Integrator> {
         match self {
             Self::Compliant => asked.to_vec(),
-            Self::Rcr | Self::RcrElastic => {
+            Self::Rcr => vec![Integrator::Rodas4],
+            Self::RcrElastic => {
                 let own = |m: &&Integrator| **m != Integrator::Rodas4 && Integrator::IN_JOINTS.contains(&m.name());
                 [Integrator::Rodas4].into_iter().chain(asked.iter().filter(own).copied()).collect()
             }

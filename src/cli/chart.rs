@@ -59,8 +59,8 @@ pub(crate) struct Chart {
     #[arg(long, value_name = "NAMES")]
     parts: Vec<String>,
 
-    /// Formulations: compliant, frame (linear), rcr, rcr-elastic (explicit steps: few and soft joints) [default:
-    /// compliant,frame]
+    /// Formulations: compliant, frame (linear), rcr, rcr-elastic (with --methods that reduce constraints too) [default:
+    /// compliant,frame,rcr]
     #[arg(long, value_name = "NAMES")]
     formulations: Vec<String>,
 

@@ -76,9 +76,10 @@ choice! {
         /// Every body has its own coordinates, joints are springs in all directions; implicit steps.
         #[default]
         Compliant = "compliant",
-        /// Relative joint coordinates, loops reduced in the recursion, joints of beams only turn: the paper's model.
+        /// Relative joint coordinates, loops closed inside the recursion: by springs, or with the methods that reduce
+        /// constraints as in the paper, where joints of beams only turn.
         Rcr = "rcr",
-        /// The same with every direction as a coordinate that the discretization leaves elastic.
+        /// The same with every direction as a coordinate that the discretization leaves elastic, whatever the method.
         RcrElastic = "rcr-elastic",
     }
 }

@@ -90,8 +90,8 @@ options! {
     /// Rotary inertia of the sections of beams; SUGAR leaves it out.
     rotary_inertia: bool = false, "rotary_inertia" = 10, [""], Range::Flag, "";
 
-    /// How bodies become equations. compliant: springs, implicit steps; rcr: the recursion in joint coordinates, beams' joints
-    /// only turn; rcr-elastic: the same, every elastic direction a coordinate; auto: what suits.
+    /// How bodies become equations. compliant: every body's own coordinates; rcr: joint coordinates on a tree, loops closed
+    /// inside the recursion; rcr-elastic: the same, and beams' joints stay elastic with every method; auto: what suits.
     formulation: Formulation = Formulation::Compliant, "formulation" = 11, [""], Range::Names(&Formulation::NAMES), "";
 }
 

@@ -61,7 +61,7 @@ impl Request<'_> {
         (method, tol): (Integrator, f64),
         progress: &mut Progress<'_>,
     ) -> Result<(TransientResult, f64), AnalysisError> {
-        // references are asked for by a method that joint coordinates may not have: then their explicit one
+        // references are asked for by a method that joint coordinates may not have: then Rodas4
         let method = formulation.methods(&[method]).last().copied().unwrap_or(method);
         let options = self.options(model, method, tol);
         let begun = Instant::now();

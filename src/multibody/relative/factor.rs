@@ -36,8 +36,14 @@ pub struct JointMatrix<T: Scalar> {
     inverse: Vec<Matrix3<T>>,
     /// C_r of each block of the pattern, rows of the later body.
     coupling: Vec<Matrix3<T>>,
+    /// For each block of a column, the block that takes over its motion with the column's parent; [`OWN`] where the row is
+    /// the parent itself.
+    heir: Vec<u32>,
     maps: Vec<Map<f64>>,
 }
+
+/// The parent's own diagonal.
+const OWN: u32 = u32::MAX;
 
 impl<T: Scalar> JointMatrix<T> {
     /// Storage.
@@ -48,6 +54,7 @@ impl<T: Scalar> JointMatrix<T> {
             bodies: BlockMatrix::new(pattern),
             inverse: vec![Matrix3::zeros(); count],
             coupling: vec![Matrix3::zeros(); pattern.off_blocks()],
+            heir: heirs(tree),
             maps: vec![Map::REST; count],
         }
     }
@@ -135,16 +142,15 @@ impl<T: Scalar> JointMatrix<T> {
         let moved = shift_columns(block, map);
         let mut own = shift_rows(&moved, map);
         for (k, &row) in pattern.column(j).zip(pattern.rows(j)) {
-            let row = row as usize;
             let below = self.bodies.below[k];
+            // along a tree nothing but the joint itself couples the two
             if below == Matrix3::zeros() {
                 continue;
             }
             let moved = shift_columns(&below, map);
-            if row == p {
-                own += moved + moved.transpose();
-            } else if let Some(at) = pattern.block(row.max(p), row.min(p)) {
-                self.bodies.below[at] += if row > p { moved } else { moved.transpose() };
+            match self.heir[k] {
+                OWN => own += moved + moved.transpose(),
+                at => self.bodies.below[at as usize] += if row as usize > p { moved } else { moved.transpose() },
             }
         }
         if let Some(g) = extra {
@@ -237,6 +243,24 @@ impl<T: Scalar> JointMatrix<T> {
             };
         }
     }
+}
+
+/// See [`JointMatrix::heir`].
+fn heirs(tree: &Tree) -> Vec<u32> {
+    let pattern = &tree.pattern;
+    let mut heirs = vec![OWN; pattern.off_blocks()];
+    for (j, link) in tree.links.iter().enumerate() {
+        let Parent::Body(p) = link.parent else { continue };
+        let p = p as usize;
+        for (k, &row) in pattern.column(j).zip(pattern.rows(j)) {
+            let row = row as usize;
+            if row != p {
+                // rows of one column are coupled pair by pair
+                heirs[k] = pattern.block(row.max(p), row.min(p)).map_or(OWN, |at| at as u32);
+            }
+        }
+    }
+    heirs
 }
 
 /// The joint's own block: springs and what its force brings.

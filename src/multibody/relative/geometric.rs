@@ -26,8 +26,9 @@ impl Geometric {
         Self { own: Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), cross: [0.0; 3], turn: 0.0 };
 }
 
-/// Fills in `out` at coordinates `q`; `force` holds the wrench on everything that hangs on each body.
-pub(super) fn fill(tree: &Tree, placed: &Placed<f64>, q: &[Pose], force: &[Pose], out: &mut [Geometric]) {
+/// Fills in `out` at coordinates `q`, where the bodies have been placed; `force` holds the wrench on everything that hangs on
+/// each body, as [`Placed::gather`] leaves it.
+pub fn fill(tree: &Tree, placed: &Placed<f64>, q: &[Pose], force: &[Pose], out: &mut [Geometric]) {
     let pose = |p: Parent| match p {
         Parent::Body(p) => placed.at(p as usize)[2],
         _ => 0.0,

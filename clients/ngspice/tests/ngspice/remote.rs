@@ -1,6 +1,6 @@
 //! The same decks with the model on a server, and what happens when the server goes away.
 
-use crate::support::{deck, run, skipped};
+use crate::support::{all_decks, deck, deviation, real, run, skipped};
 use bimorph::cosim::{CosimError, CosimOptions};
 use bimorph::service::server::{self, ServeOptions};
 use std::io::{Read, Write};
@@ -106,6 +106,35 @@ fn a_server_gives_the_same_bits() {
     let here = run(CosimOptions { deck: deck("comb_edges.cir"), ..CosimOptions::default() }).unwrap();
     let there = run(on(&server.socket(), "comb_edges.cir")).unwrap();
     assert_eq!(here.plots, there.plots);
+}
+
+/// The bank's deck in each formulation: on a server the waveforms are those of the process to the last bit, and two
+/// formulations agree within 2e-3 of each waveform's range.
+#[test]
+fn formulations_agree_on_the_bank() {
+    if skipped() {
+        return;
+    }
+    let (server, folder) = (Serving::start(), all_decks());
+    let text = std::fs::read_to_string(folder.path().join("bank.cir")).unwrap();
+    assert!(text.contains("tol=1e-4") && text.contains(".tran 1u 1.2m 0 0.2u"));
+    let [bodies, joints] = ["compliant", "rcr"].map(|formulation| {
+        let deck = folder.path().join(format!("{formulation}.cir"));
+        let text = text.replace("tol=1e-4", &format!("tol=1e-4 formulation=\"{formulation}\""));
+        std::fs::write(&deck, text.replace(".tran 1u 1.2m 0 0.2u", ".tran 1u 100u 0 0.2u")).unwrap();
+        let remote = Some(format!("unix://{}", server.socket().display()));
+        let here = run(CosimOptions { deck: deck.clone(), ..CosimOptions::default() }).unwrap();
+        let there = run(CosimOptions { deck, remote, ..CosimOptions::default() }).unwrap();
+        assert_eq!(here.plots, there.plots, "{formulation}");
+        here
+    });
+    let (a, b) = (bodies.plot("Transient"), joints.plot("Transient"));
+    for name in ["v(y)", "v(t)", "v(out)", "i(vsense)"] {
+        let wave = |plot| (real(plot, "time"), real(plot, name));
+        let apart = deviation(wave(a), wave(b), 0.0, 100e-6);
+        assert!(apart < 2e-3, "{name}: {apart:e}");
+        println!("{name}: {apart:.1e} of its range");
+    }
 }
 
 /// The run stops with an error that names the instance and the address; `deadline` is 2 s in this deck.
