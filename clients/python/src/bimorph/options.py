@@ -40,9 +40,9 @@ class Options(TypedDict, total=False):
     """Rotary inertia of the sections of beams; SUGAR leaves it out."""
 
     formulation: Literal["auto", "compliant", "rcr", "rcr-elastic"] | None
-    """How bodies become equations. compliant: springs, implicit steps; rcr: the recursion in joint coordinates,
-    beams' joints only turn; rcr-elastic: the same, every elastic direction a coordinate; auto: what suits. One
-    of auto, compliant, rcr, rcr-elastic; default: compliant."""
+    """How bodies become equations. compliant: every body's own coordinates; rcr: joint coordinates on a tree,
+    loops closed inside the recursion; rcr-elastic: the same, and beams' joints stay elastic with every method;
+    auto: what suits. One of auto, compliant, rcr, rcr-elastic; default: compliant."""
 
 
 WIRE = {
