@@ -6,7 +6,7 @@
 //! `deviation` is the largest distance of the bodies from a run of the same formulation at a hundredth of the tolerance, at
 //! the end, as a share of the largest displacement. Thread CPU time, the least of several runs.
 
-use bimorph::compile::{CompileOptions, compile};
+use bimorph::compile::{CompileOptions, Scheme, compile};
 use bimorph::equations::Joints;
 use bimorph::gaps::{Ramp, System};
 use bimorph::multibody::planar::Pose;
@@ -44,7 +44,7 @@ fn measure((file, set, start, volts, stop): &Scene<'_>, tol: f64) {
         let bundle = Bundle::read(Path::new(file), &[]).unwrap();
         let named = |&(n, v): &(&str, f64)| (n.to_owned(), Setting::Number(v));
         let set = set.iter().chain(extra).map(named).collect();
-        compile(&bundle, &CompileOptions { tol, set, ..CompileOptions::default() }).unwrap()
+        compile(&bundle, &CompileOptions { tol, set, scheme: Scheme::Es, ..CompileOptions::default() }).unwrap()
     };
     let compiled = build(&[]);
     let system = &compiled.parts.system;

@@ -62,6 +62,10 @@ pub enum CompileError {
 /// See [`CompileError`].
 pub fn compile(bundle: &Bundle, options: &CompileOptions) -> Result<Compiled, CompileError> {
     options.check()?;
+    // joint coordinates need rotary inertia in every body, and of the schemes of high order Es has it
+    let in_joints = CompileOptions { scheme: Scheme::Es, ..options.clone() };
+    let joints = matches!(options.formulation, Formulation::Rcr | Formulation::RcrElastic);
+    let options = if joints && options.scheme == Scheme::E4 { &in_joints } else { options };
     let loaded = crate::netlist::load(bundle, &options.set).map_err(CompileError::Netlist)?;
     let order = match (options.band, options.segments) {
         (Some(band), None) => model_order::choose(&loaded.structure, options, band)?,

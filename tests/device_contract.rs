@@ -126,8 +126,10 @@ fn partials_match_finite_differences() {
                         let exact = partial[2 * row + port];
                         let scale = partial[2 * row].abs().max(partial[2 * row + 1].abs());
                         let error = (difference - exact).abs();
+                        // a gap of a micrometre has its own last place
+                        let rounding = 4.0 * f64::EPSILON * hi[row].abs() / step;
                         assert!(
-                            error <= tolerance * scale,
+                            error <= tolerance * scale + rounding,
                             "{formulation:?} {mode:?} dt={dt:e} {what}[{row}]/V{port}: {difference:e} {exact:e}"
                         );
                     }

@@ -59,8 +59,8 @@ pub(crate) struct Chart {
     #[arg(long, value_name = "NAMES")]
     parts: Vec<String>,
 
-    /// Formulations: compliant, frame (linear), rcr, rcr-elastic (with --methods that reduce constraints too) [default:
-    /// compliant,frame,rcr]
+    /// Formulations: compliant, frame (linear), rcr (--scheme es), rcr-elastic (with --methods that reduce constraints too)
+    /// [default: compliant,frame]
     #[arg(long, value_name = "NAMES")]
     formulations: Vec<String>,
 

@@ -37,7 +37,7 @@ fn errors_fall_with_work() {
 #[test]
 fn joint_coordinates_converge() {
     let bench = Bench::new(&[("c.net", CANTILEVER)]);
-    let chart = bench.json(&format!("{CHART} --parts precision --formulations rcr"));
+    let chart = bench.json(&format!("{CHART} --parts precision --formulations rcr --scheme es"));
     let points = part(&chart, "precision");
     assert_eq!(points.len(), 3);
     assert!(points.iter().all(|p| p["formulation"] == "rcr" && p["method"] == "rodas4"));
@@ -52,7 +52,7 @@ fn joint_coordinates_converge() {
 fn implicit_methods_in_joint_coordinates() {
     let bench = Bench::new(&[("c.net", CANTILEVER)]);
     let chart = CHART.replace("rodas4,radau5", "rodas4,tr-bdf2");
-    let chart = bench.json(&format!("{chart} --parts precision --formulations rcr-elastic --rotary-inertia"));
+    let chart = bench.json(&format!("{chart} --parts precision --formulations rcr-elastic --scheme es"));
     let points = part(&chart, "precision");
     let methods: Vec<&str> = points.iter().filter_map(|p| p["method"].as_str()).collect();
     assert_eq!(methods, ["rodas4", "rodas4", "rodas4", "tr-bdf2", "tr-bdf2", "tr-bdf2"]);

@@ -194,7 +194,7 @@ fn heated_lengths() {
 #[test]
 fn refusals_name_the_way_out() {
     let compiled = undamped(BANK, 2e-5, false);
-    for method in [Integrator::Rodas4, Integrator::Radau5, Integrator::AverageField] {
+    for method in [Integrator::Radau5, Integrator::AverageField] {
         let options = asked(1e-6, "y1.y", method, 1e-3);
         match joint_transient(&compiled, Formulation::Rcr, &options, &mut |_, _| {}, &mut |_| true) {
             Err(AnalysisError::BadRequest { detail, .. }) => {

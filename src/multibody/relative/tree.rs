@@ -76,6 +76,13 @@ pub enum Unfit {
     /// Small displacements about the drawn geometry were asked for.
     #[error("joint coordinates are not small displacements; leave out --linear or take compliant")]
     Linear,
+    /// A body turns without inertia: what a step leaves of its rotation would leak, with the axes that turn, into directions
+    /// that have some.
+    #[error("body \"{body}\" turns without inertia; give it some (J of a lumped mass, --scheme es), or take compliant")]
+    NoInertia {
+        /// Its name.
+        body: String,
+    },
     /// A loop closes in a joint that is rigid in some direction.
     #[error(
         "a loop of rigid joints closes at body \"{body}\"; take one of the methods that reduce constraints, or compliant"
@@ -94,6 +101,10 @@ impl Tree {
     pub fn elastic(model: &Model) -> Result<Self, Unfit> {
         if model.linear {
             return Err(Unfit::Linear);
+        }
+        // a supported body keeps its own coordinates
+        if let Some(body) = model.bodies.iter().find(|b| b.inertia == 0.0 && b.free.is_none()) {
+            return Err(Unfit::NoInertia { body: body.name.to_string() });
         }
         let tree = Self::new(model, |_| [false; 3]);
         match tree.closures.iter().find(|j| model.section(j).locked != [false; 3]) {

@@ -120,7 +120,7 @@ fn formulations_agree_on_the_bank() {
     assert!(text.contains("tol=1e-4") && text.contains(".tran 1u 1.2m 0 0.2u"));
     let [bodies, joints] = ["compliant", "rcr"].map(|formulation| {
         let deck = folder.path().join(format!("{formulation}.cir"));
-        let text = text.replace("tol=1e-4", &format!("tol=1e-4 formulation=\"{formulation}\""));
+        let text = text.replace("tol=1e-4", &format!("tol=1e-4 scheme=\"es\" formulation=\"{formulation}\""));
         std::fs::write(&deck, text.replace(".tran 1u 1.2m 0 0.2u", ".tran 1u 100u 0 0.2u")).unwrap();
         let remote = Some(format!("unix://{}", server.socket().display()));
         let here = run(CosimOptions { deck: deck.clone(), ..CosimOptions::default() }).unwrap();
