@@ -55,11 +55,11 @@ pub fn fill(tree: &Tree, placed: &Placed<f64>, q: &[Pose], force: &[Pose], out: 
         let pp_own = r - 2.0 * b_p * f2 - 0.25 * s * along - 2.0 * s * pp * f1;
         let mut own = Matrix3::new(0.0, 0.0, up, 0.0, -2.0 * s * gg * f1, gp_own, up, gp_own, pp_own);
         let mut cross = [s * f2, s * (-2.0 * b_g * f2 - f1), s * (r - 2.0 * b_p * f2) - 0.5 * along];
-        for i in 0..3 {
+        for (i, cross) in cross.iter_mut().enumerate() {
             if !link.moving[i] {
                 own.row_mut(i).fill(0.0);
                 own.column_mut(i).fill(0.0);
-                cross[i] = 0.0;
+                *cross = 0.0;
             }
         }
         out[j] = Geometric { own, cross, turn: r - r_m - s * along };

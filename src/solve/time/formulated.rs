@@ -11,7 +11,7 @@ use std::sync::Arc;
 #[derive(Debug, Clone)]
 pub enum Formulated {
     /// Every body has its own coordinates.
-    Bodies(Rodas4),
+    Bodies(Box<Rodas4>),
     /// Relative joint coordinates.
     Joints(Box<JointRodas4>),
 }
@@ -22,7 +22,7 @@ impl Formulated {
     pub fn new(system: &System, joints: Option<&Arc<Joints>>, shortest: f64, sources: &[usize]) -> Self {
         match joints {
             Some(joints) => Self::Joints(Box::new(JointRodas4::new(Arc::clone(joints), shortest, sources))),
-            None => Self::Bodies(Rodas4::new(system, sources)),
+            None => Self::Bodies(Box::new(Rodas4::new(system, sources))),
         }
     }
 

@@ -42,7 +42,7 @@ const ANALYSES: [(&str, &str, &str); 8] = [
 
 /// The number behind the last equals sign of the output.
 fn number(output: &str) -> Option<f64> {
-    output.lines().filter_map(|l| l.split_once(" = ")).filter_map(|(_, v)| v.trim().parse().ok()).last()
+    output.lines().filter_map(|l| l.split_once(" = ")).filter_map(|(_, v)| v.trim().parse().ok()).next_back()
 }
 
 /// Each analysis gives after each other what it gives alone, to 1e-6; `.pz` ends with a message that says what to do
