@@ -11,6 +11,7 @@ use bimorph::analysis::integrator::Integrator;
 use bimorph::analysis::joint_transient::{JointReport, joint_transient};
 use bimorph::analysis::transient::{Counters, Event, TransientOptions, TransientResult, transient};
 use bimorph::compile::Compiled;
+use bimorph::multibody::relative::Unfit;
 use bimorph::options::Value;
 use bimorph::options::analysis::{TRAN_POINTS, TRAN_RHO, TRAN_STEP, TRAN_STOP};
 use bimorph::results::plot::axis::quantity;
@@ -211,7 +212,7 @@ impl Tran {
         let implicit = compiled.joints.is_none();
         // mechanisms of rigid loops have explicit steps
         let name = self.method.as_deref().unwrap_or(match &compiled.joints {
-            Some(Err(_)) => "rk45",
+            Some(Err(Unfit::RigidLoop { .. })) => "rk45",
             _ => "rodas4",
         });
         let unknown = || Failure::bad("--method", "the name of an integrator", name.to_owned());
