@@ -110,9 +110,6 @@ pub fn lay(
             locked: pin.locked,
         });
     }
-    if calibrated && !options.rotary_inertia {
-        add_rotary_inertia(beam, bar.length / segments as f64, ends, drawn, rigid);
-    }
     let pair = |k: usize| (bodies[k].body, bodies[k + 1].body);
     for &(i, j, stiffness) in &cut.couplings {
         out.couplings.push(Coupling { first: pair(i), second: pair(j), stiffness });
@@ -129,8 +126,7 @@ pub fn lay(
 
 /// Stiffness of joint `k` of a cut beam with the shear compliance of its segment and the springs of the ends next to it.
 ///
-/// Springs may be negative where a junction is stiffer than what its offset leaves out; on very short segments they are
-/// halved until a tenth of the segment's own compliance is left. A joint with rigid directions takes the bending part alone.
+/// A joint with rigid directions takes the bending part of the springs alone.
 fn with_springs(beam: &Beam, bar: &Bar, cut: &Cut, k: usize, ends: &[End; 2]) -> Matrix3<f64> {
     let pin = &cut.pins[k];
     let mut springs = Matrix3::zeros();
@@ -149,13 +145,7 @@ fn with_springs(beam: &Beam, bar: &Bar, cut: &Cut, k: usize, ends: &[End; 2]) ->
     if bar.shear == 0.0 && !pin.locked[1] {
         own[(1, 1)] += pin.length * shear_flexibility(beam);
     }
-    for _ in 0..8 {
-        if let (Some(_), Some(whole)) = ((own * 0.9 + springs).cholesky(), (own + springs).cholesky()) {
-            return whole.inverse();
-        }
-        springs *= 0.5;
-    }
-    pin.stiffness
+    (own + springs).cholesky().map_or(pin.stiffness, |whole| whole.inverse())
 }
 
 /// Drag per mass of a beam over a gas film [1/s].
@@ -171,18 +161,5 @@ fn add_rod(beam: &Beam, length: f64, along: Vector2<f64>, drag_per_mass: f64, no
         let second = mass * (length * length / 3.0 + beam.width * beam.width / 12.0);
         let lump = Lump { amount: mass, first: along * (0.5 * length * mass), second };
         rigid.add_mass(node, &lump, drag_per_mass);
-    }
-}
-
-/// Rotary inertia of the sections next to nodes where something else is, ρI for each length: half of the first and the last
-/// segment's.
-///
-/// Inner bodies and those at free ends turn with next to no inertia of their own. A little would let them swing at a
-/// frequency that means nothing but costs steps, and what it takes off the frequencies of bending, ½·(k·w)²/12 of each, is
-/// small wherever a beam is long enough to have inner bodies.
-fn add_rotary_inertia(beam: &Beam, h: f64, ends: &[End; 2], points: [Point; 2], rigid: &mut Assembly) {
-    let second = 0.5 * h * beam.material.density * beam.thickness * beam.width.powi(3) / 12.0;
-    for (point, _) in points.into_iter().zip(ends).filter(|(_, end)| !end.free) {
-        rigid.add_mass(point, &Lump { second, ..Lump::default() }, 0.0);
     }
 }

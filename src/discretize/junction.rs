@@ -10,12 +10,13 @@
 //!
 //! Where a bar changes its width, the step is added, as far as no stem covers it. Offsets of one beam take at most nine
 //! tenths of its length: more is cut down in proportion. A node whose beams all lie on one rigid part has no junction of its
-//! own: there each beam ends where it is drawn.
+//! own: there each beam ends where it is drawn. Springs of negative compliance are made up for by longer offsets, within the
+//! same limit.
 //!
 //! Not in the table: Poisson's ratios other than 0.3, branches of different stiffness or thickness (each takes its own),
 //! ratios of widths beyond 8 and stems that lean by more than 45° (the last row holds).
 
-use super::junction_springs::{End, interpolate};
+use super::junction_springs::{End, corner, interpolate};
 use super::junction_table as table;
 use super::overlap::{self, IN_LINE, Strip, turn};
 use super::rigid::Assembly;
@@ -76,12 +77,15 @@ pub fn find(structure: &Structure, rigid: &Assembly, kind: Junctions) -> Ends {
     }
     for (beam, [start, end]) in structure.beams.iter().zip(&mut ends.beams) {
         let share = (start.offset + end.offset) / (MOST * beam.length);
+        let taken = (start.offset + end.offset) / share.max(1.0);
+        let room = 0.5 * (MOST * beam.length - taken).max(0.0);
         for end in [start, end] {
             if share > 1.0 {
                 end.offset /= share;
             }
-            if kind == Junctions::Offset {
-                end.spring.fill(0.0);
+            match kind {
+                Junctions::Calibrated => end.settle(beam, room),
+                _ => end.spring.fill(0.0),
             }
         }
     }
@@ -136,7 +140,7 @@ fn meet(branches: &[Branch], beams: &[Beam], ends: &mut [[End; 2]]) {
         ([a, b], _) => {
             let between = turn(a.angle, b.angle).to_degrees();
             for (one, other) in [(a, b), (b, a)] {
-                let row = interpolate(&table::CORNER, other.width / one.width, &table::TURNS, between);
+                let row = corner(other.width / one.width, between);
                 add(one, &row, other.width, left_of(one, other) < 0.0);
             }
         }
@@ -178,7 +182,7 @@ fn meet(branches: &[Branch], beams: &[Beam], ends: &mut [[End; 2]]) {
                 let others = branches.iter().enumerate().filter(|&(i, _)| i != k).map(|(_, b)| b);
                 if let Some(other) = others.max_by(|a, b| a.width.total_cmp(&b.width)) {
                     let between = turn(own.angle, other.angle).to_degrees();
-                    let row = interpolate(&table::CORNER, other.width / own.width, &table::TURNS, between);
+                    let row = corner(other.width / own.width, between);
                     add(own, &row, other.width, left_of(own, other) < 0.0);
                 }
             }
@@ -193,7 +197,7 @@ fn step(a: &Branch, b: &Branch, covered: f64, add: &mut impl FnMut(&Branch, &tab
         return;
     }
     for (one, other) in [(a, b), (b, a)] {
-        let mut row = interpolate(&table::CORNER, other.width / one.width, &table::TURNS, 0.0);
+        let mut row = corner(other.width / one.width, 0.0);
         row.iter_mut().for_each(|x| *x *= open);
         add(one, &row, other.width, false);
     }

@@ -4,9 +4,16 @@
 //! from the node outwards. It adds no body: its compliance goes in series with the first segment's joint, which lies half a
 //! segment away. With d the distance from edge to joint, loads at the edge are N, V, M + d·V.
 //!
+//! A junction that is stiffer than what its offset leaves out has a spring of negative compliance. In series with a segment of
+//! a long mesh that does no harm; with a segment shorter than the spring stands for, nothing would be left. So the edge
+//! is moved outwards, rod by rod ([`End::settle`]), until rod and spring together give way under every load: the compliance of
+//! the whole stays what it was, and no segment beside it matters.
+//!
 //! Source of the numbers: [`super::junction_table`].
 
+use super::beam::bar;
 use super::junction_table::{self as table, Row};
+use super::scheme::Bar;
 use crate::structure::Beam;
 use nalgebra::Matrix3;
 
@@ -35,6 +42,24 @@ impl End {
         self.spring += Matrix3::new(uu, ug, up, ug, gg, gp, up, gp, pp) * unit;
     }
 
+    /// Moves the edge outwards until the spring gives way under every load, by at most `most` [m].
+    ///
+    /// A rod of length ℓ between the old and the new edge becomes rigid, and its compliance P = [ℓ/EA, 0, 0; 0, ℓ³/3EI + ℓ/κGA,
+    /// ℓ²/2EI; 0, ℓ²/2EI, ℓ/EI] is added to the spring's, seen from the new edge. What is still negative after `most` is left
+    /// out: a beam so short has no room for its junctions.
+    pub fn settle(&mut self, beam: &Beam, most: f64) {
+        let old = self.spring;
+        let mut rod = 0.0;
+        while rod < most && !gives(&self.spring, beam) {
+            rod = f64::min(rod + ROD * beam.width, most);
+            self.spring = moved(&old, rod) + rod_compliance(beam, rod);
+        }
+        self.offset += rod;
+        if !gives(&self.spring, beam) {
+            self.spring = positive_part(&self.spring, beam);
+        }
+    }
+
     /// The spring's compliance over the stress of a joint at distance `d` [m] along the beam from the edge; `outwards`
     /// when the beam runs from this node, not towards it.
     pub fn at_joint(&self, d: f64, outwards: bool) -> Matrix3<f64> {
@@ -45,11 +70,66 @@ impl End {
     }
 }
 
+/// Step by which an edge is moved outwards, in widths.
+const ROD: f64 = 1.0 / 64.0;
+
+/// A spring's compliance under loads at a distance `d` [m] outwards from its edge.
+fn moved(spring: &Matrix3<f64>, d: f64) -> Matrix3<f64> {
+    let carry = Matrix3::new(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, d, 1.0);
+    carry.transpose() * spring * carry
+}
+
+/// Compliance of a rod of a beam, clamped at one end, under loads at the other.
+fn rod_compliance(beam: &Beam, length: f64) -> Matrix3<f64> {
+    let Bar { ea, ei, shear, .. } = bar(beam, true, false);
+    let turned = length * length / (2.0 * ei);
+    let across = length.powi(3) / (3.0 * ei) + length * shear;
+    Matrix3::new(length / ea, 0.0, 0.0, 0.0, across, turned, 0.0, turned, length / ei)
+}
+
+/// The compliance in numbers of one size: strains (u, g, p·w) under (N, V, M/w), times E·t.
+fn scaled(spring: &Matrix3<f64>, beam: &Beam) -> Matrix3<f64> {
+    let (w, unit) = (beam.width, beam.material.youngs_modulus * beam.thickness);
+    let scale = Matrix3::from_diagonal(&[1.0, 1.0, w].into());
+    scale * spring * scale * unit
+}
+
+/// True where no load gains work from the spring, rounding aside.
+fn gives(spring: &Matrix3<f64>, beam: &Beam) -> bool {
+    scaled(spring, beam).symmetric_eigenvalues().min() >= -1e-9
+}
+
+/// The spring without what would gain work.
+fn positive_part(spring: &Matrix3<f64>, beam: &Beam) -> Matrix3<f64> {
+    let mut eigen = scaled(spring, beam).symmetric_eigen();
+    eigen.eigenvalues.apply(|x| *x = x.max(0.0));
+    let (w, unit) = (beam.width, beam.material.youngs_modulus * beam.thickness);
+    let back = Matrix3::from_diagonal(&[1.0, 1.0, 1.0 / w].into());
+    back * eigen.recompose() * back / unit
+}
+
+/// Row of [`table::CORNER`] at a ratio of widths (other over own, by its logarithm) and a turn [°], linear in between and
+/// constant outside. Next to equal widths a step of the width in a straight beam counts by the square of its logarithm: to first
+/// order it is what the two beams make of it, so that a taper of many pieces becomes the beam that it is drawn from.
+pub fn corner(ratio: f64, turn: f64) -> Row {
+    let (r, share) = place(&table::RATIOS, ratio.log2());
+    let equal = table::RATIOS.len() / 2;
+    let power = 1.0 + (1.0 - turn / 45.0).max(0.0);
+    let share = match r {
+        r if r == equal => share.powf(power),
+        r if r + 1 == equal => 1.0 - (1.0 - share).powf(power),
+        _ => share,
+    };
+    blend(&table::CORNER, (r, share), place(&table::TURNS, turn))
+}
+
 /// Row of a two-way table at a ratio of widths (other over own, by its logarithm) and an angle [°], linear in between and
 /// constant outside.
 pub fn interpolate<const N: usize>(rows: &[[Row; N]; 9], ratio: f64, angles: &[f64; N], angle: f64) -> Row {
-    let (r, share) = place(&table::RATIOS, ratio.log2());
-    let (a, part) = place(angles, angle);
+    blend(rows, place(&table::RATIOS, ratio.log2()), place(angles, angle))
+}
+
+fn blend<const N: usize>(rows: &[[Row; N]; 9], (r, share): (usize, f64), (a, part): (usize, f64)) -> Row {
     let mut row = [0.0; 7];
     for (k, value) in row.iter_mut().enumerate() {
         let along = |r: usize| rows[r][a][k] * (1.0 - part) + rows[r][a + 1][k] * part;
@@ -67,6 +147,7 @@ fn place(marks: &[f64], x: f64) -> (usize, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::structure::{Material, NodeId};
 
     /// A table is met at its marks, halved in between, and constant outside.
     #[test]
@@ -76,6 +157,56 @@ mod tests {
         assert_eq!(place(&[0.0, 1.0, 3.0], 9.0), (1, 1.0));
         let row = interpolate(&table::CORNER, 1.0, &table::TURNS, 90.0);
         assert_eq!(row, table::CORNER[4][6]);
+    }
+
+    /// A spring that is settled gives way under every load, and what it stands for has not changed: the compliance of spring and
+    /// beam together is the same, whatever length of the beam became rigid.
+    #[test]
+    fn settled_springs_give_way_and_change_nothing() {
+        let material = Material {
+            youngs_modulus: 160e9,
+            poisson: 0.3,
+            density: 2300.0,
+            viscosity: 0.0,
+            fluid: 2e-6,
+            thermal_expansion: 0.0,
+            ambient_temperature: 300.0,
+            stress: 0.0,
+        };
+        let beam = Beam {
+            name: "arm".into(),
+            a: NodeId(0),
+            b: NodeId(1),
+            length: 100e-6,
+            angle: 0.0,
+            width: 4e-6,
+            thickness: 2e-6,
+            material,
+            temperature: None,
+            heater: None,
+        };
+        let rows = table::CORNER.iter().flatten().chain(table::BAR.iter().flatten());
+        for row in rows.chain(table::STEM.iter().flatten()).chain(table::CROSS.iter().flatten()) {
+            let mut end = End::default();
+            end.add(row, &beam, 4e-6, false);
+            let (edge, raw) = (end.offset, end.spring);
+            end.settle(&beam, 40e-6);
+            assert!(gives(&end.spring, &beam), "{row:?}");
+            let whole = |spring: &Matrix3<f64>, edge: f64| {
+                let rest = 90e-6 - edge;
+                moved(spring, rest) + rod_compliance(&beam, rest)
+            };
+            let (before, after) = (whole(&raw, edge), whole(&end.spring, end.offset));
+            assert!((after - before).norm() < 1e-10 * before.norm(), "{row:?}");
+        }
+    }
+
+    /// A straight taper cut into n pieces has in all less of a junction the finer it is cut.
+    #[test]
+    fn small_steps_of_the_width_add_up_to_nothing() {
+        let total = |n: u32| f64::from(n) * corner(4f64.powf(1.0 / f64::from(n)), 0.0)[6];
+        assert!(total(1024) < 0.02 * total(8), "{} {}", total(1024), total(8));
+        assert_eq!(corner(2.0, 0.0), table::CORNER[6][0]);
     }
 
     /// No spring where nothing changes, and half a widths' offset at a right angle.
