@@ -159,7 +159,7 @@ fn lumped_plate() {
          plategap2d * [m e] [A=1e-8 gap=2u]\neground * [e] []\ndrive port * [m e] []",
     );
     let gap = &s.plate_gaps[0];
-    assert_eq!((gap.area, gap.gap, gap.permittivity, gap.height), (1e-8, 2e-6, 8.854e-12, 2e-6));
+    assert_eq!((gap.area, gap.gap, gap.permittivity, gap.touch), (1e-8, 2e-6, 8.854e-12, None));
     assert_eq!(gap.axis, [1.0, 0.0]);
     let (m, e) = (s.node("m").expect("m"), s.node("e").expect("e"));
     assert_eq!(gap.voltage, GapVoltage::Nodes(m, e));
@@ -168,6 +168,36 @@ fn lumped_plate() {
     assert_eq!((s.ports[0].name.as_str(), s.ports[0].plus, s.ports[0].minus), ("drive", m, Some(e)));
     assert_eq!(s.electrical_grounds, [e]);
     assert!(s.nodes[m.0].mechanical && s.nodes[m.0].electrical);
+}
+
+/// `touch` says where the parts of a gap meet; not beyond where they are drawn.
+#[test]
+fn touching_distance() {
+    let text =
+        "anchor * [e] []\nmass2d * [m] [m=1e-10]\nspring2d * [e m] [kx=1]\nplategap2d * [m e] [A=1e-8 gap=2u touch=T]";
+    assert_eq!(drawn(&text.replace("=T", "=0.3u")).plate_gaps[0].touch, Some(0.3e-6));
+    let wrong = load(&Bundle::from_text("t.net", &text.replace("=T", "=3u")), &[]);
+    let errors = wrong.err().map(|d| d.to_string()).unwrap_or_default();
+    assert!(errors.contains("`touch`") && errors.contains("below `gap`"), "{errors}");
+}
+
+/// stop2d: along its axis on one side or both, against another node or the ground; rigid unless `k` says otherwise.
+#[test]
+fn stops() {
+    let s = drawn(
+        "anchor * [e] []\nmass2d * [m] [m=1e-10]\nspring2d * [e m] [kx=1]\nstop2d * [m e] [gap=1u oz=pi/2]\n\
+         s stop2d * [m] [gap=2u back=3u k=5e3]\nstop2d * [m e] [back=1u A=4e-10]",
+    );
+    let (m, e) = (s.node("m").expect("m"), s.node("e").expect("e"));
+    assert_eq!(
+        (s.stops[0].a, s.stops[0].b, s.stops[0].ways, s.stops[0].stiffness),
+        (m, Some(e), [Some(1e-6), None], None)
+    );
+    same2(s.stops[0].axis, [0.0, 1.0]);
+    assert_eq!((s.stops[1].b, s.stops[1].ways, s.stops[1].stiffness), (None, [Some(2e-6), Some(3e-6)], Some(5e3)));
+    assert_eq!((s.stops[2].ways, s.stops[2].area), ([None, Some(1e-6)], 4e-10));
+    let none = load(&Bundle::from_text("t.net", "mass2d * [m] [m=1e-10]\nstop2d * [m] []"), &[]);
+    assert!(none.err().is_some_and(|d| d.to_string().contains("`gap` or `back`")));
 }
 
 /// damper2d, and a spring turned by oz.

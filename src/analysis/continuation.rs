@@ -1,5 +1,6 @@
 //! Equilibrium paths: how a mechanism's equilibria go on while one load, voltage, temperature or stress grows, past folds
 //! and through bifurcations.
+use super::contact_range::within_contact_range;
 use super::signal::{Signal, View};
 use super::statics::{beam_motions, node_motions, operating_point, source_vector};
 use super::{AnalysisError, BeamMotions, NodeMotions, Watch};
@@ -121,6 +122,9 @@ pub fn trace(
         return Err(AnalysisError::Cancelled);
     }
 
+    for point in &traced.points {
+        within_contact_range(compiled, &point.q)?;
+    }
     let value = |s: f64| if s == 1.0 { request.to } else { request.from + s * (request.to - request.from) };
     let mut columns: Vec<Vec<f64>> = vec![Vec::with_capacity(traced.points.len()); signals.len()];
     let zeros = vec![Pose::zeros(); system.bodies()];
@@ -150,6 +154,7 @@ pub fn trace(
         end: match traced.end {
             PathEnd::Arrived => "arrived",
             PathEnd::TurnedBack => "turned back",
+            PathEnd::Unstable => "unstable",
             PathEnd::Full => "as many points as allowed",
             PathEnd::Lost => "lost",
             PathEnd::Stopped => "stopped",

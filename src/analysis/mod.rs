@@ -2,6 +2,7 @@
 
 pub mod backbending;
 pub mod chart;
+pub(crate) mod contact_range;
 pub mod continuation;
 pub mod formulation;
 pub mod frame;
@@ -51,6 +52,19 @@ pub enum AnalysisError {
         dt: f64,
         /// Which body and direction, and why.
         detail: String,
+    },
+    /// Parts are pressed further into each other than the law of contact knows.
+    #[error(
+        "gap \"{gap}\" is pressed shut to {left:.3e} m, beyond the range of the law of contact, which ends at {least:.3e} m: \
+         nothing bears such a pressure. Lower the voltage or the load, or give the gap the area, or the `touch`, that it has"
+    )]
+    ContactRange {
+        /// Name of the gap.
+        gap: String,
+        /// Distance that is left [m]; negative: through.
+        left: f64,
+        /// Least distance within the range [m].
+        least: f64,
     },
     /// An iteration did not settle.
     #[error("not converged: {detail}")]

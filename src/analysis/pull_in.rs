@@ -1,21 +1,45 @@
 //! Pull-in and release voltages.
+//!
+//! The branch of equilibria is followed by arc length, from 0 V upwards, to where it loses its stability: a fold, or a
+//! bifurcation of what is drawn symmetrical. A little beyond, the part falls to what holds it. Where a gap has closed that
+//! was open, this was pull-in; where none has, the branch goes on from there. Downwards the closed branch is followed in the
+//! same way: after each fold the part falls again, and while one of the gaps that pull-in closed still touches (a beam that
+//! peels off piece by piece) it goes on. Voltages are measured in what moves this part, so that no step depends on the
+//! largest voltage asked for.
+
 use super::AnalysisError;
+use super::contact_range::within_contact_range;
 use super::statics::source_vector;
 use crate::compile::Compiled;
+use crate::gaps::System;
+use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
+use crate::solve::SolveError;
+use crate::solve::continuation::{Continuation, ContinuationOptions, PathEnd, Traced};
 use crate::solve::equilibrium::{Equilibrium, EquilibriumOptions};
+use crate::solve::family::Blend;
 use crate::solve::path::SourcePath;
 use serde::Serialize;
+
+/// How far beyond a fold a part is let fall, as a share of its voltage.
+const PAST: f64 = 1e-3;
+/// Folds on the way up, or on the way down, after which the search gives up.
+const MOST_FOLDS: usize = 200;
+/// Points of one piece of a branch.
+const MOST_POINTS: usize = 20_000;
 
 /// Where a gap closes and where it opens again.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PullInResult {
     /// The port or netlist source whose voltage was swept.
     pub port: String,
-    /// Voltage of the fold on the way up [V].
+    /// Voltage at which the open branch loses its stability on the way up, and a gap closes [V].
     pub pull_in_v: f64,
-    /// Voltage at which the closed gap lets go on the way down [V]; none when it never closed or stays stuck.
+    /// Voltage at which the last of the closed gaps lets go on the way down [V]; none when it stays closed at 0 V, or when
+    /// nothing holds the part after pull-in.
     pub release_v: Option<f64>,
+    /// False when nothing holds the part after pull-in: no gap closes on contact.
+    pub held: bool,
 }
 
 /// Follows the equilibrium up to `max` volts on `port` (none: the first port, else the first source of the netlist), then
@@ -24,59 +48,214 @@ pub struct PullInResult {
 /// # Errors
 /// See [`AnalysisError`]; `NoEquilibrium` when nothing pulls in below `max`.
 pub fn pull_in(compiled: &Compiled, port: Option<&str>, max: f64) -> Result<PullInResult, AnalysisError> {
-    let system = &compiled.parts.system;
-    let electrics = &system.electrics;
-    let source = match port {
-        Some(name) => electrics.names.iter().position(|n| n == name),
-        None => (!electrics.names.is_empty()).then_some(0),
-    };
-    let source = source.ok_or_else(|| AnalysisError::BadRequest {
-        what: format!("port \"{}\"", port.unwrap_or("")),
-        detail: match electrics.names.len() {
-            0 => "the netlist has no port and no voltage source to sweep".into(),
-            _ => format!("the netlist's ports and sources are {}", electrics.names.join(", ")),
-        },
-    })?;
+    let source = source(compiled, port)?;
     if !(max.is_finite() && max > 0.0) {
         return Err(AnalysisError::BadRequest {
             what: "largest voltage".into(),
             detail: format!("{max} is not a positive number of volts"),
         });
     }
-    let name = electrics.names[source].clone();
     let mut off = source_vector(compiled, &[])?;
     off[source] = 0.0;
-    let at = |volts: f64| {
-        let mut u = off.clone();
-        u[source] = volts;
-        u
-    };
-    let mut q = vec![Pose::zeros(); system.bodies()];
-    let mut solver = Equilibrium::new(system, EquilibriumOptions::default());
-    let rest = vec![0.0; off.len()];
-    solver.follow(system, &SourcePath::new(electrics, &rest, &off, [0.0, 1.0]), &mut q)?;
-
-    solver.options.stop_at_fold = true;
-    let full = at(max);
-    let up = solver.follow(system, &SourcePath::new(electrics, &off, &full, [1.0, 1.0]), &mut q)?;
-    let Some(fold) = up.fold else {
-        return Err(AnalysisError::NoEquilibrium {
-            detail: format!("{name} pulls nothing in up to {max} V; raise the largest voltage"),
-        });
-    };
-    let pull_in_v = fold * max;
-
-    // beyond the fold: fall to contact, then come back down
-    solver.options.stop_at_fold = false;
-    let (here, above) = (at(pull_in_v), at(1.01 * pull_in_v));
-    let fallen = solver.follow(system, &SourcePath::new(electrics, &here, &above, [1.0, 1.0]), &mut q);
-    let release_v = match fallen {
-        Ok(_) if system.in_contact(&q) => {
-            solver.options.stop_at_fold = true;
-            let down = solver.follow(system, &SourcePath::new(electrics, &above, &off, [1.0, 1.0]), &mut q)?;
-            down.fold.map(|share| (1.0 - share) * above[source])
+    let system = &compiled.parts.system;
+    let mut sweep =
+        Sweep { compiled, system, off, source, equilibrium: Equilibrium::new(system, EquilibriumOptions::default()) };
+    let name = system.electrics.names[source].clone();
+    let q = sweep.at_rest()?;
+    let touching = sweep.touching(&q);
+    match sweep.close(q, max)? {
+        Closed::Falls { volts } => Ok(PullInResult { port: name, pull_in_v: volts, release_v: None, held: false }),
+        Closed::Rests { fold, volts, q } => {
+            let made: Vec<usize> = (0..touching.len()).filter(|&g| !touching[g] && system.touches(g, &q)).collect();
+            let release_v = sweep.release(q, volts, &made)?;
+            Ok(PullInResult { port: name, pull_in_v: fold, release_v, held: true })
         }
-        _ => None,
+    }
+}
+
+/// Index of the source to sweep.
+fn source(compiled: &Compiled, port: Option<&str>) -> Result<usize, AnalysisError> {
+    let names = &compiled.parts.system.electrics.names;
+    let found = match port {
+        Some(name) => names.iter().position(|n| n == name),
+        None => (!names.is_empty()).then_some(0),
     };
-    Ok(PullInResult { port: name, pull_in_v, release_v })
+    found.ok_or_else(|| AnalysisError::BadRequest {
+        what: format!("port \"{}\"", port.unwrap_or("")),
+        detail: match names.len() {
+            0 => "the netlist has no port and no voltage source to sweep".into(),
+            _ => format!("the netlist's ports and sources are {}", names.join(", ")),
+        },
+    })
+}
+
+/// What became of a part beyond pull-in.
+enum Closed {
+    /// It rests on contact: voltage of the fold, and an equilibrium beyond.
+    Rests { fold: f64, volts: f64, q: Vec<Pose> },
+    /// Nothing holds it.
+    Falls { volts: f64 },
+}
+
+/// One source raised and lowered.
+struct Sweep<'a> {
+    compiled: &'a Compiled,
+    system: &'a System,
+    /// Source voltages with the swept one at 0 V.
+    off: Vec<f64>,
+    source: usize,
+    equilibrium: Equilibrium,
+}
+
+impl Sweep<'_> {
+    fn sources(&self, volts: f64) -> Vec<f64> {
+        let mut u = self.off.clone();
+        u[self.source] = volts;
+        u
+    }
+
+    fn touching(&self, q: &[Pose]) -> Vec<bool> {
+        (0..self.system.gaps.len()).map(|g| self.system.touches(g, q)).collect()
+    }
+
+    /// The equilibrium at 0 V.
+    fn at_rest(&mut self) -> Result<Vec<Pose>, AnalysisError> {
+        let mut q = vec![Pose::zeros(); self.system.bodies()];
+        let rest = vec![0.0; self.off.len()];
+        let path = SourcePath::new(&self.system.electrics, &rest, &self.off, [0.0, 1.0]);
+        self.equilibrium.follow(self.system, &path, &mut q)?;
+        Ok(q)
+    }
+
+    /// From 0 V up to pull-in, and to what holds the part beyond.
+    fn close(&mut self, mut q: Vec<Pose>, max: f64) -> Result<Closed, AnalysisError> {
+        let open = self.touching(&q);
+        let unit = self.unit(&q, max)?;
+        let mut from = 0.0;
+        for _ in 0..MOST_FOLDS {
+            let traced = self.trace(&q, from, from + unit, (max - from) / unit)?;
+            let last = last(&traced);
+            let fold = from + last.0 * unit;
+            if traced.end == PathEnd::Arrived {
+                break;
+            }
+            q = last.1;
+            let beyond = fold * (1.0 + PAST);
+            if self.fall(&mut q, beyond).is_err() {
+                return Ok(Closed::Falls { volts: fold });
+            }
+            within_contact_range(self.compiled, &q)?;
+            if self.touching(&q).iter().zip(&open).any(|(now, before)| *now && !before) {
+                return Ok(Closed::Rests { fold, volts: beyond, q });
+            }
+            if beyond >= max {
+                break;
+            }
+            from = beyond;
+        }
+        let name = &self.system.electrics.names[self.source];
+        Err(AnalysisError::NoEquilibrium {
+            detail: format!("{name} pulls nothing in up to {max} V; raise the largest voltage"),
+        })
+    }
+
+    /// From the closed state `q` at `volts` down to where none of the gaps `made` touches any more.
+    fn release(&mut self, mut q: Vec<Pose>, mut volts: f64, made: &[usize]) -> Result<Option<f64>, AnalysisError> {
+        let system = self.system;
+        let free = |q: &[Pose]| made.iter().all(|&g| !system.touches(g, q));
+        for _ in 0..MOST_FOLDS {
+            let traced = self.trace(&q, volts, 0.0, 1.0)?;
+            let at = |s: f64| volts * (1.0 - s);
+            if let Some(k) = traced.points.iter().position(|p| free(&p.q)) {
+                // contact was lost without a fold
+                return Ok(Some(at(traced.points[k.saturating_sub(1)].s)));
+            }
+            if traced.end == PathEnd::Arrived {
+                return Ok(None);
+            }
+            let last = last(&traced);
+            let fold = at(last.0);
+            q = last.1;
+            let beyond = fold * (1.0 - PAST);
+            self.fall(&mut q, beyond)?;
+            if free(&q) {
+                return Ok(Some(fold));
+            }
+            volts = beyond;
+        }
+        Err(AnalysisError::NoEquilibrium {
+            detail: format!("no release found after {MOST_FOLDS} folds of the closed branch"),
+        })
+    }
+
+    fn fall(&mut self, q: &mut [Pose], volts: f64) -> Result<(), SolveError> {
+        let sources = self.sources(volts);
+        let path = SourcePath::new(&self.system.electrics, &sources, &sources, [1.0, 1.0]);
+        self.equilibrium.settle(self.system, &path, 1.0, q).map(|_| ())
+    }
+
+    /// The branch from the equilibrium `q` at `from` volts through s·`to` + (1 − s)·`from`, until `target` or until it is
+    /// no longer stable.
+    fn trace(&mut self, q: &[Pose], from: f64, to: f64, target: f64) -> Result<Traced, AnalysisError> {
+        let system = self.system;
+        let mut family = Blend::new(system, &self.sources(from), system, &self.sources(to))
+            .map_err(|e| AnalysisError::BadRequest { what: "pull-in".into(), detail: e.to_string() })?;
+        let options = ContinuationOptions {
+            longest: 0.05,
+            growth: 0.05,
+            target,
+            points: MOST_POINTS,
+            stop_at_loss: true,
+            ..ContinuationOptions::default()
+        };
+        let traced = Continuation::new(system, options).trace(&mut family, q, &mut |_| true)?;
+        match traced.end {
+            PathEnd::Arrived | PathEnd::Unstable => Ok(traced),
+            _ => {
+                let at = from + last(&traced).0 * (to - from);
+                let name = &system.electrics.names[self.source];
+                let detail = format!("the branch of equilibria is lost at {name} = {at:.6} V");
+                Err(AnalysisError::NoEquilibrium { detail })
+            }
+        }
+    }
+
+    /// The voltage that moves the part by a tenth of the length scale, or takes a third of a stiffness away, whichever is
+    /// smaller: what steps are measured in [V]. `max` where it does neither.
+    fn unit(&self, q: &[Pose], max: f64) -> Result<f64, AnalysisError> {
+        let system = self.system;
+        let electrics = &system.electrics;
+        let mut tangent = BlockMatrix::new(&system.model.pattern);
+        let mut rise = vec![0.0; electrics.heating.heaters.len()];
+        let mut residual = [vec![Pose::zeros(); q.len()], vec![Pose::zeros(); q.len()]];
+        let mut drive = electrics.drive();
+        for (r, volts) in residual.iter_mut().zip([1.0, 0.0]) {
+            electrics.steady(&self.sources(volts), &mut rise, &mut drive);
+            system.tangent(q, &drive, &mut tangent, r);
+        }
+        system.model.project_matrix(&mut tangent);
+        tangent.factor(&system.model.pattern).map_err(|p| SolveError::singular(system, p))?;
+        let [mut moved, still] = residual;
+        moved.iter_mut().zip(&still).for_each(|(a, b)| *a -= b);
+        tangent.solve(&system.model.pattern, &mut moved);
+        let far = moved.iter().map(|p| p.xy().amax().max(p.z.abs() * system.length_scale)).fold(0.0, f64::max);
+        let mut unit = (0.1 * system.length_scale / far).sqrt().min(max);
+        let mut volts = 1e-3 * unit;
+        while volts < unit {
+            electrics.steady(&self.sources(volts), &mut rise, &mut drive);
+            system.tangent(q, &drive, &mut tangent, &mut moved);
+            system.model.project_matrix(&mut tangent);
+            if !matches!(tangent.factor(&system.model.pattern), Ok(inertia) if inertia.negative == 0) {
+                unit = 0.3 * volts;
+                break;
+            }
+            volts *= 1.5;
+        }
+        Ok(unit)
+    }
+}
+
+/// s and configuration of the last point.
+fn last(traced: &Traced) -> (f64, Vec<Pose>) {
+    traced.points.last().map(|p| (p.s, p.q.clone())).unwrap_or_default()
 }

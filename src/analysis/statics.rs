@@ -1,4 +1,5 @@
 //! Static equilibrium.
+use super::contact_range::within_contact_range;
 use super::signal::{Signal, View};
 use super::{AnalysisError, BeamMotions, PortVoltages};
 use crate::compile::Compiled;
@@ -130,6 +131,7 @@ pub(crate) fn operating_point(compiled: &Compiled, voltages: &PortVoltages) -> R
     if let Some(&loose) = solver.held().iter().find(|p| !system.model.grounded(p.body)) {
         return Err(SolveError::singular(system, loose).into());
     }
+    within_contact_range(compiled, &q)?;
     let free_motions = solver.held().iter().map(|&p| SolveError::singular(system, p).to_string()).collect();
     let mut drive = electrics.drive();
     let mut rise = vec![0.0; electrics.heating.heaters.len()];

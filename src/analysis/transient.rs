@@ -1,11 +1,12 @@
 //! Motion in time.
+use super::contact_range::within_contact_range;
 use super::integrator::Integrator;
 use super::joint_transient::joint_transient;
 use super::signal::{Signal, View};
 use super::statics::{operating_point, source_vector};
 use super::{AnalysisError, Watch};
 use crate::compile::Compiled;
-use crate::gaps::{Ramp, System, contact};
+use crate::gaps::{Ramp, System};
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
 use crate::options::analysis::TRAN_POINTS;
@@ -250,7 +251,12 @@ pub(super) fn record(
     };
     emit(0.0, &motion, &mut result);
     let mut next = 1;
+    let mut beyond = None;
     let mut observe = |s: f64, h: f64, before: &Motion, after: &Motion| {
+        if let Err(error) = within_contact_range(compiled, &after.q) {
+            beyond = Some(error);
+            return false;
+        }
         while next < options.points {
             let t = if next + 1 == options.points { options.stop } else { next as f64 * spacing };
             if t > s + h && next + 1 < options.points || t > (s + h) * (1.0 + 1e-12) {
@@ -285,7 +291,7 @@ pub(super) fn record(
     };
     let (end, work) = carrier.advance(&ramp, &mut motion, &mut observe)?;
     if end == Advance::Stopped {
-        return Err(AnalysisError::Cancelled);
+        return Err(beyond.unwrap_or(AnalysisError::Cancelled));
     }
     result.counters = Counters {
         steps: work.steps,
@@ -317,10 +323,11 @@ fn watched(compiled: &Compiled, options: &TransientOptions<'_>) -> Result<Vec<Wa
         .iter()
         .map(|(name, level)| Signal::find(compiled, name).map(|signal| watch(name.clone(), signal, *level, false)));
     let system = &compiled.parts.system;
-    let touching = (0..system.gaps.len()).filter(|&g| system.touches(g)).map(|g| {
-        let name = format!("{}.gap", compiled.parts.gap_names[g]);
-        Ok(watch(name, Signal::Distance(g), contact::RANGE, true))
-    });
+    let touching =
+        (0..system.gaps.len()).filter_map(|g| system.touching(g).map(|[touch, _]| (g, touch))).map(|(g, touch)| {
+            let name = format!("{}.gap", compiled.parts.gap_names[g]);
+            Ok(watch(name, Signal::Distance(g), touch, true))
+        });
     asked.chain(touching).collect()
 }
 

@@ -14,8 +14,8 @@ use serde::Serialize;
 
 /// Pull-in and release voltage of a gap.
 ///
-/// The equilibrium is followed up to the fold, where the gap closes, and down again to where the closed gap lets go.
-/// JSON: "pull_in_v" [V]; "release_v" [V], null when it never lets go.
+/// The equilibrium is followed up to where it loses its stability and a gap closes, and down again to where the last closed
+/// gap lets go. JSON: "pull_in_v" [V]; "release_v" [V], null when it never lets go; "held": false when no contact holds it.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  bimorph pullin switch.net --max 50\n  \
                         bimorph pullin switch.net --source drive --set gap=1.5u --json")]
@@ -57,7 +57,8 @@ impl Pullin {
         let result = pull_in(&compiled, self.source.as_deref(), self.max);
         busy.finish_and_clear();
         let result = result?;
-        let release = result.release_v.map_or("none: it stays closed".to_owned(), |v| quantity(v, "V"));
+        let none = if result.held { "none: it stays closed" } else { "none: nothing holds the part beyond pull-in" };
+        let release = result.release_v.map_or(none.to_owned(), |v| quantity(v, "V"));
         let text = format!(
             "port     {}\npull-in  {}\nrelease  {release}\n\n{}",
             result.port,

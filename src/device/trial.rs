@@ -5,6 +5,7 @@ use super::local::Session;
 use super::shown::Shown;
 use super::states::Snapshot;
 use super::{Status, Trial, TrialReply};
+use crate::analysis::contact_range::within_contact_range;
 use crate::analysis::signal::{Signal, View};
 use crate::compile::Compiled;
 use crate::gaps::Ramp;
@@ -49,6 +50,10 @@ impl Session {
                 reply.status = Status::Fail(error.to_string());
                 return;
             }
+        }
+        if let Err(error) = within_contact_range(compiled, &self.motion.q) {
+            reply.status = Status::Fail(error.to_string());
+            return;
         }
         electrics.steady(&self.sources, &mut self.rise, &mut self.drive);
         // ∂q/∂V = −K⁻¹·∂r/∂V with the factor that the last Newton iteration left
@@ -115,6 +120,10 @@ impl Session {
                 reply.status = Status::Fail(error.to_string());
                 return;
             }
+        }
+        if let Err(error) = within_contact_range(compiled, &self.motion.q) {
+            reply.status = Status::Fail(error.to_string());
+            return;
         }
         for k in 0..self.rise_slope.len() {
             self.rise_slope[k] = ramp.rise_at(k, request.dt);

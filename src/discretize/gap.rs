@@ -1,15 +1,17 @@
-//! Combs, lumped plates and facing beams → gap functions.
+//! Combs, lumped plates, facing beams and stops → gap functions.
 
 use super::rigid::Assembly;
 use crate::gaps::approach::Approach;
 use crate::gaps::capacitor::Capacitor;
+use crate::gaps::contact::{Contact, touching_distance};
 use crate::gaps::facing::Facing;
-use crate::gaps::{Gap, Point, contact};
+use crate::gaps::stop::Stop;
+use crate::gaps::{Gap, Point};
 use crate::multibody::BodyId;
 use crate::structure::Structure;
 use nalgebra::Vector2;
 
-/// Gaps in the order combs, plates, facing beams; their names; and the pairs of bodies they couple.
+/// Gaps in the order combs, plates, facing beams, stops; their names; and the pairs of bodies they couple.
 pub fn lay(structure: &Structure, rigid: &Assembly) -> (Vec<Gap>, Vec<String>, Vec<(BodyId, BodyId)>) {
     let mut gaps = Vec::new();
     let mut names = Vec::new();
@@ -25,13 +27,11 @@ pub fn lay(structure: &Structure, rigid: &Assembly) -> (Vec<Gap>, Vec<String>, V
     }
     for plate in &structure.plate_gaps {
         let approach = approach(rigid, plate.a.0, plate.b.0, plate.axis);
-        let capacitor = Capacitor::Plates {
-            strength: plate.permittivity * plate.area,
-            gap: plate.gap,
-            closest: contact::FROZEN.min(0.5 * plate.gap),
-        };
+        let contact = Contact { touch: plate.touch.unwrap_or(touching_distance(plate.gap)), area: plate.area };
+        let strength = plate.permittivity * plate.area;
+        let capacitor = Capacitor::Plates { strength, gap: plate.gap, closest: contact.least() };
         couplings.push((approach.a.body, approach.b.body));
-        gaps.push(Gap::Single { approach, capacitor, contact: Some(plate.height) });
+        gaps.push(Gap::Single { approach, capacitor, contact: Some(contact) });
         names.push(plate.name.clone());
     }
     for pair in &structure.beam_gaps {
@@ -50,9 +50,18 @@ pub fn lay(structure: &Structure, rigid: &Assembly) -> (Vec<Gap>, Vec<String>, V
             gap: pair.gap,
             strength: pair.permittivity * pair.height * pair.fringe,
             height: pair.height,
+            touch: pair.touch.unwrap_or(touching_distance(pair.gap)),
         };
         gaps.push(Gap::Facing { ends, side: pair.side, facing });
         names.push(pair.name.clone());
+    }
+    for stop in &structure.stops {
+        let b = stop.b.map_or(Point { body: BodyId::Ground, arm: Vector2::zeros() }, |b| rigid.point(b.0));
+        let approach = Approach { a: rigid.point(stop.a.0), b, axis: Vector2::new(stop.axis[0], stop.axis[1]) };
+        let law = stop.stiffness.map_or(Stop::Rigid(stop.area), Stop::Elastic);
+        couplings.push((approach.a.body, approach.b.body));
+        gaps.push(Gap::Stop { approach, ways: stop.ways, stop: law });
+        names.push(stop.name.clone());
     }
     (gaps, names, couplings)
 }
@@ -69,5 +78,6 @@ pub fn centered(gap: Gap, moved: &dyn Fn(Point) -> Point) -> Gap {
         Gap::Facing { ends: [first, second], side, facing } => {
             Gap::Facing { ends: [shift(first), shift(second)], side, facing }
         }
+        Gap::Stop { approach, ways, stop } => Gap::Stop { approach: shift(approach), ways, stop },
     }
 }

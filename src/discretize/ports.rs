@@ -65,7 +65,8 @@ pub fn lay(structure: &Structure, heated: &[usize], rigid: &Assembly) -> Result<
         });
     }
     let sources = ports + fixed.len();
-    let mut gap_rows = DMatrix::zeros(rows.len(), sources);
+    // stops have no field
+    let mut gap_rows = DMatrix::zeros(rows.len() + structure.stops.len(), sources);
     for (g, row) in rows.into_iter().enumerate() {
         match row {
             Ok(row) => gap_rows.view_mut((g, 0), (1, driven)).copy_from(&RowDVector::from_vec(row)),

@@ -3,9 +3,8 @@
 //! At constant voltages and temperatures Π = U(q) − Σ ½·C(q)·V² + contact − load · displacement, and kinetic energy plus Π
 //! does not change: what the sources deliver is in −½·C·V².
 
-use super::contact;
 use super::drive::Drive;
-use super::system::{Gap, System};
+use super::system::System;
 use crate::multibody::planar::{self, Pose};
 use crate::multibody::{BodyId, forces};
 
@@ -13,19 +12,12 @@ impl System {
     /// Potential Π(q) at a drive [J]; see [`crate::gaps::energy`].
     pub fn potential(&self, q: &[Pose], drive: &Drive) -> f64 {
         let mut sum = forces::strain_energy(&self.model, q, &drive.rest());
-        for (g, gap) in self.gaps.iter().enumerate() {
+        for g in 0..self.gaps.len() {
             if drive.volts[g] != 0.0 {
                 sum -= 0.5 * self.capacitance(g, q) * drive.volts[g] * drive.volts[g];
             }
-            sum += match gap {
-                Gap::Single { contact: None, .. } => 0.0,
-                Gap::Single { contact: Some(height), .. } => contact::energy(self.distance(g, q), *height),
-                Gap::Facing { ends, facing, .. } => ends
-                    .iter()
-                    .map(|end| contact::energy(facing.gap + end.value(q, self.model.linear), facing.height))
-                    .sum(),
-            };
         }
+        sum += self.contact_energy(q);
         for load in &self.loads {
             if let BodyId::Free(k) = load.point.body {
                 let moved = planar::point(&q[k], load.point.arm, self.model.linear);

@@ -1,11 +1,12 @@
-//! Two facing beams: C = ∫ ε·h·α/g(s) ds along their length, and SUGAR's contact at their ends.
+//! Two facing beams: C = ∫ ε·h·α/g(s) ds along their length, and contact along it.
 //!
 //! The gap is g(s) = g₀ + w(s), with w the cubic (Hermite) interpolation of the relative displacement and rotation of the
 //! two pairs of ends: z = (w₁, φ₁, w₂, φ₂). Parallel beams get exactly SUGAR's nodal forces and moments, pl/2 and pl²/12
 //! (its `gap2d`); tilted ones differ in second order, because here forces, stiffness and charge come from one potential.
-//! α is SUGAR's fringe factor 1 + 1.12·g₀/h. Quadrature: Gauss–Legendre with six points.
+//! α is SUGAR's fringe factor 1 + 1.12·g₀/h. Quadrature of the field: Gauss–Legendre with six points; of the contact
+//! pressure: Gauss–Lobatto with nine points, among them the ends, where tilted beams touch first, and the middle.
 
-use super::contact;
+use super::contact::Contact;
 use nalgebra::{Matrix4, Vector4};
 
 /// Abscissae and weights of six-point Gauss–Legendre quadrature on 0…1.
@@ -18,6 +19,19 @@ const GAUSS: [(f64, f64); 6] = [
     (0.966_234_757_101_576, 0.085_662_246_189_585_17),
 ];
 
+/// Abscissae and weights of nine-point Gauss–Lobatto quadrature on 0…1.
+const LOBATTO: [(f64, f64); 9] = [
+    (0.0, 0.013_888_888_888_888_89),
+    (0.050_121_002_294_270_02, 0.082_747_680_780_404_59),
+    (0.161_406_860_244_631_19, 0.137_269_356_250_081_19),
+    (0.318_441_268_086_910_92, 0.173_214_255_486_522_97),
+    (0.5, 0.185_759_637_188_208_62),
+    (0.681_558_731_913_089_13, 0.173_214_255_486_522_97),
+    (0.838_593_139_755_368_75, 0.137_269_356_250_081_19),
+    (0.949_878_997_705_730_03, 0.082_747_680_780_404_59),
+    (1.0, 0.013_888_888_888_888_89),
+];
+
 /// Constants of a pair of facing beams.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Facing {
@@ -27,8 +41,10 @@ pub struct Facing {
     pub gap: f64,
     /// ε·h·α, capacitance times gap per length [F].
     pub strength: f64,
-    /// Electrode height, which scales the contact force [m].
+    /// Electrode height h [m].
     pub height: f64,
+    /// Distance at which the beams touch [m].
+    pub touch: f64,
 }
 
 /// C(z) with gradient and Hessian.
@@ -46,29 +62,78 @@ impl Facing {
     /// Capacitance at the relative end displacements z = (w₁, φ₁, w₂, φ₂); positive w opens the gap.
     pub fn at(&self, z: &Vector4<f64>) -> FacingCapacitance {
         let mut c = FacingCapacitance { value: 0.0, gradient: Vector4::zeros(), hessian: Matrix4::zeros() };
-        let l = self.length;
+        let closest = self.least();
         for (s, weight) in GAUSS {
-            let n = Vector4::new(
-                1.0 - 3.0 * s * s + 2.0 * s * s * s,
-                l * (s - 2.0 * s * s + s * s * s),
-                3.0 * s * s - 2.0 * s * s * s,
-                l * (s * s * s - s * s),
-            );
+            let n = self.shape(s);
             let g = self.gap + n.dot(z);
-            let k = self.strength * l * weight;
-            let d = g.max(contact::FROZEN);
+            let k = self.strength * self.length * weight;
+            let d = g.max(closest);
             c.value += k * (1.0 / d + (d - g) / (d * d));
             c.gradient -= n * (k / (d * d));
-            if g > contact::FROZEN {
+            if g > closest {
                 c.hessian += n * n.transpose() * (2.0 * k / (d * d * d));
             }
         }
         c
     }
 
-    /// Contact force that opens each end [N] and its derivative [N/m].
-    pub fn contact(&self, z: &Vector4<f64>) -> [(f64, f64); 2] {
-        [contact::repulsion(self.gap + z[0], self.height), contact::repulsion(self.gap + z[2], self.height)]
+    /// Least distance that the law of contact knows [m]; the field goes on along its tangent below.
+    pub fn least(&self) -> f64 {
+        Contact { touch: self.touch, area: 0.0 }.least()
+    }
+
+    /// The cubic's weights at the share `s` of the length: g(s) = g₀ + n·z.
+    #[inline]
+    fn shape(&self, s: f64) -> Vector4<f64> {
+        let l = self.length;
+        Vector4::new(
+            1.0 - 3.0 * s * s + 2.0 * s * s * s,
+            l * (s - 2.0 * s * s + s * s * s),
+            3.0 * s * s - 2.0 * s * s * s,
+            l * (s * s * s - s * s),
+        )
+    }
+
+    /// Smallest distance among the points where contact is looked at [m], and its derivative with z.
+    pub fn closest(&self, z: &Vector4<f64>) -> (f64, Vector4<f64>) {
+        let at = LOBATTO.map(|(s, _)| (self.gap + self.shape(s).dot(z), s));
+        let (g, s) = at.into_iter().fold((f64::INFINITY, 0.0), |a, b| if b.0 < a.0 { b } else { a });
+        (g, self.shape(s))
+    }
+
+    /// True when the cubic stays above the touching distance, as its Bernstein coefficients do.
+    #[inline]
+    fn apart(&self, z: &Vector4<f64>) -> bool {
+        let third = self.length / 3.0;
+        let least = z[0].min(z[0] + third * z[1]).min(z[2] - third * z[3]).min(z[2]);
+        self.gap + least >= self.touch
+    }
+
+    fn piece(&self, weight: f64) -> Contact {
+        Contact { touch: self.touch, area: self.height * self.length * weight }
+    }
+
+    /// Gradient and Hessian of the contact's potential with z.
+    pub fn contact(&self, z: &Vector4<f64>) -> (Vector4<f64>, Matrix4<f64>) {
+        let (mut first, mut second) = (Vector4::zeros(), Matrix4::zeros());
+        if self.apart(z) {
+            return (first, second);
+        }
+        for (s, weight) in LOBATTO {
+            let n = self.shape(s);
+            let g = self.gap + n.dot(z);
+            if g < self.touch {
+                let (force, slope) = self.piece(weight).force(g);
+                first -= n * force;
+                second -= n * n.transpose() * slope;
+            }
+        }
+        (first, second)
+    }
+
+    /// Energy stored in the contact [J].
+    pub fn contact_energy(&self, z: &Vector4<f64>) -> f64 {
+        LOBATTO.iter().map(|&(s, weight)| self.piece(weight).energy(self.gap + self.shape(s).dot(z))).sum()
     }
 }
 
@@ -77,7 +142,7 @@ mod tests {
     use super::*;
 
     fn facing() -> Facing {
-        Facing { length: 100e-6, gap: 2e-6, strength: 8.854e-12 * 2e-6, height: 2e-6 }
+        Facing { length: 100e-6, gap: 2e-6, strength: 8.854e-12 * 2e-6, height: 2e-6, touch: 0.1e-6 }
     }
 
     /// Parallel beams: C = εhl/g, and the work-equivalent nodal loads of a uniform pressure, l/2 and l²/12 (SUGAR gap2d).
@@ -108,5 +173,30 @@ mod tests {
             let column = (hi.gradient - lo.gradient) / (2.0 * step);
             assert!((column - c.hessian.column(i)).norm() < 1e-6 * c.hessian.column(i).norm());
         }
+    }
+
+    /// Contact's gradient is the derivative of its energy and its Hessian that of the gradient, on a tilted, bent pair that
+    /// touches along a part: central differences. Parallel beams bear p·h·l whatever the length of the elements.
+    #[test]
+    fn contact_comes_from_one_potential() {
+        let f = facing();
+        let z = Vector4::new(-1.93e-6, 2e-4, -1.915e-6, 3e-4);
+        let (first, second) = f.contact(&z);
+        for i in 0..4 {
+            let step = if i % 2 == 0 { 1e-12 } else { 1e-8 };
+            let (mut lo, mut hi) = (z, z);
+            lo[i] -= step;
+            hi[i] += step;
+            let slope = (f.contact_energy(&hi) - f.contact_energy(&lo)) / (2.0 * step);
+            assert!((slope - first[i]).abs() < 1e-5 * first[i].abs(), "{i}: {slope} {}", first[i]);
+            let column = (f.contact(&hi).0 - f.contact(&lo).0) / (2.0 * step);
+            assert!((column - second.column(i)).norm() < 1e-5 * column.norm(), "{i}");
+        }
+        let flat = Vector4::new(-1.92e-6, 0.0, -1.92e-6, 0.0);
+        let half = Facing { length: 50e-6, ..f };
+        let sum = |f: &Facing| f.contact(&flat).0[0] + f.contact(&flat).0[2];
+        let pressure = Contact { touch: 0.1e-6, area: 1.0 }.force(0.08e-6).0;
+        assert!((sum(&f) / (-pressure * 2e-6 * 100e-6) - 1.0).abs() < 1e-9);
+        assert!((2.0 * sum(&half) / sum(&f) - 1.0).abs() < 1e-9);
     }
 }

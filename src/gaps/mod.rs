@@ -12,12 +12,14 @@
 //! | [`approach`] | the scalar a gap measures between two material points, and its derivatives |
 //! | [`backbending`] | the strength of a hot arm, beyond which it is shortened for good |
 //! | [`capacitor`] | C(u) of a comb and of parallel plates |
-//! | [`contact`] | SUGAR's repulsion of nearly closed gaps |
+//! | [`contact`] | pressure between surfaces that touch |
 //! | [`facing`] | two facing beams: pressure along a gap that varies over their length |
 //! | [`network`] | potentials of a resistive network driven by ports and sources |
 //! | [`thermal`] | mean temperature rise of beams that carry current; its lag in time |
 //! | [`drive`] | ports → gap voltages and free strains, at a time within a step |
 //! | [`energy`] | the potential of it all, and the energy that an undamped motion keeps |
+//! | [`stop`] | how a stop bears |
+//! | `touching` | which gaps touch, and the energy in contacts |
 //! | [`system`] | a multibody model with its gaps, loads and network: what `solve` works on |
 
 pub mod approach;
@@ -28,8 +30,10 @@ pub mod drive;
 pub mod energy;
 pub mod facing;
 pub mod network;
+pub mod stop;
 pub mod system;
 pub mod thermal;
+mod touching;
 
 pub use drive::{Drive, Ramp};
 pub use system::{Gap, Load, Point, System};

@@ -5,9 +5,10 @@
 use super::approach::Approach;
 pub use super::approach::Point;
 use super::capacitor::{Capacitance, Capacitor};
-use super::contact;
+use super::contact::Contact;
 use super::drive::{Drive, Electrics};
 use super::facing::Facing;
+use super::stop::{self, Stop};
 use crate::multibody::planar::{self, Pose};
 use crate::multibody::{BlockMatrix, BodyId, Model, forces};
 use nalgebra::{SMatrix, SVector, Vector2, Vector4};
@@ -21,8 +22,8 @@ pub enum Gap {
         approach: Approach,
         /// C(u).
         capacitor: Capacitor,
-        /// Electrode height for the contact force [m]; none: no contact.
-        contact: Option<f64>,
+        /// How the parts touch; none: never.
+        contact: Option<Contact>,
     },
     /// Two facing beams with ends a–c and b–d.
     Facing {
@@ -32,6 +33,15 @@ pub enum Gap {
         side: f64,
         /// Constants.
         facing: Facing,
+    },
+    /// A stop, without a field.
+    Stop {
+        /// What it measures.
+        approach: Approach,
+        /// Way along the approach and against it until they touch [m].
+        ways: [Option<f64>; 2],
+        /// How it bears.
+        stop: Stop,
     },
 }
 
@@ -144,6 +154,7 @@ impl System {
         match &self.gaps[gap] {
             Gap::Single { approach, capacitor, .. } => capacitor.at(approach.value(q, self.model.linear)).value,
             Gap::Facing { ends, side, facing } => facing.at(&self.ends(ends, *side, q)).value,
+            Gap::Stop { .. } => 0.0,
         }
     }
 
@@ -158,24 +169,19 @@ impl System {
             }
             Gap::Facing { ends, side, facing } => {
                 let c = facing.at(&self.ends(ends, *side, q));
-                let rows = self.end_rows(ends, *side, q).0;
-                let mut d = Quad::zeros();
-                for (i, id) in quad(ends).into_iter().enumerate() {
-                    d.fixed_rows_mut::<3>(3 * i).copy_from(&Model::pose(dq, id));
-                }
-                c.gradient.dot(&(rows * d))
+                c.gradient.dot(&self.end_changes(ends, *side, q, dq))
             }
+            Gap::Stop { .. } => 0.0,
         }
     }
 
-    /// Distance left in a gap [m]: overlap of a comb, gap of plates, smaller end gap of facing beams.
+    /// Distance left in a gap [m]: overlap of a comb, gap of plates, smallest gap of facing beams, way left to the nearer side of
+    /// a stop.
     pub fn distance(&self, gap: usize, q: &[Pose]) -> f64 {
         match &self.gaps[gap] {
             Gap::Single { approach, capacitor, .. } => capacitor.distance(approach.value(q, self.model.linear)),
-            Gap::Facing { ends, side, facing } => {
-                let z = self.ends(ends, *side, q);
-                facing.gap + z[0].min(z[2])
-            }
+            Gap::Facing { ends, side, facing } => facing.closest(&self.ends(ends, *side, q)).0,
+            Gap::Stop { approach, ways, .. } => stop::nearer(ways, approach.value(q, self.model.linear)).0,
         }
     }
 
@@ -188,21 +194,14 @@ impl System {
         match &self.gaps[gap] {
             Gap::Single { approach, capacitor: Capacitor::Comb { .. }, .. } => along(approach),
             Gap::Single { approach, .. } => -along(approach),
-            Gap::Facing { ends, side, .. } => {
-                let z = self.ends(ends, *side, q);
-                along(&ends[usize::from(z[2] < z[0])])
+            Gap::Facing { ends, side, facing } => {
+                let (_, weights) = facing.closest(&self.ends(ends, *side, q));
+                weights.dot(&self.end_changes(ends, *side, q, dq))
+            }
+            Gap::Stop { approach, ways, .. } => {
+                stop::nearer(ways, approach.value(q, self.model.linear)).1 * along(approach)
             }
         }
-    }
-
-    /// True when some gap is so far closed that its contact force acts.
-    pub fn in_contact(&self, q: &[Pose]) -> bool {
-        (0..self.gaps.len()).any(|g| self.touches(g) && self.distance(g, q) < contact::RANGE)
-    }
-
-    /// True when a gap has a contact force.
-    pub fn touches(&self, gap: usize) -> bool {
-        !matches!(&self.gaps[gap], Gap::Single { contact: None, .. })
     }
 
     fn add_loads(&self, q: &[Pose], scale: f64, r: &mut [Pose]) {
@@ -230,8 +229,8 @@ impl System {
             Gap::Single { approach, capacitor, contact } => {
                 let m = approach.measure(q, self.model.linear);
                 let mut first = factor * capacitor.at(m.value).slope;
-                if let (true, Some(height)) = (touch, contact) {
-                    first += contact::repulsion(capacitor.distance(m.value), *height).0;
+                if let (true, Some(contact)) = (touch, contact) {
+                    first += contact.force(capacitor.distance(m.value)).0;
                 }
                 let f = m.gradient * first;
                 for (id, part) in [(approach.a.body, f.fixed_rows::<3>(0)), (approach.b.body, f.fixed_rows::<3>(3))] {
@@ -242,11 +241,30 @@ impl System {
             }
             Gap::Facing { ends, side, facing } => {
                 let z = self.ends(ends, *side, q);
-                let first = facing_first(facing, &z, factor, touch);
+                let mut first = facing.at(&z).gradient * factor;
+                if touch {
+                    first += facing.contact(&z).0;
+                }
                 let f = self.end_rows(ends, *side, q).0.transpose() * first;
                 for (i, id) in quad(ends).into_iter().enumerate() {
                     if let BodyId::Free(k) = id {
                         r[k] += f.fixed_rows::<3>(3 * i);
+                    }
+                }
+            }
+            Gap::Stop { approach, ways, stop } => {
+                if !touch {
+                    return;
+                }
+                let m = approach.measure(q, self.model.linear);
+                let first = stop.bearing(ways, m.value).0;
+                if first == 0.0 {
+                    return;
+                }
+                let f = m.gradient * first;
+                for (id, part) in [(approach.a.body, f.fixed_rows::<3>(0)), (approach.b.body, f.fixed_rows::<3>(3))] {
+                    if let BodyId::Free(k) = id {
+                        r[k] += part;
                     }
                 }
             }
@@ -260,21 +278,19 @@ impl System {
                 let m = approach.measure(q, self.model.linear);
                 let Capacitance { slope, curvature, .. } = capacitor.at(m.value);
                 let (mut first, mut second) = (factor * slope, factor * curvature);
-                if let Some(height) = contact {
-                    let (force, stiffness) = contact::repulsion(capacitor.distance(m.value), *height);
+                if let Some(contact) = contact {
+                    let (force, slope) = contact.force(capacitor.distance(m.value));
                     first += force;
-                    second -= stiffness; // the distance shrinks as u grows
+                    second -= slope; // the distance shrinks as u grows
                 }
                 let h = m.hessian(first, second);
                 self.model.place(approach.a.body, approach.b.body).add(tangent, &h);
             }
             Gap::Facing { ends, side, facing } => {
                 let z = self.ends(ends, *side, q);
-                let first = facing_first(facing, &z, factor, true);
-                let mut hz = facing.at(&z).hessian * factor;
-                let touch = facing.contact(&z);
-                hz[(0, 0)] -= touch[0].1;
-                hz[(2, 2)] -= touch[1].1;
+                let (field, (touch, stiffness)) = (facing.at(&z), facing.contact(&z));
+                let first = field.gradient * factor + touch;
+                let hz = field.hessian * factor + stiffness;
                 let (rows, bend) = self.end_rows(ends, *side, q);
                 let mut h: SMatrix<f64, 12, 12> = rows.transpose() * hz * rows;
                 for i in 0..4 {
@@ -282,6 +298,14 @@ impl System {
                     h[(3 * i + 2, 3 * i + 2)] += first[2 * (i % 2)] * bend[i];
                 }
                 self.add_quad(&quad(ends), &h, tangent);
+            }
+            Gap::Stop { approach, ways, stop } => {
+                let m = approach.measure(q, self.model.linear);
+                let (first, second) = stop.bearing(ways, m.value);
+                if first != 0.0 {
+                    let h = m.hessian(first, second);
+                    self.model.place(approach.a.body, approach.b.body).add(tangent, &h);
+                }
             }
         }
     }
@@ -302,10 +326,19 @@ impl System {
         }
     }
 
-    fn ends(&self, ends: &[Approach; 2], side: f64, q: &[Pose]) -> Vector4<f64> {
+    pub(super) fn ends(&self, ends: &[Approach; 2], side: f64, q: &[Pose]) -> Vector4<f64> {
         let w = |e: &Approach| e.value(q, self.model.linear);
         let turn = |e: &Approach| side * (e.a.rotation(q) - e.b.rotation(q));
         Vector4::new(w(&ends[0]), turn(&ends[0]), w(&ends[1]), turn(&ends[1]))
+    }
+
+    /// Change of z with a change `dq` of the configuration.
+    pub(super) fn end_changes(&self, ends: &[Approach; 2], side: f64, q: &[Pose], dq: &[Pose]) -> Vector4<f64> {
+        let mut d = Quad::zeros();
+        for (i, id) in quad(ends).into_iter().enumerate() {
+            d.fixed_rows_mut::<3>(3 * i).copy_from(&Model::pose(dq, id));
+        }
+        self.end_rows(ends, side, q).0 * d
     }
 
     /// ∂z/∂(bodies a, b, c, d), and ∂²w/∂θ² of each body.
@@ -324,16 +357,6 @@ impl System {
         }
         (rows, bend)
     }
-}
-
-fn facing_first(facing: &Facing, z: &Vector4<f64>, factor: f64, touch: bool) -> Vector4<f64> {
-    let mut first = facing.at(z).gradient * factor;
-    if touch {
-        let ends = facing.contact(z);
-        first[0] -= ends[0].0;
-        first[2] -= ends[1].0;
-    }
-    first
 }
 
 fn quad(ends: &[Approach; 2]) -> [BodyId; 4] {

@@ -196,6 +196,7 @@ fn acted_on(structure: &Structure) -> Vec<NodeId> {
     nodes.extend(structure.combs.iter().flat_map(|c| [c.a, c.b]));
     nodes.extend(structure.plate_gaps.iter().flat_map(|g| [g.a, g.b]));
     nodes.extend(structure.beam_gaps.iter().flat_map(|g| g.nodes));
+    nodes.extend(structure.stops.iter().flat_map(|s| [Some(s.a), s.b]).flatten());
     nodes.sort_unstable();
     nodes.dedup();
     nodes

@@ -46,6 +46,18 @@ pub struct ContinuationOptions {
     pub iterations: usize,
     /// Longest step in s, default 0.04 of the way. Smaller: more points.
     pub longest: f64,
+    /// Longest step as a share of s, default 0: where it exceeds `longest`, steps grow with s.
+    pub growth: f64,
+    /// The path arrives where s comes to this, default 1.
+    pub target: f64,
+    /// Largest change of a gap in one step, as a share of what is left of it, default 0.2: no step leads across a gap to
+    /// another branch. Smaller: more points.
+    pub closing: f64,
+    /// Largest distance of a point from where the tangent led, in steps, default 0.5. Tangents as straight as `straightness`
+    /// asks for lead within 0.1; what is further off lies on another branch.
+    pub aside: f64,
+    /// End where stability is lost, at a fold or a bifurcation; default false.
+    pub stop_at_loss: bool,
     /// Smallest step, in s and in length scales, default 1e-9: below it the path is lost.
     pub smallest: f64,
     /// Smallest cosine between the tangents at both ends of a step, default 0.98. Larger: more points where the path bends.
@@ -64,6 +76,11 @@ impl Default for ContinuationOptions {
             tolerance: 1e-9,
             iterations: 8,
             longest: 0.04,
+            growth: 0.0,
+            target: 1.0,
+            closing: 0.2,
+            aside: 0.5,
+            stop_at_loss: false,
             smallest: 1e-9,
             straightness: 0.98,
             points: PATH_POINTS.count(),
@@ -96,11 +113,13 @@ pub enum Event {
 /// Why a path ends.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum PathEnd {
-    /// It came to s = 1.
+    /// It came to the last s asked for.
     #[default]
     Arrived,
     /// s fell below the lowest one asked for.
     TurnedBack,
+    /// It lost its stability, and was to end there.
+    Unstable,
     /// It has as many points as asked for.
     Full,
     /// The next point was not found even with the smallest step.
@@ -164,7 +183,7 @@ impl Continuation {
         }
     }
 
-    /// Traces the path from the equilibrium `q` at s = 0 until s = 1. `watch` hears of each point's s and may stop.
+    /// Traces the path from the equilibrium `q` at s = 0 until the last s asked for. `watch` hears of each point's s and may stop.
     ///
     /// # Errors
     /// [`SolveError::Singular`] where a body moves freely at the start; [`SolveError::Lost`] where `q` is no equilibrium.
@@ -186,11 +205,15 @@ impl Continuation {
             if traced.points.len() >= self.options.points {
                 break PathEnd::Full;
             }
-            let longest = self.options.longest / here.ds.abs().max(1e-3);
-            step = step.min(longest);
+            let longest = self.options.longest.max(self.options.growth * here.s.abs());
+            step = step.min(longest / here.ds.abs().max(1e-3));
             let Some((next, cost)) = self.advance(family, &here, &mut step) else { break PathEnd::Lost };
+            let lost = next.negative > here.negative;
             let branched = self.note(family, &here, &next, step, &mut traced);
-            let arrived = next.s >= 1.0 && branched.is_none();
+            if lost && self.options.stop_at_loss {
+                break PathEnd::Unstable;
+            }
+            let arrived = next.s >= self.options.target && branched.is_none();
             here = branched.unwrap_or(next);
             if arrived {
                 let last = self.land(family, &traced, here);
@@ -236,7 +259,8 @@ impl Continuation {
                 let changed = here.negative.abs_diff(next.negative);
                 // one event a step, so that each is found
                 let simple = if folded { changed == 1 } else { changed <= 1 };
-                if cosine >= self.options.straightness && (simple || *step < 1e-3) {
+                let near = self.keeps_branch(family, here, &next, *step);
+                if near && cosine >= self.options.straightness && (simple || *step < 1e-3) {
                     return Some((next, cost));
                 }
             }
@@ -245,6 +269,19 @@ impl Continuation {
                 return None;
             }
         }
+    }
+
+    /// True when a step stayed on its branch: it closed or opened no gap by much, and ends near where the tangent led.
+    fn keeps_branch(&self, family: &Blend, here: &Place, next: &Place, step: f64) -> bool {
+        let system = family.system();
+        let leap = (0..system.gaps.len()).filter(|&g| system.touching(g).is_some()).any(|g| {
+            let (a, b) = (system.room(g, &here.q), system.room(g, &next.q));
+            (a - b).abs() > self.options.closing * a.min(b)
+        });
+        let off = next.q.iter().zip(&here.q).zip(&here.dq).map(|((a, b), dq)| a - b - dq * step);
+        let off: f64 = off.map(|x| dot(system, &x, &x)).sum::<f64>() / here.q.len() as f64;
+        let aside = (off + (next.s - here.s - here.ds * step).powi(2)).sqrt();
+        !leap && aside <= self.options.aside * step
     }
 
     /// The point at arc length `distance` from `here`, with its tangent.
@@ -374,19 +411,19 @@ impl Continuation {
         self.branch_off(family, &at)
     }
 
-    /// The point at s = 1 exactly, from the two points around it.
+    /// The point at the last s exactly, from the two points around it.
     fn land(&mut self, family: &mut Blend, traced: &Traced, past: Place) -> PathPoint {
         let Some(before) = traced.points.last() else { return point(&past) };
-        let share = if past.s > before.s { (1.0 - before.s) / (past.s - before.s) } else { 1.0 };
+        let share = if past.s > before.s { (self.options.target - before.s) / (past.s - before.s) } else { 1.0 };
         let mut guess = past.clone();
         for (q, before) in guess.q.iter_mut().zip(&before.q) {
             *q = before + (*q - before) * share;
         }
-        guess.s = 1.0;
+        guess.s = self.options.target;
         let zeros = vec![Pose::zeros(); guess.q.len()];
         let plane = Plane { from: &guess, dq: &zeros, ds: 1.0, distance: 0.0 };
         match self.correct(family, &plane, guess.clone()) {
-            Ok((place, _)) => PathPoint { s: 1.0, ..point(&place) },
+            Ok((place, _)) => PathPoint { s: self.options.target, ..point(&place) },
             Err(_) => point(&past),
         }
     }

@@ -208,6 +208,16 @@ impl Equilibrium {
         Corrected::No
     }
 
+    /// Lets the system fall at the loads of `s` from `q`, as an overdamped motion, to a stable equilibrium; `q` becomes that.
+    ///
+    /// # Errors
+    /// [`SolveError::Lost`] where it falls without end.
+    pub fn settle(&mut self, system: &System, path: &dyn LoadPath, s: f64, q: &mut [Pose]) -> Result<Path, SolveError> {
+        let mut done = Path::default();
+        self.fall(system, path, s, q, &mut done)?;
+        Ok(done)
+    }
+
     /// Lets the system fall at fixed loads, as an overdamped motion, to a stable equilibrium.
     fn fall(
         &mut self,

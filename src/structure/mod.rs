@@ -212,13 +212,14 @@ pub struct PlateGap {
     pub gap: f64,
     /// Permittivity ε [F/m].
     pub permittivity: f64,
-    /// Height that scales SUGAR's contact force [m]; its law is for 2 µm.
-    pub height: f64,
+    /// Distance at which the plates touch [m]; none: that of nearly closed gaps of their size.
+    #[serde(default)]
+    pub touch: Option<f64>,
     /// Where its voltage comes from.
     pub voltage: GapVoltage,
 }
 
-/// Two facing beams `a`–`b` and `c`–`d` (SUGAR's gap2d family): pressure ½εV²/g(s)² along their length, contact at the ends.
+/// Two facing beams `a`–`b` and `c`–`d` (SUGAR's gap2d family): pressure ½εV²/g(s)² and contact along their length.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct BeamGap {
     /// Full element name.
@@ -239,8 +240,30 @@ pub struct BeamGap {
     pub permittivity: f64,
     /// Factor on capacitance and force for the fringe field, 1 + 1.12·gap/h in SUGAR [1].
     pub fringe: f64,
+    /// Distance at which the beams touch [m]; none: that of nearly closed gaps of their size.
+    #[serde(default)]
+    pub touch: Option<f64>,
     /// Where its voltage comes from.
     pub voltage: GapVoltage,
+}
+
+/// A stop: how far one node may move along an axis towards another before they touch, and against it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Stop {
+    /// Full element name.
+    pub name: String,
+    /// Moving node.
+    pub a: NodeId,
+    /// What it meets; none: the ground.
+    pub b: Option<NodeId>,
+    /// Unit vector of the motion.
+    pub axis: [f64; 2],
+    /// Way along the axis and against it until they touch [m]; none: no stop on that side.
+    pub ways: [Option<f64>; 2],
+    /// Stiffness of the stop [N/m]; none: rigid.
+    pub stiffness: Option<f64>,
+    /// Area on which a rigid stop bears [m²].
+    pub area: f64,
 }
 
 /// A linear resistor between two electrical nodes.
@@ -314,6 +337,9 @@ pub struct Structure {
     pub plate_gaps: Vec<PlateGap>,
     /// Facing beams.
     pub beam_gaps: Vec<BeamGap>,
+    /// Stops.
+    #[serde(default)]
+    pub stops: Vec<Stop>,
     /// Resistors.
     pub resistors: Vec<Resistor>,
     /// Voltage sources of the netlist.

@@ -3,6 +3,7 @@
 mod backbending;
 mod baselines;
 mod beams;
+mod contact;
 mod electrothermal;
 mod examples;
 mod formulations;

@@ -74,12 +74,13 @@ fn runs_repeat_and_can_be_stopped() {
 }
 
 /// Undamped dynamic pull-in of the lumped plate lies between 0.999 and 1.001 of √(27/32) of the static one, 4.7527 V: a step
-/// just below swings back, a step just above closes the gap.
+/// just below swings back, a step just above closes the gap. (The plate bounces at once, 0.1 µm from the electrode: samples of 75 ns
+/// catch it within 50 nm of that.)
 #[test]
 fn dynamic_pull_in() {
     let compiled = model(crate::gaps::PLATE, &CompileOptions::default());
     let reach = |volts: f64| {
-        let asked = TransientOptions { voltages: vec![("drive".into(), volts)], ..options(3e-4, None) };
+        let asked = TransientOptions { voltages: vec![("drive".into(), volts)], points: 4001, ..options(3e-4, None) };
         run(&compiled, &asked).1.into_iter().fold(0.0, f64::max)
     };
     let below = reach(4.7527 * 0.999);

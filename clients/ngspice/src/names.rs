@@ -27,7 +27,8 @@ pub(crate) fn respell(card: &mut ModelCard, structure: &Structure) {
         .chain(structure.beams.iter().map(|b| b.name.as_str()))
         .chain(structure.combs.iter().map(|c| c.name.as_str()))
         .chain(structure.plate_gaps.iter().map(|g| g.name.as_str()))
-        .chain(structure.beam_gaps.iter().map(|g| g.name.as_str()));
+        .chain(structure.beam_gaps.iter().map(|g| g.name.as_str()))
+        .chain(structure.stops.iter().map(|s| s.name.as_str()));
     for monitor in &mut card.monitors {
         if let Some((owner, quantity)) = monitor.signal.rsplit_once('.') {
             let owner = spelled(owner, owners.clone()).unwrap_or(owner);

@@ -2,13 +2,12 @@
 
 use super::super::drawing::Fact;
 use super::super::sink::Reported;
+use super::super::value::short;
 use super::arguments::Site;
 use crate::structure::{BeamGap, GapVoltage, NodeId, PlateGap, Resistor};
 
 /// SUGAR's factor on the fringe field: α = 1 + 1.12·gap/h.
 const FRINGE: f64 = 1.12;
-/// Height for the contact force where nothing gives one [m]: the height SUGAR's law is scaled to.
-const CONTACT_HEIGHT: f64 = 2e-6;
 
 impl Site<'_, '_> {
     /// Widths of the upper and the lower beam [m]: `w1` and `w2`, or `w` for both.
@@ -24,6 +23,19 @@ impl Site<'_, '_> {
         Ok(widths)
     }
 
+    /// Distance at which electrodes drawn `gap` apart touch [m], if it is given.
+    fn touch(&mut self, gap: f64) -> Result<Option<f64>, Reported> {
+        let touch = self.positive_if_any("touch")?;
+        if let Some(touch) = touch
+            && touch >= gap
+        {
+            let message = format!("`touch` is {} m, but the parts are drawn only {} m apart", short(touch), short(gap));
+            let help = "give a distance below `gap`: the thickness of the insulation, or the height of the bumps";
+            return Err(self.sink.error("E060", self.span_of("touch"), message, help));
+        }
+        Ok(touch)
+    }
+
     /// The field between two facing beams. Node c lies at local y = −(gap + (w1+w2)/2) under a, d under b.
     fn facing(&mut self, voltage: GapVoltage) -> Result<(), Reported> {
         let angle = self.direction(self.instance.rotation)?;
@@ -31,6 +43,7 @@ impl Site<'_, '_> {
         let [w1, w2] = self.widths()?;
         let (length, gap, height) = (self.positive("l")?, self.positive("gap")?, self.positive("h")?);
         let permittivity = self.permittivity()?;
+        let touch = self.touch(gap)?;
         let below = -(gap + (w1 + w2) / 2.0);
         let nodes: [NodeId; 4] = std::array::from_fn(|i| self.node(i));
         let offsets = [[0.0; 2], [length, 0.0], [0.0, below], [length, below]].map(|v| self.global(v));
@@ -45,6 +58,7 @@ impl Site<'_, '_> {
             height,
             permittivity,
             fringe: 1.0 + FRINGE * gap / height,
+            touch,
             voltage,
         });
         Ok(())
@@ -109,12 +123,12 @@ pub(super) fn plategap2d(site: &mut Site<'_, '_>) -> Result<(), Reported> {
     let angle = site.direction(site.instance.rotation)?;
     let (area, gap) = (site.positive("A")?, site.positive("gap")?);
     let permittivity = site.permittivity()?;
-    let height = site.positive_if_any("h")?.unwrap_or(CONTACT_HEIGHT);
+    let touch = site.touch(gap)?;
     let axis = [angle.cos(), angle.sin()];
     let (a, b) = (site.node(0), site.node(1));
     let voltage = site.across(0, 1);
     site.drawing.place(site.instance.span, &[a, b], &[[0.0; 2], [gap * axis[0], gap * axis[1]]]);
     let name = site.name();
-    site.drawing.structure.plate_gaps.push(PlateGap { name, a, b, axis, area, gap, permittivity, height, voltage });
+    site.drawing.structure.plate_gaps.push(PlateGap { name, a, b, axis, area, gap, permittivity, touch, voltage });
     Ok(())
 }

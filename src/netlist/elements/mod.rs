@@ -8,6 +8,7 @@ mod gap;
 mod load;
 mod lumped;
 mod material;
+mod stop;
 mod support;
 mod table;
 

@@ -2,7 +2,7 @@
 
 use super::super::sink::Reported;
 use super::arguments::Site;
-use super::{beam, circuit, comb, gap, load, lumped, support};
+use super::{beam, circuit, comb, gap, load, lumped, stop, support};
 
 /// An element of the language.
 pub(crate) struct Model {
@@ -53,9 +53,9 @@ const BEAM: &[&str] = &["l", "w", "h", "T", "curvature"];
 const BEAM_E: &[&str] = &["l", "w", "h", "T", "curvature", "R", "G", "resistivity"];
 const LINK: &[&str] = &["l", "w", "h", "T", "L1", "ox1", "oy1", "oz1", "L2", "ox2", "oy2", "oz2"];
 const SIZE: &[&str] = &["l", "w", "h"];
-const GAP: &[&str] = &["l", "w", "w1", "w2", "gap", "h", "V", "permittivity"];
+const GAP: &[&str] = &["l", "w", "w1", "w2", "gap", "h", "V", "permittivity", "touch"];
 const GAP_E: &[&str] =
-    &["l", "w", "w1", "w2", "gap", "h", "R", "R1", "R2", "G", "G1", "G2", "resistivity", "permittivity"];
+    &["l", "w", "w1", "w2", "gap", "h", "R", "R1", "R2", "G", "G1", "G2", "resistivity", "permittivity", "touch"];
 const LOAD: &[&str] = &["F", "M"];
 
 const fn sugar(
@@ -115,7 +115,8 @@ pub(crate) const MODELS: &[Model] = &[
     own("spring2d", &[2], "[a b]", &["kx", "ky", "krz", "l"], lumped::spring2d),
     own("damper2d", &[2], "[a b]", &["bx", "by", "brz", "l"], lumped::damper2d),
     own("guide2d", &[1], "[n]", &[], support::guide2d),
-    own("plategap2d", &[2], "[a b]", &["A", "gap", "h", "permittivity"], gap::plategap2d),
+    own("plategap2d", &[2], "[a b]", &["A", "gap", "permittivity", "touch"], gap::plategap2d),
+    own("stop2d", &[1, 2], "[a] or [a b]", &["gap", "back", "k", "A"], stop::stop2d),
     own("comb2de", &[2], "[a b]", &["N", "gap", "l", "L", "w", "h", "Cp", "permittivity"], comb::comb2de),
     own(
         "beam2det",
@@ -165,6 +166,9 @@ pub(super) fn meaning(name: &str) -> &'static str {
         "L" => "finger length [m]",
         "L1" | "L2" => "length of a rigid arm [m]",
         "gap" => "gap [m]",
+        "back" => "way against local x [m]",
+        "k" => "stiffness [N/m]",
+        "touch" => "distance at which the parts touch [m]",
         "N" => "number of gaps [1]",
         "A" => "area [m²]",
         "V" => "voltage [V]",

@@ -76,12 +76,17 @@ pub fn modes_from_wire(wire: proto::ModesResponse) -> ModesResult {
 
 /// Pull-in as it travels.
 pub fn pull_in_to_wire(result: &PullInResult) -> proto::PullInResponse {
-    proto::PullInResponse { port: result.port.clone(), pull_in_v: result.pull_in_v, release_v: result.release_v }
+    proto::PullInResponse {
+        port: result.port.clone(),
+        pull_in_v: result.pull_in_v,
+        release_v: result.release_v,
+        unheld: !result.held,
+    }
 }
 
 /// Pull-in back.
 pub fn pull_in_from_wire(wire: proto::PullInResponse) -> PullInResult {
-    PullInResult { port: wire.port, pull_in_v: wire.pull_in_v, release_v: wire.release_v }
+    PullInResult { port: wire.port, pull_in_v: wire.pull_in_v, release_v: wire.release_v, held: !wire.unheld }
 }
 
 /// The end of a transient as it travels.

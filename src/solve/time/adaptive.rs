@@ -3,7 +3,9 @@
 //!
 //! The error of a step is measured in the mass norm, ‖e‖² = eᵀMe, which has one unit for translations and rotations:
 //! √(‖e_q‖² + h²‖e_v‖²) must stay below tol·(‖q‖ + floor), with ‖q‖ the larger of both ends and a floor of 1e-4 of the
-//! model's length scale. The next step is 0.9·err^(−1/p) times the last, between 0.2 and 5 times, where the estimated
+//! model's length scale. Where parts touch, the time of a bounce is nothing beside that of the motion, and a displacement
+//! beside its reach: there the error of the energy, |vᵀMe_v| + |work of the contact forces over e_q|, must also stay below
+//! tol·(kinetic energy + energy in the contacts). The next step is 0.9·err^(−1/p) times the last, between 0.2 and 5 times, where the estimated
 //! error falls with the p-th power of the step (Hairer & Wanner 1996, §IV.8).
 
 use super::method::{Method, Motion, StepFailure, Work};
@@ -11,6 +13,7 @@ use super::rodas4::Rodas4;
 use super::step_size;
 use crate::gaps::{Ramp, System};
 use crate::multibody::planar::Pose;
+use crate::solve::frequency::eigen::mass_product;
 use crate::solve::{SolveError, WhyFailed};
 
 /// Share of the length scale below which a displacement's relative error does not count.
@@ -195,7 +198,21 @@ impl<M: Method> Adaptive<M> {
         let (eq, ev) = (norm(&self.error.q), norm(&self.error.v));
         let reach = norm(&self.before.q).max(norm(&after.q)) + FLOOR * system.length_scale * self.mass.sqrt();
         let error = (eq * eq + h * h * ev * ev).sqrt() / (tol * reach);
+        let error = error.max(self.contact_error(system, after, tol));
         if error.is_nan() { f64::INFINITY } else { error }
+    }
+
+    /// Error of the energy over a step that begins or ends in contact; 0 elsewhere.
+    fn contact_error(&self, system: &System, after: &Motion, tol: f64) -> f64 {
+        let stored = system.contact_energy(&self.before.q).max(system.contact_energy(&after.q));
+        if stored == 0.0 {
+            return 0.0;
+        }
+        let model = &system.model;
+        let kinetic =
+            0.5 * mass_product(model, &after.v, &after.v).max(mass_product(model, &self.before.v, &self.before.v));
+        let work = system.contact_work(&after.q, &self.error.q);
+        (mass_product(model, &after.v, &self.error.v).abs() + work) / (tol * (kinetic + stored))
     }
 
     fn too_small(&self, system: &System, t: f64, dt: f64, rejected: usize) -> SolveError {
@@ -232,5 +249,5 @@ fn not_finite(motion: &Motion) -> Option<(usize, usize)> {
 
 /// √(xᵀMx).
 fn mass_norm(system: &System, x: &[Pose]) -> f64 {
-    crate::solve::frequency::eigen::mass_product(&system.model, x, x).sqrt()
+    mass_product(&system.model, x, x).sqrt()
 }
