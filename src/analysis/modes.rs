@@ -8,7 +8,7 @@ use crate::multibody::BlockMatrix;
 use crate::multibody::forces::add_inertia;
 use crate::multibody::planar::Pose;
 use crate::refine::order_error::{of_modes, own_stiffness};
-use crate::solve::eigen::lowest_modes;
+use crate::solve::eigen::{RELIABLE, lowest_modes};
 use serde::Serialize;
 
 /// Undamped modes.
@@ -18,7 +18,8 @@ pub struct ModesResult {
     pub frequencies_hz: Vec<f64>,
     /// For each mode, the displacement of every mechanical node (largest translation 1), in netlist order.
     pub shapes: Vec<Vec<(String, NodeMotion)>>,
-    /// For each mode, the residual ‖x − λK⁻¹Mx‖ in the mass norm, about the relative error of its shape [1].
+    /// For each mode, the residual ‖(K + λM)⁻¹(Kx − λMx)‖ in the mass norm, about the relative error of its shape; the
+    /// frequency is off by the square [1].
     pub residuals: Vec<f64>,
     /// For each mode, the estimated relative error of its frequency by the number of segments [1], signed; none where no
     /// estimate can be made: for the baselines, and about a loaded equilibrium with rigid beams or schemes other than
@@ -27,9 +28,6 @@ pub struct ModesResult {
     /// Mechanical unknowns.
     pub unknowns: usize,
 }
-
-/// A mode with a larger residual is no mode.
-const WORST_RESIDUAL: f64 = 1e-2;
 
 /// The `count` lowest modes about the static equilibrium at these voltages.
 ///
@@ -66,16 +64,20 @@ pub fn modes_with_curves(
     let mut tangent = BlockMatrix::new(&system.model.pattern);
     let mut residual = q.clone();
     system.tangent(&q, &drive, &mut tangent, &mut residual);
-    let found = lowest_modes(system, &tangent, count)?;
-    if let Some(k) = found.residuals.iter().position(|&r| r.is_nan() || r > WORST_RESIDUAL) {
-        return Err(AnalysisError::NotConverged {
-            detail: format!(
-                "mode {} of {} has a residual of {:.1e}: ask for fewer modes, or for fewer segments",
-                k + 1,
-                count,
-                found.residuals[k]
-            ),
-        });
+    let found = lowest_modes(system, (&q, &drive), &tangent, count)?;
+    if found.lambda.is_empty() {
+        let detail = "no mode came out: nothing that moves has mass, or the stiffness is not finite".into();
+        return Err(AnalysisError::NotConverged { detail });
+    }
+    if let Some(k) = found.residuals.iter().position(|&r| r.is_nan() || r > RELIABLE) {
+        let (residual, rounding) = (found.residuals[k], found.rounding);
+        let size = if residual.is_nan() { "that rounding hides".into() } else { format!("of {residual:.1e}") };
+        let detail = format!(
+            "mode {} of {count} keeps a residual {size}, more than {RELIABLE:.0e}; rounding leaves the stiffness uncertain \
+             by {rounding:.0e}: ask for fewer modes or segments, or draw what is far stiffer than the rest as a rigid link",
+            k + 1
+        );
+        return Err(AnalysisError::NotConverged { detail });
     }
     if found.missed {
         return Err(AnalysisError::NotConverged {

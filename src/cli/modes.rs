@@ -27,7 +27,7 @@ const MOST_SHAPES: usize = 12;
 /// Natural frequencies and mode shapes about the operating point, without damping.
 ///
 /// JSON: "frequencies_hz" ascending [Hz]; "shapes": for each mode the displacement of every node, the largest
-/// translation being 1; "residuals": |Kx - λMx| / |Kx|; "estimated_errors": relative, by the number of segments, signed,
+/// translation being 1; "residuals": about the relative error of each shape; "estimated_errors": relative, by the number of segments, signed,
 /// null where there is none.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  bimorph modes bank.net --count 10 --band 1.3M\n  \

@@ -27,6 +27,8 @@ use std::f64::consts::PI;
 
 /// Share of a beam that its two offsets may take together.
 const MOST: f64 = 0.9;
+/// Share of the mass that beams bring to a junction which it may have twice.
+const MOST_MASS: f64 = 0.5;
 
 /// One beam as its junction sees it.
 #[derive(Debug, Clone, Copy)]
@@ -96,9 +98,11 @@ impl Ends {
     /// Takes away the mass that junctions have twice, and adds what corners lack.
     pub fn correct_mass(&self, structure: &Structure, undamped: bool, rigid: &mut Assembly) {
         let mut shortest = vec![f64::INFINITY; structure.nodes.len()];
+        let mut brought = vec![0.0; structure.nodes.len()];
         for beam in &structure.beams {
             for node in [beam.a, beam.b] {
                 shortest[node.0] = shortest[node.0].min(beam.length);
+                brought[node.0] += 0.5 * beam.material.density * beam.width * beam.thickness * beam.length;
             }
         }
         for (node, strips, beam) in &self.meetings {
@@ -108,7 +112,10 @@ impl Ends {
             // beams shorter than the junction have no such overlap
             let shortest = shortest[*node];
             let widest = strips.iter().map(|s| s.width).fold(0.0, f64::max);
-            let scale = -m.density * beam.thickness * (shortest / widest).min(1.0);
+            let whole = m.density * beam.thickness * (shortest / widest).min(1.0);
+            // where junctions of stout beams overlap in turn, no more goes than leaves half of what the beams bring
+            let left = MOST_MASS * brought[*node] / (whole * excess.amount).max(f64::MIN_POSITIVE);
+            let scale = -whole * left.min(1.0);
             excess.amount *= scale;
             excess.first *= scale;
             excess.second *= scale;

@@ -1,6 +1,7 @@
 //! Elastic forces, strain energy, tangent and damping of a model. One pass over the joints each, no allocation.
 
 use super::model::{Coupling, Model};
+use super::planar::factored::FactoredTangent;
 use super::planar::{HalfTurn, JointKinematics, PairTangent, Pose};
 use super::section::{LaidJoint, NONE, Place, Section};
 use super::{BlockMatrix, BodyId};
@@ -178,6 +179,19 @@ pub fn add_tangent(
     }
     add_couplings(model, q, r);
     add_coupling_tangent(model, tangent);
+}
+
+/// The tangents of the joints, unsummed; their sum is that of [`add_tangent`] without couplings.
+pub(crate) fn factored(model: &Model, q: &[Pose], rest: &RestStrain<'_>) -> Vec<(Place, FactoredTangent)> {
+    let mut turns = Turns::new();
+    let one = |joint: &LaidJoint| {
+        let section = model.section(joint);
+        let k = turns.kinematics(model.linear, joint, section, q);
+        let stress = joint.stress(section, &k, rest);
+        let stressed = (!model.linear).then_some((&stress, &section.second));
+        (joint.place, k.factored(&section.stiffness, stressed))
+    };
+    model.joints.iter().map(one).collect()
 }
 
 /// Strain energy U(q) [J].

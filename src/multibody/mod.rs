@@ -18,8 +18,11 @@
 //! | [`relative`] | joint coordinates on a spanning tree, loops closed by springs |
 //! | [`linear_system`] | K, M and C of a linear frame on one pattern |
 //! | [`forces`] | elastic forces, energy and tangent of a model at a configuration |
+//! | [`precise`] | the product of that tangent with a displacement in extended precision |
+//! | [`double`] | double-double numbers |
 
 pub mod body;
+pub mod double;
 pub mod factor;
 pub mod forces;
 pub mod linear_system;
@@ -27,6 +30,7 @@ pub mod model;
 pub mod order;
 pub mod pattern;
 pub mod planar;
+pub mod precise;
 pub mod rcr;
 pub mod relative;
 pub mod section;

@@ -21,6 +21,8 @@
 //! Strains depend on translations through the opening alone, so their derivatives with respect to the position of body a
 //! are those of body b with the other sign, and ten numbers make up the 6×6 tangent of a pair.
 
+pub(crate) mod factored;
+
 use super::sine::sin_cos;
 use nalgebra::{Matrix3, Matrix6, SMatrix, Vector2, Vector3, Vector6};
 

@@ -2,24 +2,34 @@
 //!
 //! Shift-invert Lanczos: the operator A = M^½·(K − σM)⁻¹·M^½ is symmetric, its largest eigenvalues 1/(λ − σ) belong to the
 //! lowest modes, and one application is one solve with the block factor, O(n+m). Coordinates weighted by M^½ have one unit,
-//! so no scaling is needed. The Lanczos iteration is faer's; small models go through a dense symmetric eigensolver. Each
-//! mode is checked by its residual, and the number of modes below the highest found is checked against the inertia of
-//! K − λM (Sylvester), which no lost mode survives.
+//! so no scaling is needed. Small models go through a dense symmetric eigensolver. Where rounding has spoiled the factor
+//! (parts a million times stiffer than others) the operator applies solves that correct themselves ([`refined`]).
+//!
+//! The last digits come from inverse iteration of the block ([`inverse_iteration`]), which also measures each mode. The
+//! number of modes below the highest found is checked against the inertia of K − λM (Sylvester), which no lost mode
+//! survives; where one is lost, or did not settle, a wider block with further directions takes over. All iterations are
+//! bounded.
 //!
 //! Reference: T. Ericsson, A. Ruhe, "The spectral transformation Lanczos method", Math. Comp. 35 (1980).
 
-use crate::gaps::System;
+use super::inverse_iteration::{self, Block};
+use super::lanczos::{self, Pairs};
+use super::refined::Refined;
+use super::subspace;
+use crate::gaps::{Drive, System};
 use crate::multibody::planar::Pose;
-use crate::multibody::{BlockMatrix, Model, Pattern};
+use crate::multibody::{BlockMatrix, Model};
 use crate::solve::SolveError;
-use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
-use faer::matrix_free::LinOp;
-use faer::matrix_free::eigen::{PartialEigenParams, partial_self_adjoint_eigen, partial_self_adjoint_eigen_scratch};
-use faer::{Col, Mat, MatMut, MatRef, Par};
-use nalgebra::{DMatrix, SymmetricEigen};
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 /// Models of at most this many coordinates are solved densely.
 const DENSE: usize = 150;
+/// A factor whose solves are off by more than this share is corrected in every solve.
+const ROUGH: f64 = 1e-9;
+/// Residual at which an iteration stops [1].
+const GOAL: f64 = 1e-11;
+/// Residual of a mode that can be relied on: its frequency is off by the square [1].
+pub const RELIABLE: f64 = 1e-8;
 
 /// Modes with their residuals.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,131 +38,131 @@ pub struct Modes {
     pub lambda: Vec<f64>,
     /// Shapes with xᵀMx = 1.
     pub shapes: Vec<Vec<Pose>>,
-    /// ‖x − (λ − σ)(K − σM)⁻¹Mx‖ in the mass norm, relative: about the relative error of the shape; or how far the
-    /// Rayleigh quotients of K and of its factor differ, if that is more.
+    /// ‖(K + |λ|M)⁻¹(Kx − λMx)‖ in the mass norm: about the relative error of the shape.
     pub residuals: Vec<f64>,
     /// The inertia below the highest mode counts more modes than were found.
     pub missed: bool,
+    /// About the relative error of K by rounding, as the factor has it [1].
+    pub rounding: f64,
 }
 
 /// M^½·(K − σM)⁻¹·M^½ over flat vectors.
-#[derive(Debug)]
-struct Operator<'a> {
+struct Operator<'a, 'b> {
+    refined: &'a mut Refined<'b>,
     factor: &'a BlockMatrix<f64, 3>,
-    pattern: &'a Pattern,
+    shift: f64,
     model: &'a Model,
     root: &'a [Pose],
+    /// Solves correct themselves.
+    corrected: bool,
 }
 
-impl Operator<'_> {
-    fn apply_to(&self, read: impl Fn(usize) -> f64, mut write: impl FnMut(usize, f64)) {
-        let mut x: Vec<Pose> = self
-            .root
-            .iter()
-            .enumerate()
-            .map(|(k, r)| Pose::new(r.x * read(3 * k), r.y * read(3 * k + 1), r.z * read(3 * k + 2)))
-            .collect();
-        self.model.project(&mut x);
-        self.factor.solve(self.pattern, &mut x);
-        self.model.project(&mut x);
-        for (k, (x, r)) in x.iter().zip(self.root).enumerate() {
-            for i in 0..3 {
-                write(3 * k + i, x[i] * r[i]);
-            }
+impl Operator<'_, '_> {
+    /// (K − σM)⁻¹·M^½·y.
+    fn displacement(&mut self, y: &[f64]) -> Vec<Pose> {
+        let weigh = |(k, r): (usize, &Pose)| Pose::new(r.x * y[3 * k], r.y * y[3 * k + 1], r.z * y[3 * k + 2]);
+        let mut x: Vec<Pose> = self.root.iter().enumerate().map(weigh).collect();
+        if self.corrected {
+            self.refined.solve(self.factor, self.shift, &mut x);
+        } else {
+            self.model.project(&mut x);
+            self.factor.solve(&self.model.pattern, &mut x);
+            self.model.project(&mut x);
         }
+        x
+    }
+
+    fn apply(&mut self, y: &DVector<f64>) -> DVector<f64> {
+        let x = self.displacement(y.as_slice());
+        DVector::from_iterator(y.len(), x.iter().zip(self.root).flat_map(|(x, r)| [x.x * r.x, x.y * r.y, x.z * r.z]))
     }
 }
 
-impl LinOp<f64> for Operator<'_> {
-    fn apply_scratch(&self, _: usize, _: Par) -> StackReq {
-        StackReq::EMPTY
-    }
-    fn nrows(&self) -> usize {
-        3 * self.root.len()
-    }
-    fn ncols(&self) -> usize {
-        3 * self.root.len()
-    }
-    fn apply(&self, mut out: MatMut<'_, f64>, rhs: MatRef<'_, f64>, _: Par, _: &mut MemStack) {
-        for c in 0..rhs.ncols() {
-            self.apply_to(|i| rhs[(i, c)], |i, v| out[(i, c)] = v);
-        }
-    }
-    fn conj_apply(&self, out: MatMut<'_, f64>, rhs: MatRef<'_, f64>, par: Par, stack: &mut MemStack) {
-        self.apply(out, rhs, par, stack);
-    }
-}
-
-/// The `count` lowest modes of a system whose tangent is `stiffness` (held directions not yet projected).
+/// The `count` lowest modes of a system whose tangent is `stiffness` (held directions not yet projected) at `q` under
+/// `drive`; fewer where fewer directions have mass.
 ///
 /// A structure that floats freely is solved with a small negative shift and shows its rigid motions as λ ≈ 0.
 ///
 /// # Errors
 /// [`SolveError::Singular`] when even the shifted matrix cannot be factored.
-pub fn lowest_modes(system: &System, stiffness: &BlockMatrix<f64, 3>, count: usize) -> Result<Modes, SolveError> {
+pub fn lowest_modes(
+    system: &System,
+    (q, drive): (&[Pose], &Drive),
+    stiffness: &BlockMatrix<f64, 3>,
+    count: usize,
+) -> Result<Modes, SolveError> {
     let model = &system.model;
-    let pattern = &model.pattern;
+    let (factor, shift) = factored(system, stiffness)?;
+    let massive = massive_directions(model);
+    let count = count.min(massive);
+    let mut refined = Refined::new(system, q, drive);
+    let mut force: Vec<Pose> = (0..system.bodies()).map(|j| model.mass(j).map(f64::sqrt)).collect();
+    let root = force.clone();
+    let first = refined.solve(&factor, shift, &mut force);
+    let rounding = first.first.max(first.left);
+    let mut operator =
+        Operator { refined: &mut refined, factor: &factor, shift, model, root: &root, corrected: rounding > ROUGH };
+    // a few more than asked for keep the last wanted one well separated
+    let wide = (count + 4).min(massive);
+    let pairs = if 3 * root.len() <= DENSE { dense(&mut operator, wide) } else { sparse(&mut operator, wide, massive) };
+    let few = if pairs.settled >= wide && rounding <= ROUGH { count } else { wide };
+    let start: Vec<Vec<Pose>> = (0..few.min(pairs.theta.len()))
+        .map(|i| operator.displacement(pairs.vectors.column(i).as_slice()).iter().map(|x| x / pairs.theta[i]).collect())
+        .collect();
+    let wanted = count.min(start.len());
+    let settle = |refined: &mut Refined<'_>, start, wanted| {
+        inverse_iteration::settle(model, refined, (&factor, shift), stiffness, start, wanted, GOAL)
+    };
+    let found = settle(&mut refined, start.clone(), wanted);
+    let complete = |found: &Block| {
+        found.lambda.len() == count
+            && found.residuals.iter().all(|&r| r <= RELIABLE)
+            && !missed(model, stiffness, &found.lambda, rounding)
+    };
+    let found = match found {
+        Some(found) if complete(&found) => Some(found),
+        found => {
+            let block = (count + (8 + count / 2).min(24)).min(massive);
+            let mut start = found.as_ref().map_or(start, |f| f.shapes.clone());
+            start.truncate(block);
+            let extra = subspace::start(system.bodies(), block - start.len(), system.length_scale);
+            start.extend(extra);
+            let wider = settle(&mut refined, start, count);
+            if wider.as_ref().is_some_and(complete) || found.is_none() { wider } else { wider.or(found) }
+        }
+    };
+    let Some(mut found) = found else {
+        return Ok(Modes { lambda: Vec::new(), shapes: Vec::new(), residuals: Vec::new(), missed: true, rounding });
+    };
+    found.shapes.truncate(found.lambda.len());
+    let missed = missed(model, stiffness, &found.lambda, rounding);
+    Ok(Modes { lambda: found.lambda, shapes: found.shapes, residuals: found.residuals, missed, rounding })
+}
+
+/// The factor of K − σM and σ: 0, or a little below where K itself is singular.
+fn factored(system: &System, stiffness: &BlockMatrix<f64, 3>) -> Result<(BlockMatrix<f64, 3>, f64), SolveError> {
+    let model = &system.model;
     let mut k = stiffness.clone();
     model.project_matrix(&mut k);
     let mut factor = k.clone();
-    let mut shift = 0.0;
-    if factor.factor(pattern).is_err() {
-        shift = -1e-6 * typical(model, &k);
-        factor = shifted(model, stiffness, shift);
-        factor.factor(pattern).map_err(|p| SolveError::singular(system, p))?;
+    if factor.factor(&model.pattern).is_ok() {
+        return Ok((factor, 0.0));
     }
-    let root: Vec<Pose> = (0..system.bodies()).map(|j| model.mass(j).map(f64::sqrt)).collect();
-    let n = 3 * root.len();
-    let count = count.min(massive_directions(model));
-    let operator = Operator { factor: &factor, pattern, model, root: &root };
-    let (theta, vectors) = if n <= DENSE { dense(&operator, n, count) } else { lanczos(&operator, n, count) };
-    let mut found: Vec<Vec<Pose>> = Vec::with_capacity(count);
-    for (i, &theta) in theta.iter().enumerate() {
-        if theta == 0.0 || !theta.is_finite() {
-            continue;
-        }
-        // one inverse iteration takes the weighted vector back: x = (K − σM)⁻¹ M^½ y / θ
-        let mut x: Vec<Pose> = (0..root.len())
-            .map(|b| Pose::new(vectors(3 * b, i), vectors(3 * b + 1, i), vectors(3 * b + 2, i)).component_mul(&root[b]))
-            .collect();
-        model.project(&mut x);
-        factor.solve(pattern, &mut x);
-        model.project(&mut x);
-        let norm = mass_product(model, &x, &x).sqrt();
-        for x in &mut x {
-            *x /= norm;
-        }
-        found.push(x);
+    let shift = -1e-6 * typical(model, &k);
+    factor = shifted(model, stiffness, shift);
+    factor.factor(&model.pattern).map_err(|p| SolveError::singular(system, p))?;
+    Ok((factor, shift))
+}
+
+/// True when more modes lie below the highest one than were found. The factor that counts has rounding errors itself.
+fn missed(model: &Model, stiffness: &BlockMatrix<f64, 3>, lambda: &[f64], rounding: f64) -> bool {
+    let margin = 0.01 + 20.0 * rounding;
+    let Some(&highest) = lambda.last() else { return true };
+    if margin.is_nan() || margin > 0.5 || highest <= 0.0 {
+        return false;
     }
-    let mut modes = Modes { lambda: Vec::new(), shapes: Vec::new(), residuals: Vec::new(), missed: false };
-    for x in &found {
-        // Rayleigh quotient and residual of the inverse operator: stiff directions, which K would drown them in, are quiet
-        let mut y: Vec<Pose> = (x.iter().enumerate()).map(|(b, x)| model.mass(b).component_mul(x)).collect();
-        factor.solve(pattern, &mut y);
-        model.project(&mut y);
-        let theta = mass_product(model, x, &y);
-        for (y, x) in y.iter_mut().zip(x.iter()) {
-            *y -= x * theta;
-        }
-        // the quotient of K itself is the better value; where rounding has spoiled the factor the two part
-        let mut kx = vec![Pose::zeros(); x.len()];
-        k.multiply_add(pattern, x, &mut kx);
-        let lambda: f64 = x.iter().zip(&kx).map(|(x, k)| x.dot(k)).sum();
-        let inverse = shift + 1.0 / theta;
-        let apart = (lambda - inverse).abs() / (lambda.abs() + shift.abs());
-        modes.lambda.push(lambda);
-        modes.residuals.push((mass_product(model, &y, &y).sqrt() / theta.abs()).max(apart));
-    }
-    let mut order: Vec<usize> = (0..found.len()).collect();
-    order.sort_by(|&a, &b| modes.lambda[a].total_cmp(&modes.lambda[b]));
-    modes.lambda = order.iter().map(|&i| modes.lambda[i]).collect();
-    modes.residuals = order.iter().map(|&i| modes.residuals[i]).collect();
-    modes.shapes = order.iter().map(|&i| std::mem::take(&mut found[i])).collect();
-    if let Some(&highest) = modes.lambda.last() {
-        let mut counted = shifted(model, stiffness, highest * 0.99);
-        modes.missed = counted.factor(pattern).is_ok_and(|i| i.negative >= modes.lambda.len());
-    }
-    Ok(modes)
+    let mut counted = shifted(model, stiffness, highest * (1.0 - margin));
+    counted.factor(&model.pattern).is_ok_and(|i| i.negative >= lambda.len())
 }
 
 /// Free directions that carry mass: a model has as many modes. Inner bodies of a beam have no rotary inertia of their own.
@@ -167,7 +177,7 @@ fn massive_directions(model: &Model) -> usize {
 }
 
 /// K − σM, held directions projected.
-fn shifted(model: &Model, stiffness: &BlockMatrix<f64, 3>, sigma: f64) -> BlockMatrix<f64, 3> {
+pub(super) fn shifted(model: &Model, stiffness: &BlockMatrix<f64, 3>, sigma: f64) -> BlockMatrix<f64, 3> {
     let mut a = stiffness.clone();
     for (j, block) in a.diagonal.iter_mut().enumerate() {
         let m = model.mass(j);
@@ -194,46 +204,28 @@ pub fn mass_product(model: &Model, x: &[Pose], y: &[Pose]) -> f64 {
     x.iter().zip(y).enumerate().map(|(j, (x, y))| x.dot(&model.mass(j).component_mul(y))).sum()
 }
 
-type Vectors = Box<dyn Fn(usize, usize) -> f64>;
-
-fn dense(operator: &Operator<'_>, n: usize, count: usize) -> (Vec<f64>, Vectors) {
+/// The largest eigenvalues of an operator from all of its columns.
+fn dense(operator: &mut Operator<'_, '_>, wanted: usize) -> Pairs {
+    let n = 3 * operator.root.len();
     let mut a = DMatrix::<f64>::zeros(n, n);
     for c in 0..n {
-        operator.apply_to(|i| if i == c { 1.0 } else { 0.0 }, |i, v| a[(i, c)] = v);
+        let unit = DVector::from_fn(n, |i, _| if i == c { 1.0 } else { 0.0 });
+        a.set_column(c, &operator.apply(&unit));
     }
-    let a = (&a + a.transpose()) * 0.5;
-    let eigen = SymmetricEigen::new(a);
+    let eigen = SymmetricEigen::new((&a + a.transpose()) * 0.5);
     let mut order: Vec<usize> = (0..n).collect();
     order.sort_by(|&i, &j| eigen.eigenvalues[j].abs().total_cmp(&eigen.eigenvalues[i].abs()));
-    order.truncate(count);
-    let theta = order.iter().map(|&i| eigen.eigenvalues[i]).collect();
-    (theta, Box::new(move |row, i| eigen.eigenvectors[(row, order[i])]))
+    order.retain(|&i| eigen.eigenvalues[i] != 0.0 && eigen.eigenvalues[i].is_finite());
+    order.truncate(wanted);
+    let theta: Vec<f64> = order.iter().map(|&i| eigen.eigenvalues[i]).collect();
+    let settled = theta.len();
+    Pairs { theta, vectors: DMatrix::from_fn(n, settled, |r, c| eigen.eigenvectors[(r, order[c])]), settled }
 }
 
-fn lanczos(operator: &Operator<'_>, n: usize, count: usize) -> (Vec<f64>, Vectors) {
-    // a few more than asked for keep the last wanted one well separated
-    let wanted = (count + 4).min(n);
-    let params = PartialEigenParams { max_restarts: 1000, ..Default::default() };
-    let mut vectors = Mat::<f64>::zeros(n, wanted);
-    let mut theta = vec![0.0; wanted];
-    // a fixed start with components everywhere: the same bits on every run
-    let start = Col::<f64>::from_fn(n, |i| 1.0 + ((i * 7919) % 101) as f64 / 101.0);
-    let start = &start / start.norm_l2();
-    let scratch = partial_self_adjoint_eigen_scratch(operator, wanted, Par::Seq, params);
-    let mut memory = MemBuffer::new(scratch);
-    let info = partial_self_adjoint_eigen(
-        vectors.as_mut(),
-        &mut theta,
-        operator,
-        start.as_ref(),
-        1e-13,
-        Par::Seq,
-        MemStack::new(&mut memory),
-        params,
-    );
-    let mut order: Vec<usize> = (0..info.n_converged_eigen.min(wanted)).collect();
-    order.sort_by(|&i, &j| theta[j].abs().total_cmp(&theta[i].abs()));
-    order.truncate(count);
-    let kept = order.iter().map(|&i| theta[i]).collect();
-    (kept, Box::new(move |row, i| vectors[(row, order[i])]))
+/// The same by Lanczos, from fixed directions with components everywhere: the same bits on every run.
+fn sparse(operator: &mut Operator<'_, '_>, wanted: usize, rank: usize) -> Pairs {
+    let n = 3 * operator.root.len();
+    let direction = |k: usize| DVector::from_fn(n, |i, _| 1.0 + ((i * (7919 + 104 * k)) % 101) as f64 / 101.0);
+    let mut apply = |y: &DVector<f64>| operator.apply(y);
+    lanczos::largest((n, rank), &mut apply, &direction, wanted, 1e-10, 3 * wanted + 100)
 }

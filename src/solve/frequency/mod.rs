@@ -3,6 +3,9 @@
 //! | file | what it holds |
 //! |---|---|
 //! | [`eigen`] | lowest natural frequencies: shift-invert Lanczos on the same factor |
+//! | [`lanczos`] | largest eigenvalues of an operator |
+//! | [`inverse_iteration`] | the last digits of modes, and how good each is |
+//! | [`refined`] | solves that correct themselves in extended precision |
 //! | [`subspace`] | many of them at once |
 //! | [`fastest`] | the highest natural frequency in joint coordinates |
 //! | [`harmonic`] | small-signal response at one frequency: the same factorization over complex numbers |
@@ -10,4 +13,7 @@
 pub mod eigen;
 pub mod fastest;
 pub mod harmonic;
+pub mod inverse_iteration;
+pub mod lanczos;
+pub mod refined;
 pub mod subspace;
