@@ -63,6 +63,7 @@ pub fn frame_statics(
             .map(|p| (compiled.parts.system.electrics.names[p].clone(), 0.0))
             .collect(),
         pulled_in: false,
+        jumped: false,
         free_motions: Vec::new(),
         unknowns: frame.system.unknowns(),
         iterations: 1,

@@ -31,8 +31,10 @@ pub struct StaticResult {
     pub currents_a: Vec<(String, f64)>,
     /// Charge on each port [C], by name.
     pub charges_c: Vec<(String, f64)>,
-    /// True when the part pulled in on the way.
+    /// True when the part jumped on the way, past a fold or a bifurcation, and voltage closed a gap.
     pub pulled_in: bool,
+    /// True when it jumped: it pulled in, snapped through or buckled.
+    pub jumped: bool,
     /// Motions that nothing resists noticeably and no load excites; they are held where they are.
     pub free_motions: Vec<String>,
     /// Mechanical unknowns.
@@ -67,13 +69,16 @@ pub fn static_with_curves(
             .sum::<f64>()
     };
     let curves = beam_motions(compiled, &point.q);
+    let jumped = point.path.fold.is_some();
+    let touching = (0..system.gaps.len()).any(|g| system.touches(g, &point.q));
     let electrical = electrical(compiled, &point.sources, &point.rise);
     let result = StaticResult {
         nodes: node_motions(compiled, &point.q),
         temperatures_k: electrical.temperatures_k,
         currents_a: electrical.currents_a,
         charges_c: (0..electrics.ports).map(|p| (port(p), charge(p))).collect(),
-        pulled_in: point.path.fold.is_some(),
+        pulled_in: jumped && point.volts.iter().any(|v| *v != 0.0) && touching,
+        jumped,
         free_motions: point.free_motions,
         unknowns: system.model.unknowns(),
         iterations: point.path.iterations,

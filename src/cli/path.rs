@@ -283,7 +283,12 @@ impl PathCommand {
         let mut row = |what: &str, point: usize| {
             let mut cells = vec![what.to_owned(), quantity(result.values[point], unit)];
             cells.extend(result.signals.iter().map(|(_, unit, values)| quantity(values[point], unit)));
-            cells.push(if result.negative[point] == 0 { "stable".into() } else { "unstable".into() });
+            // a fold is the limit of both
+            cells.push(match (what, result.negative[point]) {
+                ("fold", _) => String::new(),
+                (_, 0) => "stable".into(),
+                _ => "unstable".into(),
+            });
             rows.push((point, cells));
         };
         row("start", 0);

@@ -56,6 +56,7 @@ struct Document<'a> {
     charges_c: Named<'a, f64>,
     permanent_strains: Named<'a, f64>,
     pulled_in: bool,
+    jumped: bool,
     free_motions: &'a [String],
     unknowns: usize,
     solver: ModelChoice,
@@ -94,6 +95,7 @@ impl Static {
             charges_c: Named(&result.charges_c),
             permanent_strains: Named(&permanent_strains),
             pulled_in: result.pulled_in,
+            jumped: result.jumped,
             free_motions: &result.free_motions,
             unknowns: result.unknowns,
             solver: self.solver,
@@ -179,6 +181,8 @@ fn text(compiled: &Compiled, result: &StaticResult, strains: &[(String, f64)]) -
     }
     if result.pulled_in {
         text.push_str("\npulled in on the way to these voltages\n");
+    } else if result.jumped {
+        text.push_str("\nsnapped through or buckled on the way to these loads; `bimorph path` shows the branches\n");
     }
     for motion in &result.free_motions {
         let _ = writeln!(text, "\nheld, because no load excites it: {motion}");

@@ -117,6 +117,16 @@ pub(super) fn draw_lines(picture: &mut Picture, structure: &Structure, moved: &M
             picture.polyline(&ends, Paint::line(colour, 2.5));
         }
     }
+    for stop in &structure.stops {
+        for (way, sign) in stop.ways.iter().zip([1.0, -1.0]).filter(|(way, _)| way.is_some()) {
+            let from = structure.nodes[stop.a.0].position;
+            let reach = sign * way.unwrap_or(0.0);
+            let [x, y] = view.at([from[0] + reach * stop.axis[0], from[1] + reach * stop.axis[1]]);
+            let (across, size) = ([stop.axis[1], stop.axis[0]], 12.0);
+            let ends = [[x - across[0] * size, y - across[1] * size], [x + across[0] * size, y + across[1] * size]];
+            picture.polyline(&ends, Paint::line(colour, 3.5));
+        }
+    }
     for mass in structure.masses.iter().filter(|m| m.outline[0] <= 0.0) {
         let [x, y] = at(mass.node);
         picture.circle(x, y, 5.0, Paint::fill(colour));

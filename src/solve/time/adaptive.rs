@@ -198,7 +198,8 @@ impl<M: Method> Adaptive<M> {
         let (eq, ev) = (norm(&self.error.q), norm(&self.error.v));
         let reach = norm(&self.before.q).max(norm(&after.q)) + FLOOR * system.length_scale * self.mass.sqrt();
         let error = (eq * eq + h * h * ev * ev).sqrt() / (tol * reach);
-        let error = error.max(self.contact_error(system, after, tol));
+        // a sum: the larger of the two would hide what is not a number
+        let error = error.hypot(self.contact_error(system, after, tol));
         if error.is_nan() { f64::INFINITY } else { error }
     }
 
