@@ -9,9 +9,12 @@
 //! writes tables and pictures.
 //! [`compile`](mod@compile) walks that path once, from netlist text to a ready model.
 //!
+//! [`budget`] bounds what a computation may use, and stops it.
+//!
 //! Everything inside is SI: metres, kilograms, seconds, volts, kelvin, radians. Units are parsed once, in the netlist.
 
 pub mod analysis;
+pub mod budget;
 pub mod compile;
 pub mod cosim;
 pub mod device;

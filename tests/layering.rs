@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 const FLOORS: [&[&str]; 10] = [
-    &["sets"],
+    &["budget", "sets"],
     &["structure", "multibody"],
     &["netlist", "layout", "gaps", "results"],
     &["options", "equations"],

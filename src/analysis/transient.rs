@@ -41,6 +41,8 @@ pub struct TransientOptions<'a> {
     /// What solves the linear systems of the method. The result is the same to rounding; all but the recursion are
     /// baselines, and Radau5 and rk45 have none.
     pub solver: SolverKind,
+    /// Whether the result holds the samples, default true; without, only who is told them as they come has them.
+    pub keep: bool,
 }
 
 impl Default for TransientOptions<'_> {
@@ -57,6 +59,7 @@ impl Default for TransientOptions<'_> {
             step: None,
             events: Vec::new(),
             solver: SolverKind::default(),
+            keep: true,
         }
     }
 }
@@ -216,10 +219,11 @@ pub(super) fn record(
     let volts = drive.volts.clone();
     carrier.begin(&ramp, &mut motion)?;
 
+    let kept = if options.keep { options.points } else { 0 };
     let mut result = TransientResult {
-        t: Vec::with_capacity(options.points),
+        t: Vec::with_capacity(kept),
         signals: (options.signals.iter().zip(&signals))
-            .map(|(name, s)| (name.clone(), s.unit().to_owned(), Vec::with_capacity(options.points)))
+            .map(|(name, s)| (name.clone(), s.unit().to_owned(), Vec::with_capacity(kept)))
             .collect(),
         counters: Counters::default(),
         unknowns: compiled.unknowns(),
@@ -242,10 +246,14 @@ pub(super) fn record(
             *r = ramp.rise_at(k, t);
         }
         let view = View { q: &motion.q, v: &motion.v, rise: &rise_now, volts: &volts };
-        result.t.push(t);
-        for ((value, signal), column) in row.iter_mut().zip(&signals).zip(&mut result.signals) {
+        for (value, signal) in row.iter_mut().zip(&signals) {
             *value = signal.value(compiled, &view);
-            column.2.push(*value);
+        }
+        if options.keep {
+            result.t.push(t);
+            for (value, column) in row.iter().zip(&mut result.signals) {
+                column.2.push(*value);
+            }
         }
         sample(t, &row);
     };
@@ -277,6 +285,7 @@ pub(super) fn record(
                 w.signal.value(compiled, &view) - w.level
             };
             w.detector.step(value, |x, direction| {
+                crate::budget::lay_out(size_of::<Event>() + w.name.len());
                 events.push(Event {
                     signal: w.name.clone(),
                     level: w.level,

@@ -125,6 +125,7 @@ fn server() -> Result<String, String> {
     let options = ServeOptions {
         listen: vec![Address::Unix(path.clone())],
         insecure: false,
+        while_stdin: false,
         limits: Limits::default(),
         ready: Box::new(move |_| drop(tell.send(Ok(())))),
     };

@@ -4,7 +4,7 @@ use super::failure::Failure;
 use super::options::Chosen;
 use super::{interrupt, value};
 use bimorph::compile::{CompileOptions, Compiled, Junctions, compile};
-use bimorph::netlist::{Bundle, Setting};
+use bimorph::netlist::{Bundle, DroppedInclude, Setting};
 use bimorph::options::{MODEL, Value};
 use clap::Args;
 use serde::ser::SerializeMap;
@@ -34,7 +34,9 @@ impl ModelArgs {
     /// The netlist with everything it uses.
     pub(crate) fn bundle(&self) -> Result<Bundle, Failure> {
         interrupt::listen();
-        Bundle::read(&self.file, &self.include).map_err(|source| Failure::Read { path: self.file.clone(), source })
+        let warn = &mut |dropped: DroppedInclude| eprintln!("warning: {dropped}");
+        Bundle::read_telling(&self.file, &self.include, warn)
+            .map_err(|source| Failure::Read { path: self.file.clone(), source })
     }
 
     /// The options of the compilation, checked.

@@ -3,6 +3,7 @@
 use super::failure::Failure;
 use bimorph::service::address::Address;
 use bimorph::service::limits::Limits;
+use bimorph::service::log;
 use bimorph::service::server::{ServeOptions, run_until_signal};
 use clap::Args;
 
@@ -22,6 +23,10 @@ pub(crate) struct Serve {
     /// Allow addresses that other machines can reach
     #[arg(long)]
     insecure: bool,
+
+    /// Stop when standard input ends, as it does when the program that started this server ends
+    #[arg(long)]
+    while_stdin: bool,
 }
 
 impl Serve {
@@ -29,11 +34,16 @@ impl Serve {
         let listen = self.listen.iter().map(|text| text.parse()).collect::<Result<Vec<Address>, _>>()?;
         let ready = |addresses: &[Address]| {
             for address in addresses {
-                eprintln!("listening on {address}");
+                log::line(&format!("listening on {address}"));
             }
         };
-        let options =
-            ServeOptions { listen, insecure: self.insecure, limits: Limits::default(), ready: Box::new(ready) };
+        let options = ServeOptions {
+            listen,
+            insecure: self.insecure,
+            limits: Limits::default(),
+            while_stdin: self.while_stdin,
+            ready: Box::new(ready),
+        };
         Ok(run_until_signal(options)?)
     }
 }

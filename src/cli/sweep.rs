@@ -95,7 +95,9 @@ impl Sweep {
         let (bundle, options) = (self.model.bundle()?, self.model.options()?);
         let bar = progress::bar("sweep");
         let table = match &self.to {
-            None => sweep::run(&spec, &bundle, &options, &|p| report(&bar, p)).map_err(Failure::from),
+            None => sweep::check_names(&spec, &bundle, &options)
+                .and_then(|()| sweep::run(&spec, &bundle, &options, &|p| report(&bar, p)))
+                .map_err(Failure::from),
             Some(uri) => {
                 if !(self.deadline > 0.0 && self.deadline < 1e6) {
                     return Err(Failure::bad("--deadline", "a time above 0 s", self.deadline.to_string()));

@@ -163,6 +163,7 @@ impl Tran {
             step: self.step,
             events: self.events.clone(),
             solver: self.solver.linear(),
+            keep: true,
         };
         let bar = progress::bar("transient");
         let watch = &mut progress::watch(&bar);

@@ -11,6 +11,7 @@ use super::{
 };
 use crate::analysis::signal::Signal;
 use crate::analysis::transient::first_step;
+use crate::budget;
 use crate::compile::Compiled;
 use crate::gaps::Drive;
 use crate::multibody::BlockMatrix;
@@ -20,6 +21,7 @@ use crate::solve::harmonic::{ComplexPose, Harmonic};
 use crate::solve::time::adaptive::Adaptive;
 use crate::solve::time::formulated::Formulated;
 use crate::solve::time::method::Motion;
+use std::collections::HashMap;
 use std::sync::Arc;
 
 /// A [`Device`] over a compiled model.
@@ -32,6 +34,8 @@ pub struct LocalDevice {
 /// What is open: the choice of ports and signals, the states, and the storage that every trial reuses.
 #[derive(Debug)]
 pub(super) struct Session {
+    /// What it was opened with.
+    opened: OpenRequest,
     /// Source index of each opened port.
     pub(super) ports: Vec<usize>,
     pub(super) signals: Vec<Signal>,
@@ -113,25 +117,33 @@ impl Device for LocalDevice {
         let state = session.states.get(token).ok_or(DeviceError::UnknownToken(token))?;
         session.respond(&self.compiled, token, &state, omega, reply)
     }
+
+    fn recover(&mut self) {
+        // a state is stored whole or not at all; all else is storage that every trial fills again
+        let Some(mut session) = self.session.take() else { return };
+        self.session = Session::open(&self.compiled, &session.opened)
+            .ok()
+            .map(|(fresh, _)| Session { states: std::mem::take(&mut session.states), ..fresh });
+    }
 }
 
 impl Session {
     fn open(compiled: &Compiled, request: &OpenRequest) -> Result<(Self, Description), DeviceError> {
         let system = &compiled.parts.system;
         let electrics = &system.electrics;
-        let available = || electrics.names[..electrics.ports].to_vec();
+        let names = &electrics.names[..electrics.ports];
         let ports: Vec<usize> = if request.ports.is_empty() {
             (0..electrics.ports).collect()
         } else {
+            let known: HashMap<&str, usize> = names.iter().enumerate().map(|(k, name)| (name.as_str(), k)).collect();
+            let unknown = |name: &String| DeviceError::UnknownPort { name: name.clone(), available: names.to_vec() };
             (request.ports.iter())
-                .map(|name| {
-                    let found = available().iter().position(|n| n == name);
-                    found.ok_or_else(|| DeviceError::UnknownPort { name: name.clone(), available: available() })
-                })
+                .map(|name| known.get(name.as_str()).copied().ok_or_else(|| unknown(name)))
                 .collect::<Result<_, _>>()?
         };
         let signals: Vec<Signal> = (request.signals.iter())
             .map(|name| {
+                budget::check();
                 Signal::find(compiled, name)
                     .map_err(|e| DeviceError::UnknownSignal { name: name.clone(), hint: e.to_string() })
             })
@@ -144,6 +156,8 @@ impl Session {
             unknowns: compiled.unknowns(),
         };
         let n = system.bodies();
+        // each port carries its sensitivity, and matrices of ports and signals go with every reply
+        budget::lay_out_matrix(ports.len(), 12 * n + 4 * ports.len() + 2 * signals.len());
         let heaters = electrics.heating.heaters.len();
         let first_step = first_step(system, f64::INFINITY);
         let joints = match &compiled.joints {
@@ -158,6 +172,7 @@ impl Session {
             None => None,
         };
         let session = Self {
+            opened: request.clone(),
             stepper: Adaptive::new(system, Formulated::new(system, joints.as_ref(), first_step, &ports)),
             ports,
             signals,

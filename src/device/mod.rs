@@ -197,4 +197,8 @@ pub trait Device: Send {
     /// # Errors
     /// [`DeviceError::UnknownToken`], [`DeviceError::Remote`].
     fn linearize(&mut self, token: Token, omega: f64, reply: &mut SmallSignal) -> Result<(), DeviceError>;
+
+    /// Makes the device fit to go on after a call that was stopped in the middle ([`crate::budget`]): its storage is made
+    /// anew, its states stay as they are. A device that holds no half computed storage does nothing.
+    fn recover(&mut self) {}
 }

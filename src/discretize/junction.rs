@@ -20,6 +20,7 @@ use super::junction_springs::{End, corner, interpolate};
 use super::junction_table as table;
 use super::overlap::{self, IN_LINE, Strip, turn};
 use super::rigid::Assembly;
+use crate::budget;
 use crate::multibody::BodyId;
 use crate::options::Junctions;
 use crate::structure::{Beam, Structure};
@@ -63,9 +64,12 @@ pub fn find(structure: &Structure, rigid: &Assembly, kind: Junctions) -> Ends {
             at[node].push(Branch { beam: k, end, angle: beam.angle + PI * end as f64, width: beam.width });
         }
     }
-    let guided: Vec<usize> = structure.supports.iter().filter(|s| s.held[2]).map(|s| s.node.0).collect();
+    let mut guided = vec![false; structure.nodes.len()];
+    for support in structure.supports.iter().filter(|s| s.held[2]) {
+        guided[support.node.0] = true;
+    }
     for (node, branches) in at.iter().enumerate() {
-        if held[node] || (branches.len() == 1 && guided.contains(&node)) {
+        if held[node] || (branches.len() == 1 && guided[node]) {
             for b in branches {
                 ends.beams[b.beam][b.end].add(&table::CLAMP, &structure.beams[b.beam], b.width, false);
             }
@@ -214,6 +218,8 @@ fn step(a: &Branch, b: &Branch, covered: f64, add: &mut impl FnMut(&Branch, &tab
 fn in_line(branches: &[Branch]) -> Vec<(usize, usize)> {
     let mut found: Vec<(f64, usize, usize)> = Vec::new();
     for i in 0..branches.len() {
+        budget::check();
+        budget::lay_out((branches.len() - i - 1) * size_of::<(f64, usize, usize)>());
         for j in i + 1..branches.len() {
             let turn = turn(branches[i].angle, branches[j].angle);
             if turn < IN_LINE {

@@ -37,6 +37,7 @@ pub mod scheme;
 
 pub use crate::options::{Junctions, Scheme};
 
+use crate::budget;
 use crate::gaps::{Load, Point, System};
 use crate::multibody::{BodyId, Coupling, Damper, Joint, Model};
 use crate::options::CompileOptions;
@@ -46,6 +47,11 @@ use thiserror::Error;
 
 /// Most segments of all beams together: with bodies, joints and their factors each takes about a kilobyte.
 pub const MOST_SEGMENTS: usize = 2_000_000;
+
+/// Of a segment's joint and points, about [byte].
+const SEGMENT_BYTES: usize = 600;
+/// Of a body, with its share of the tangents and factors that an analysis has, about [byte].
+const BODY_BYTES: usize = 1000;
 
 /// A system, and where the drawing's parts went.
 #[derive(Debug, Clone)]
@@ -122,6 +128,9 @@ pub fn discretize_with(
     if total > MOST_SEGMENTS {
         return Err(DiscretizeError::TooFine { segments: total });
     }
+    // inner bodies of beams alone: what they come to at least is refused before anything is laid out
+    budget::unknowns(3 * segments.iter().map(|n| n.saturating_sub(1)).sum::<usize>());
+    budget::lay_out(total * SEGMENT_BYTES);
     let stiff: Vec<bool> = segments.iter().map(|n| *n == 0).collect();
     let mut rigid = rigid::Assembly::new(structure, &stiff);
     let mut laid = beam::Joints::default();
@@ -130,6 +139,7 @@ pub fn discretize_with(
     let mut heaters = Vec::new();
     let ends = junction::find(structure, &rigid, options.junctions);
     for (index, drawn) in structure.beams.iter().enumerate() {
+        budget::check();
         let heater = drawn.heater.is_some().then(|| {
             heaters.push(index);
             heaters.len() - 1
@@ -163,6 +173,7 @@ pub fn discretize_with(
     if rigid.bodies.is_empty() {
         return Err(DiscretizeError::NothingMoves);
     }
+    budget::lay_out(rigid.bodies.len() * BODY_BYTES);
     let bodies = rigid.finish_bodies();
     for joint in &mut joints {
         rigid.center(joint.a, joint.b, &mut joint.frame);

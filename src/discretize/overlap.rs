@@ -48,6 +48,7 @@ pub fn overlap(strips: &[Strip]) -> Lump {
         if step <= 1e-9 * widest {
             continue;
         }
+        crate::budget::check();
         for line in 0..LINES {
             let y = band[0] + (line as f64 + 0.5) * step;
             for (low, high) in drawn.iter().filter_map(|q| q.cut(y)) {

@@ -49,6 +49,9 @@ pub fn lay(structure: &Structure, heated: &[usize], rigid: &Assembly) -> Result<
     let potentials =
         circuit.solve().map_err(|e| DiscretizeError::SourceLoop { source_name: names[e.source_index].clone() })?;
     let driven = potentials.potential.ncols();
+    let gaps = structure.combs.len() + structure.plate_gaps.len() + structure.beam_gaps.len();
+    // a gap with a voltage of its own is a source
+    crate::budget::lay_out_matrix(gaps + 2 * ports, driven + ports + structure.voltage_sources.len() + gaps);
 
     let voltages = (structure.combs.iter().map(|c| (&c.name, &c.voltage)))
         .chain(structure.plate_gaps.iter().map(|g| (&g.name, &g.voltage)))

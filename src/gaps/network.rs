@@ -78,6 +78,10 @@ impl Circuit {
             }
         }
         let size = free + self.sources.len();
+        // the matrix and its factor, the right-hand sides and the solution, potentials and conductances
+        let count = self.sources.len();
+        crate::budget::lay_out_matrix(size, 2 * size + 2 * count);
+        crate::budget::lay_out_matrix(self.nodes + count, count);
         let mut a = DMatrix::<f64>::zeros(size, size);
         for &(i, k, r) in &self.resistors {
             let (i, k, g) = (row[i], row[k], 1.0 / r);
@@ -98,7 +102,6 @@ impl Circuit {
                 }
             }
         }
-        let count = self.sources.len();
         let mut rhs = DMatrix::<f64>::zeros(size, count);
         for s in 0..count {
             rhs[(free + s, s)] = 1.0;

@@ -80,6 +80,8 @@ impl Heating {
         if let Some(heater) = without_sink(&heaters, sink) {
             return Err(NoHeatSink { heater });
         }
+        crate::budget::lay_out_matrix(2 * free, free + heaters.len());
+        crate::budget::lay_out_matrix(heaters.len(), sources.saturating_mul(sources).saturating_add(driven));
         let mut conduction = DMatrix::<f64>::zeros(free, free);
         let mut share = DMatrix::<f64>::zeros(free, heaters.len());
         for (k, h) in heaters.iter().enumerate() {
@@ -102,6 +104,7 @@ impl Heating {
             heaters.iter().map(|h| potentials.difference(h.a, h.b) / h.resistance).collect();
         let mut form = vec![0.0; heaters.len() * sources * sources];
         for (k, h) in heaters.iter().enumerate() {
+            crate::budget::check();
             for (c, source) in heaters.iter().enumerate() {
                 let at = |node: usize| if row[node] == usize::MAX { 0.0 } else { node_rise[(row[node], c)] };
                 let mut per_watt = 0.5 * (at(h.a) + at(h.b));
@@ -154,6 +157,7 @@ impl Heating {
 fn without_sink(heaters: &[Heater], sink: &[bool]) -> Option<usize> {
     let mut cooled = sink.to_vec();
     loop {
+        crate::budget::check();
         let mut changed = false;
         for h in heaters {
             if cooled[h.a] != cooled[h.b] {

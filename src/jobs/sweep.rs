@@ -10,9 +10,12 @@ mod table;
 
 pub use table::{SweepRow, SweepTable};
 
+use crate::budget::{self, Budget, Stopped};
 use crate::compile::CompileOptions;
 use crate::netlist::{Bundle, Setting};
 use rayon::prelude::*;
+use std::collections::HashSet;
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use thiserror::Error;
 
@@ -113,6 +116,12 @@ pub enum SweepError {
         /// Points of this shard.
         points: u64,
     },
+    /// The table would take more memory than the sweep may use.
+    #[error("the table needs more than {most} bytes; name the outputs that are wanted, or split the sweep into shards")]
+    TooLarge {
+        /// What it may use [byte].
+        most: usize,
+    },
     /// The operating system gave no threads.
     #[error("no worker threads: {reason}")]
     Threads {
@@ -121,7 +130,17 @@ pub enum SweepError {
     },
 }
 
-/// Runs a sweep. `progress` is told after every point, from any thread, and answers whether to go on.
+/// Refuses a specification with names that the netlist does not have; compiles its first point for that. Other errors of a
+/// point are rows of the table.
+///
+/// # Errors
+/// [`SweepError::BadSpec`] with the first such parameter or output.
+pub fn check_names(spec: &SweepSpec, bundle: &Bundle, options: &CompileOptions) -> Result<(), SweepError> {
+    spec.point_numbers()?;
+    point::check_names(spec, bundle, options)
+}
+
+/// Runs a sweep; under a budget, each point has all of its allowance, and the rows together have it once more. `progress` is told after every point, from any thread, and answers whether to go on.
 ///
 /// # Errors
 /// [`SweepError`]; a point without a result is a row with its error, not an error here.
@@ -134,11 +153,16 @@ pub fn run(
     let numbers = spec.point_numbers()?;
     let points = numbers.len() as u64;
     let (done, failed, stop) = (AtomicU64::new(0), AtomicU64::new(0), AtomicBool::new(false));
+    let (budget, full) = (budget::current(), OnceLock::new());
     let one = |&number: &usize| -> Option<point::Outcome> {
         if stop.load(Ordering::Relaxed) {
             return None;
         }
-        let outcome = point::run(spec, number, bundle, options);
+        let outcome = point::run(spec, number, bundle, options, budget.as_ref().map(Budget::part));
+        if let Some(Err(Stopped::Bytes { most, .. })) = budget.as_ref().map(|budget| budget.take(outcome.bytes())) {
+            let _ = full.set(most);
+            stop.store(true, Ordering::Relaxed);
+        }
         if outcome.values.is_err() {
             failed.fetch_add(1, Ordering::Relaxed);
         }
@@ -153,6 +177,9 @@ pub fn run(
         .build()
         .map_err(|error| SweepError::Threads { reason: error.to_string() })?;
     let outcomes: Option<Vec<_>> = pool.install(|| numbers.par_iter().map(one).collect());
+    if let Some(&most) = full.get() {
+        return Err(SweepError::TooLarge { most });
+    }
     match outcomes {
         Some(outcomes) => Ok(table::assemble(spec, outcomes)),
         None => Err(SweepError::Cancelled { done: done.into_inner(), points }),
@@ -184,8 +211,9 @@ impl SweepSpec {
         if count == 0 || index >= count {
             return Err(bad("shard".into(), "i/N with 0 <= i < N", &format!("{index}/{count}")));
         }
-        for (i, axis) in self.parameters.iter().enumerate() {
-            if self.parameters[..i].iter().any(|other| other.name == axis.name) {
+        let mut seen = HashSet::with_capacity(self.parameters.len());
+        for axis in &self.parameters {
+            if !seen.insert(axis.name.as_str()) {
                 return Err(bad("parameters".into(), "each name once", &format!("\"{}\" twice", axis.name)));
             }
         }

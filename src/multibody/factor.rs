@@ -36,6 +36,9 @@ pub struct BlockMatrix<T: Scalar, const N: usize> {
 /// 10,000 segments reaches 2.5e-13.
 const LOST: f64 = 1e-13;
 
+/// Bodies eliminated between two looks at the budget, some ten microseconds.
+const BODIES_PER_CHECK: usize = 64;
+
 /// Where a factorization met a pivot that is zero or not finite.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ZeroPivot {
@@ -99,6 +102,9 @@ impl<T: Scalar, const N: usize> BlockMatrix<T, N> {
             *scale = SVector::from_fn(|i, _| block[(i, i)].modulus());
         }
         for j in 0..pattern.bodies() {
+            if j.is_multiple_of(BODIES_PER_CHECK) {
+                crate::budget::check();
+            }
             let own = Decomposed::new(&self.diagonal[j], &self.scale[j], &mut inertia, &mut |direction| {
                 vanished(ZeroPivot { body: j, direction })
             })?;

@@ -35,6 +35,7 @@ pub fn elimination_order(count: usize, edges: &[(usize, usize)], grounded: &[usi
             continue;
         }
         order.push(vertex as usize);
+        crate::budget::check();
         graph.eliminate(vertex, &mut front);
         for &u in &front {
             heap.push(key(graph.held(u as usize), number[u as usize]));
@@ -85,6 +86,7 @@ impl Remaining {
             self.ground[u as usize] |= self.ground[vertex as usize];
         }
         for (i, &u) in front.iter().enumerate() {
+            crate::budget::check();
             for &w in &front[..i] {
                 if !self.coupled(u, w) {
                     for (from, to) in [(u, w), (w, u)] {

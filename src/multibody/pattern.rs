@@ -21,6 +21,8 @@ pub struct Pattern {
 }
 
 const NONE: u32 = u32::MAX;
+/// Of a block below the diagonal, in the tangents and factors that an analysis has, about [byte].
+const FILL_BYTES: usize = 4 * 72;
 
 impl Pattern {
     /// The pattern of `count` bodies coupled by `edges` (pairs in elimination order; order within a pair and repetitions
@@ -54,6 +56,8 @@ impl Pattern {
         }
         start.push(row.len() as u32);
         row.shrink_to_fit();
+        // a factor holds a block for each, and solvers hold some factors
+        crate::budget::lay_out(row.len() * FILL_BYTES);
         let fill = vec![true; row.len()];
         let mut pattern = Self { start, row, target: Vec::new(), target_start: Vec::new(), fill };
         for &(a, b) in edges {
@@ -70,8 +74,10 @@ impl Pattern {
         let count = self.bodies();
         let mut target_start = Vec::with_capacity(count + 1);
         let pairs = (0..count).map(|j| self.column(j).len()).map(|n| n * n.saturating_sub(1) / 2).sum();
+        crate::budget::lay_out(pairs * size_of::<u32>());
         let mut target = Vec::with_capacity(pairs);
         for j in 0..count {
+            crate::budget::check();
             target_start.push(target.len() as u32);
             let column = &self.row[self.column(j)];
             for (i, &below) in column.iter().enumerate() {

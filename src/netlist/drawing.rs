@@ -1,8 +1,16 @@
 //! The structure under construction, with what is needed to place its nodes.
 
 use super::source::Span;
+use crate::budget;
 use crate::structure::{Beam, Node, NodeId, Structure};
 use std::collections::HashSet;
+
+/// Of a node without its name, about [byte].
+const NODE_BYTES: usize = 200;
+/// Of an element without its name, about [byte].
+pub(crate) const ELEMENT_BYTES: usize = 400;
+/// How often a model and its description hold a name.
+pub(crate) const NAME_COPIES: usize = 4;
 
 /// How one element fixes the positions of its nodes relative to each other.
 #[derive(Debug, Clone)]
@@ -69,6 +77,7 @@ pub(crate) struct Drawing {
 impl Drawing {
     /// A new node.
     pub(crate) fn add_node(&mut self, name: String, span: Span) -> NodeId {
+        budget::lay_out(NODE_BYTES + NAME_COPIES * name.len());
         self.structure.nodes.push(Node { name, position: [0.0; 2], mechanical: false, electrical: false });
         self.first_named.push(span);
         NodeId(self.structure.nodes.len() - 1)

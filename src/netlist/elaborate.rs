@@ -9,6 +9,7 @@ use super::sink::{Reported, Sink};
 use super::source::Span;
 use super::value::{Value, short};
 use crate::structure::NodeId;
+use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::rc::Rc;
 
@@ -43,6 +44,8 @@ pub(crate) struct Elaborator<'p> {
     pub(super) layers: Vec<Option<LayerValues<'p>>>,
     pub(super) drawing: Drawing,
     parameters: Vec<(String, Setting)>,
+    /// Where each stands in `parameters`.
+    parameter_at: HashMap<&'p str, usize>,
     /// Full names given so far, without the anonymous ones.
     pub(super) names: HashSet<String>,
     /// Statements and expressions run so far.
@@ -73,6 +76,7 @@ impl<'p> Elaborator<'p> {
             layers: vec![None; program.layers.len()],
             drawing: Drawing::default(),
             parameters: Vec::new(),
+            parameter_at: HashMap::new(),
             names: HashSet::new(),
             steps: 0,
             elements: 0,
@@ -169,6 +173,7 @@ impl<'p> Elaborator<'p> {
 
     /// Counts a statement; false once the netlist has run or built too much.
     fn may_go_on(&mut self) -> bool {
+        crate::budget::check();
         self.steps += 1;
         let built = self.elements.max(self.drawing.structure.nodes.len());
         if !self.stopped && (self.steps > MOST_STEPS || built > MOST_ELEMENTS) {
@@ -199,9 +204,12 @@ impl<'p> Elaborator<'p> {
             Value::Text(text) => Setting::Text(text.to_string()),
             Value::Undefined | Value::Failed => return value,
         };
-        match self.parameters.iter_mut().find(|(known, _)| known == name) {
-            Some((_, old)) => *old = setting,
-            None => self.parameters.push((name.to_owned(), setting)),
+        match self.parameter_at.entry(name) {
+            Entry::Occupied(at) => self.parameters[*at.get()].1 = setting,
+            Entry::Vacant(at) => {
+                at.insert(self.parameters.len());
+                self.parameters.push((name.to_owned(), setting));
+            }
         }
         value
     }

@@ -1,12 +1,14 @@
 //! Elements and subnet instances: parameters evaluated, layers looked up, frames opened.
 
 use super::ast::{Element, Layer, LayerRef};
+use super::drawing::{ELEMENT_BYTES, NAME_COPIES};
 use super::elaborate::{Elaborator, Frame, LayerValues};
 use super::elements::{self, Argument, Arguments, Instance};
 use super::rotation::Rotation;
 use super::sink::Reported;
 use super::source::Span;
 use super::value::{Value, short};
+use crate::budget;
 use crate::structure::NodeId;
 use std::collections::HashMap;
 use std::rc::Rc;
@@ -35,6 +37,7 @@ impl<'p> Elaborator<'p> {
             Some(name) => {
                 let local = self.name(name)?;
                 let full = format!("{}{local}", self.here().prefix);
+                budget::lay_out(ELEMENT_BYTES + NAME_COPIES * full.len());
                 if self.names.contains(&full) {
                     let message = format!("there is an element `{full}` already");
                     self.sink.warning(
@@ -47,7 +50,10 @@ impl<'p> Elaborator<'p> {
                 self.names.insert(full);
                 local
             }
-            None => Rc::from(format!("anon{}", element.number)),
+            None => {
+                budget::lay_out(ELEMENT_BYTES + NAME_COPIES * self.here().prefix.len());
+                Rc::from(format!("anon{}", element.number))
+            }
         };
         let mut nodes = Vec::with_capacity(element.nodes.len());
         for name in &element.nodes {
@@ -129,6 +135,8 @@ impl<'p> Elaborator<'p> {
         let mut values = Vec::new();
         let mut next: Option<&'p Layer> = Some(&program.layers[index]);
         while let Some(layer) = next {
+            budget::check();
+            budget::lay_out(layer.entries.len() * size_of::<(&str, Value)>());
             for entry in &layer.entries {
                 values.push((&*entry.name.name, self.evaluate(&entry.value)?));
             }
@@ -197,6 +205,7 @@ impl<'p> Elaborator<'p> {
             self.frames[at].nodes.insert(name, *id);
         }
         for formal in &subnet.formals {
+            budget::check();
             let name = &*formal.name.name;
             let actual = given.iter().find(|a| a.name == name).map(|a| a.value.clone());
             let mut value = actual.unwrap_or(Value::Undefined);

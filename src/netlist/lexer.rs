@@ -3,6 +3,12 @@
 use super::sink::Sink;
 use super::source::Span;
 use super::token::{Kind, Token};
+use crate::budget;
+
+/// Tokens between two looks at the budget.
+const CHUNK: usize = 1024;
+/// What a token becomes, with its share of the syntax tree, about [byte].
+const TOKEN_BYTES: usize = 96;
 
 /// Turns the text of file number `file` into tokens. Errors go to the sink; a token stands in for what was wrong.
 pub(crate) fn tokens(file: u16, text: &str, sink: &mut Sink) -> Vec<Token> {
@@ -74,6 +80,10 @@ impl Lexer<'_> {
 
     fn push(&mut self, kind: Kind, start: usize) {
         let span = self.span(start);
+        if self.out.len().is_multiple_of(CHUNK) {
+            budget::check();
+            budget::lay_out(CHUNK * TOKEN_BYTES);
+        }
         self.out.push(Token { kind, span, starts_line: std::mem::take(&mut self.fresh_line) });
     }
 

@@ -31,7 +31,7 @@ mod suggest;
 mod token;
 mod value;
 
-pub use bundle::Bundle;
+pub use bundle::{Bundle, DroppedInclude};
 pub use diagnostic::{Diagnostic, Diagnostics, Severity};
 pub use setting::Setting;
 
@@ -40,6 +40,10 @@ use ast::{Program, Statement};
 use elaborate::Elaborator;
 use sink::Sink;
 use source::Span;
+use std::collections::HashSet;
+
+/// Longer lists of names are cut in messages.
+const MOST_LISTED: usize = 40;
 
 /// What a netlist elaborates to.
 #[derive(Debug, Clone)]
@@ -85,18 +89,24 @@ pub fn element_names() -> impl Iterator<Item = &'static str> {
 
 /// Every name set from outside must be a parameter of the netlist.
 fn check_settings(program: &Program, set: &[(String, Setting)], sink: &mut Sink) {
-    let known: Vec<&str> = program
+    let names = program
         .statements
         .iter()
-        .filter_map(|s| if let Statement::Param { name, .. } = s { Some(&*name.name) } else { None })
-        .collect();
+        .filter_map(|s| if let Statement::Param { name, .. } = s { Some(&*name.name) } else { None });
+    let known: Vec<&str> = names.collect();
+    let sorted: HashSet<&str> = known.iter().copied().collect();
     for (name, _) in set {
-        if known.contains(&name.as_str()) {
+        if sorted.contains(name.as_str()) {
+            continue;
+        }
+        if !sink.suggests() {
+            sink.error("E048", Span::NOWHERE, format!("the netlist has no parameter `{name}` to set"), "");
             continue;
         }
         let mut help = match known.as_slice() {
             [] => "the netlist has no `param`".to_owned(),
-            names => format!("its parameters are {}", names.join(" ")),
+            names if names.len() <= MOST_LISTED => format!("its parameters are {}", names.join(" ")),
+            names => format!("it has {} parameters, {} …", names.len(), names[..MOST_LISTED].join(" ")),
         };
         if let Some(meant) = suggest::nearest(name, known.iter().copied()) {
             help = format!("did you mean `{meant}`? {help}");

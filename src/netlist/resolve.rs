@@ -88,6 +88,7 @@ impl Resolver<'_> {
 
     fn statements(&mut self, statements: &mut [Statement], program: &mut Program) {
         for statement in statements {
+            crate::budget::check();
             self.statement(statement, program);
         }
     }
@@ -203,7 +204,8 @@ impl Resolver<'_> {
 
     fn model(&mut self, model: &Ident) {
         if elements::model(&model.name).is_none() && self.first(&model.name) {
-            let known = self.subnets.keys().map(|k| &**k);
+            let most = if self.sink.suggests() { usize::MAX } else { 0 };
+            let known = self.subnets.keys().map(|k| &**k).take(most);
             elements::unknown(self.sink, &model.name, model.span, known);
         }
     }
@@ -218,8 +220,10 @@ impl Resolver<'_> {
         if !self.first(&layer.name) {
             return;
         }
-        let mut help = did_you_mean(&layer.name, self.layers.keys().map(|k| &**k), "");
-        if help.is_empty() {
+        let suggests = self.sink.suggests();
+        let known = self.layers.keys().map(|k| &**k);
+        let mut help = if suggests { did_you_mean(&layer.name, known, "") } else { String::new() };
+        if help.is_empty() && suggests {
             help = match &*layer.name {
                 "parent" => "`parent` is known inside subnets only".into(),
                 _ if self.incomplete => "it may be defined in the file that cannot be found".into(),
@@ -242,6 +246,9 @@ impl Resolver<'_> {
                 self.layers_used += 1;
                 match self.lookup(name) {
                     Some(found) => *slot = found,
+                    None if self.first(name) && !self.sink.suggests() => {
+                        self.sink.error("E030", expr.span, format!("undefined variable `{name}`"), "");
+                    }
                     None if self.first(name) => {
                         let known: BTreeSet<&str> = self.scopes.iter().flat_map(|s| s.keys().map(|k| &**k)).collect();
                         let otherwise = "a variable must be defined above its first use";
@@ -275,5 +282,5 @@ impl Resolver<'_> {
 }
 
 fn listed<'a>(names: impl Iterator<Item = &'a Rc<str>>) -> String {
-    names.map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", ")
+    names.take(super::MOST_LISTED).map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", ")
 }

@@ -12,6 +12,12 @@ pub(crate) struct Reported;
 /// Messages beyond this many are dropped: nobody reads them, and a loop could make millions.
 const MOST_MESSAGES: usize = 100;
 
+/// Messages that look for a near name.
+const MOST_SUGGESTIONS: usize = 20;
+
+/// Longer messages are cut [byte].
+const LONGEST_MESSAGE: usize = 4000;
+
 /// Longer instance names (deep recursion) are cut in messages.
 const LONGEST_NAME: usize = 60;
 
@@ -53,8 +59,13 @@ impl Sink {
     /// Records output of the netlist itself (`call print`): never merged with other messages.
     pub(crate) fn output(&mut self, code: &'static str, span: Span, message: String) {
         if self.items.len() < MOST_MESSAGES {
-            self.items.push((span, Severity::Warning, code, message, String::new()));
+            self.items.push((span, Severity::Warning, code, cut(message), String::new()));
         }
+    }
+
+    /// Whether messages still look for what was meant, which takes a look at every known name.
+    pub(crate) fn suggests(&self) -> bool {
+        self.items.len() < MOST_SUGGESTIONS
     }
 
     /// True once an error was reported.
@@ -78,7 +89,7 @@ impl Sink {
             let dots = if name.len() < instance.len() { "…" } else { "" };
             help.push_str(&format!("seen in the subnet instance `{name}{dots}`"));
         }
-        self.items.push((span, severity, code, message, help));
+        self.items.push((span, severity, code, cut(message), cut(help)));
     }
 
     /// All messages in order of place.
@@ -112,6 +123,16 @@ fn place(files: &[String], bundle: &Bundle, span: Span) -> (String, usize, usize
     let column = before.rsplit('\n').next().map_or(0, |l| l.chars().count()) + 1;
     let marked = text[start..end].split('\n').next().unwrap_or("");
     (name.clone(), line, column, marked.trim_end().chars().count().max(1))
+}
+
+/// A message that is not longer than anyone reads.
+fn cut(mut message: String) -> String {
+    if message.len() > LONGEST_MESSAGE {
+        message.truncate(floor(&message, LONGEST_MESSAGE));
+        message.shrink_to_fit();
+        message.push('…');
+    }
+    message
 }
 
 /// The nearest character boundary at or before `at`.

@@ -6,6 +6,9 @@ use super::sink::Reported;
 use super::source::Span;
 use super::token::{Kind, Token};
 
+/// Parameters of one element, layer or subnet.
+const MOST_PARAMETERS: usize = 1000;
+
 impl Parser<'_> {
     pub(super) fn line(&mut self) -> Parsed<Statement> {
         match self.peek().kind {
@@ -129,6 +132,7 @@ impl Parser<'_> {
                 self.next();
             }
             formals.push(Formal { name, slot: Slot::NONE, default });
+            self.short(formals.len(), open)?;
         }
         let body = self.block()?;
         self.program.subnets.push(Subnet { name, nodes, formals, body, variables: 0 });
@@ -244,9 +248,19 @@ impl Parser<'_> {
                     let name = self.list_name(open)?;
                     self.expect(Kind::Equals, &format!("`=` after the parameter `{}`", name.name))?;
                     defs.push(Def { name, slot: Slot::NONE, value: self.expression()? });
+                    self.short(defs.len(), open)?;
                 }
             }
         }
+    }
+
+    /// Refuses a list of parameters that nobody wrote: elements look through it for each name they take.
+    fn short(&mut self, length: usize, open: Token) -> Parsed<()> {
+        if length <= MOST_PARAMETERS {
+            return Ok(());
+        }
+        let message = format!("a list of more than {MOST_PARAMETERS} parameters");
+        Err(self.sink.error("E018", open.span, message, "split the element, or name what it takes"))
     }
 
     /// The next name of a parameter list, or the error that the list was left open.

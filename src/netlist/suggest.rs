@@ -1,13 +1,25 @@
 //! "Did you mean": the nearest known name.
 
+/// No name longer than this [characters] is compared.
+const LONGEST: usize = 64;
+
 /// The known name nearest to `name`, if it is near enough to be a slip of the pen.
 pub(crate) fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    let limit = match name.chars().count() {
+    let length = name.chars().count();
+    if length > LONGEST {
+        return None;
+    }
+    let limit = match length {
         0..=2 => 1,
         3..=5 => 2,
         _ => 3,
     };
-    let scored = known.into_iter().filter(|k| *k != name).map(|k| (distance(name, k), k));
+    // names of much other length are far without a look at their letters
+    let near = known.into_iter().filter(|k| *k != name && k.len().abs_diff(name.len()) <= 4 * limit);
+    let scored = near.map(|k| {
+        crate::budget::check();
+        (distance(name, k), k)
+    });
     // Ties go to the name that comes first in the alphabet, so that messages do not depend on any order.
     scored.filter(|(d, k)| *d <= limit && *d < k.chars().count().max(name.chars().count())).min().map(|(_, k)| k)
 }

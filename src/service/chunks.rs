@@ -3,17 +3,23 @@
 use super::convert::analysis::summary_to_wire;
 use super::convert::sweep::row_to_wire;
 use super::rpc::Shared;
+use super::shutdown::Shutdown;
+use super::sweeps::Sweep;
 use super::{proto, status};
 use crate::analysis::AnalysisError;
 use crate::analysis::transient::{TransientOptions, TransientResult, transient};
 use crate::compile::Compiled;
-use crate::jobs::sweep::SweepTable;
 use prost::Message;
 use proto::transient_event::Kind;
+use std::future::Future;
+use std::pin::Pin;
 use std::sync::Arc;
+use std::task::{Context, Poll};
 use std::time::{Duration, Instant};
 use tokio::runtime::Handle;
-use tokio::sync::mpsc;
+use tokio::sync::{OwnedSemaphorePermit, mpsc};
+use tokio_stream::Stream;
+use tokio_util::sync::WaitForCancellationFutureOwned;
 use tonic::Status;
 
 /// Most bytes of one message of a stream.
@@ -28,6 +34,8 @@ pub(super) struct Outlet<T> {
     sender: mpsc::Sender<Result<T, Status>>,
     shared: Arc<Shared>,
     runtime: Handle,
+    /// Where the computation runs; given back while a reader is slow, so that others go on.
+    place: Option<OwnedSemaphorePermit>,
     pub(super) open: bool,
 }
 
@@ -35,12 +43,26 @@ impl<T> Outlet<T> {
     /// An outlet, used from a blocking thread, and what the client reads.
     pub(super) fn new(shared: Arc<Shared>) -> (Self, mpsc::Receiver<Result<T, Status>>) {
         let (sender, receiver) = mpsc::channel(2);
-        (Self { sender, shared, runtime: Handle::current(), open: true }, receiver)
+        (Self { sender, shared, runtime: Handle::current(), place: None, open: true }, receiver)
+    }
+
+    /// The same for a computation that takes a place.
+    pub(super) fn with_place(self, place: OwnedSemaphorePermit) -> Self {
+        Self { place: Some(place), ..self }
     }
 
     /// Sends, or notices that nobody reads any more.
     pub(super) fn send(&mut self, item: Result<T, Status>) {
         let (sender, shared) = (&self.sender, &self.shared);
+        let item = match sender.try_send(item) {
+            Ok(()) => return,
+            Err(mpsc::error::TrySendError::Full(item)) => item,
+            Err(mpsc::error::TrySendError::Closed(_)) => {
+                self.open = false;
+                return;
+            }
+        };
+        let computes = self.place.take().is_some();
         self.open = self.open
             && self.runtime.block_on(async {
                 tokio::select! {
@@ -48,6 +70,14 @@ impl<T> Outlet<T> {
                     () = shared.shutdown.ending.cancelled() => false,
                 }
             });
+        if computes && self.open {
+            self.place = self.runtime.block_on(async {
+                tokio::select! {
+                    place = shared.work.again() => place,
+                    () = sender.closed() => None,
+                }
+            });
+        }
         if shared.shutdown.ending.is_cancelled() {
             let _ = sender.try_send(Err(status::stopping()));
         }
@@ -59,6 +89,7 @@ impl<T> Outlet<T> {
             sender: self.sender.clone(),
             shared: Arc::clone(&self.shared),
             runtime: self.runtime.clone(),
+            place: None,
             open: true,
         }
     }
@@ -138,27 +169,56 @@ impl Pending {
     }
 }
 
-/// Sends a table: columns first, then rows in as few messages as fit.
-pub(super) fn send_table(table: &SweepTable, outlet: &mut Outlet<proto::SweepChunk>) {
-    let mut chunk = proto::SweepChunk {
-        parameters: table.parameters.clone(),
-        results: table.results.clone(),
-        units: table.units.clone(),
-        rows: Vec::new(),
-    };
-    let mut bytes = chunk.encoded_len();
-    for row in &table.rows {
-        let row = row_to_wire(row);
-        let more = row.encoded_len() + 8;
-        if bytes + more > CHUNK_BYTES && !chunk.rows.is_empty() {
-            outlet.send(Ok(std::mem::take(&mut chunk)));
-            bytes = 0;
-        }
-        if !outlet.wanted() {
-            return;
-        }
-        bytes += more;
-        chunk.rows.push(row);
+/// A table on its way: columns first, then rows in as few messages as fit, each made when the one before is taken. A
+/// reader that is slow holds a place and one message, and no thread.
+pub(super) struct TableStream {
+    sweep: Arc<Sweep>,
+    /// Rows sent; none before the first message.
+    sent: Option<usize>,
+    ending: Pin<Box<WaitForCancellationFutureOwned>>,
+    _place: OwnedSemaphorePermit,
+}
+
+impl TableStream {
+    /// The table of a finished sweep.
+    pub(super) fn new(sweep: Arc<Sweep>, place: OwnedSemaphorePermit, shutdown: &Shutdown) -> Self {
+        Self { sweep, sent: None, ending: Box::pin(shutdown.ending.clone().cancelled_owned()), _place: place }
     }
-    outlet.send(Ok(chunk));
+
+    fn next(&mut self) -> Option<proto::SweepChunk> {
+        let table = self.sweep.table()?;
+        let mut chunk = proto::SweepChunk::default();
+        let first = self.sent.is_none();
+        if first {
+            chunk.parameters.clone_from(&table.parameters);
+            chunk.results.clone_from(&table.results);
+            chunk.units.clone_from(&table.units);
+        }
+        let mut bytes = chunk.encoded_len();
+        let mut sent = self.sent.unwrap_or(0);
+        for row in table.rows.get(sent..).unwrap_or_default() {
+            let row = row_to_wire(row);
+            bytes += row.encoded_len() + 8;
+            if bytes > CHUNK_BYTES && !chunk.rows.is_empty() {
+                break;
+            }
+            chunk.rows.push(row);
+            sent += 1;
+        }
+        self.sent = Some(sent);
+        (first || !chunk.rows.is_empty()).then_some(chunk)
+    }
+}
+
+impl Stream for TableStream {
+    type Item = Result<proto::SweepChunk, Status>;
+
+    fn poll_next(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<Option<Self::Item>> {
+        let over = self.sent.is_some_and(|sent| self.sweep.table().is_none_or(|table| sent >= table.rows.len()));
+        if !over && self.ending.as_mut().poll(cx).is_ready() {
+            self.sent = Some(usize::MAX);
+            return Poll::Ready(Some(Err(status::stopping())));
+        }
+        Poll::Ready(self.next().map(Ok))
+    }
 }

@@ -1,60 +1,197 @@
-//! A client's socket that the server can cut.
+//! A client's socket that the server can cut, and the places for such.
+//!
+//! A client that connects and says nothing is closed after the time for a handshake, and when all places are taken the
+//! connection without calls that was idle for longest makes room: silent clients cannot lock others out.
 //!
 //! The HTTP layer waits for its clients when it shuts down; one that never answers would hold the server for as long as
 //! it likes. So the socket itself listens for the order to cut: reads and writes then fail, and the layer above gives up.
 
+use super::limits::Limits;
 use std::future::Future;
 use std::io;
 use std::pin::Pin;
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError, Weak};
 use std::task::{Context, Poll};
+use std::time::{Duration, Instant};
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::net::{TcpStream, UnixStream};
-use tokio::sync::OwnedSemaphorePermit;
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::time::Sleep;
 use tokio_util::sync::{CancellationToken, WaitForCancellationFutureOwned};
 use tonic::transport::server::Connected;
+
+/// Bytes that a client has sent when it has said that it speaks HTTP/2: the preface and the head of its settings.
+const GREETING: usize = 24 + 9;
 
 enum Socket {
     Tcp(TcpStream),
     Unix(UnixStream),
 }
 
+/// What is known of a connection from outside.
+#[derive(Debug)]
+pub(super) struct Presence {
+    opened: Instant,
+    /// Calls under way.
+    calls: AtomicUsize,
+    /// When the last call ended, after `opened` [ms].
+    used_ms: AtomicU64,
+    greeted: AtomicBool,
+    cut: CancellationToken,
+}
+
+impl Presence {
+    fn new(cut: &CancellationToken) -> Arc<Self> {
+        Arc::new(Self {
+            opened: Instant::now(),
+            calls: AtomicUsize::new(0),
+            used_ms: AtomicU64::new(0),
+            greeted: AtomicBool::new(false),
+            cut: cut.child_token(),
+        })
+    }
+
+    /// A call begins.
+    pub(super) fn begin(&self) {
+        self.calls.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// A call ends.
+    pub(super) fn end(&self) {
+        let now = u64::try_from(self.opened.elapsed().as_millis()).unwrap_or(u64::MAX);
+        self.used_ms.store(now, Ordering::Relaxed);
+        self.calls.fetch_sub(1, Ordering::Relaxed);
+    }
+
+    /// How long it has had no call; none while it has one. Before its greeting it counts as idle for ever.
+    fn idle(&self) -> Option<Duration> {
+        if self.calls.load(Ordering::Relaxed) > 0 {
+            return None;
+        }
+        if !self.greeted.load(Ordering::Relaxed) {
+            return Some(Duration::MAX);
+        }
+        Some(self.opened.elapsed().saturating_sub(Duration::from_millis(self.used_ms.load(Ordering::Relaxed))))
+    }
+}
+
+/// The connections of a server and their places.
+#[derive(Debug)]
+pub(super) struct Connections {
+    places: Arc<Semaphore>,
+    open: Mutex<Vec<Weak<Presence>>>,
+    handshake: Duration,
+    cutting: CancellationToken,
+}
+
+impl Connections {
+    pub(super) fn new(limits: &Limits, cutting: &CancellationToken) -> Self {
+        let places = Arc::new(Semaphore::new(limits.connections));
+        Self { places, open: Mutex::default(), handshake: limits.handshake, cutting: cutting.clone() }
+    }
+
+    /// A place for one more: a free one, or that of the connection without calls that was idle for longest.
+    pub(super) async fn place(&self) -> Option<OwnedSemaphorePermit> {
+        if let Ok(place) = Arc::clone(&self.places).try_acquire_owned() {
+            return Some(place);
+        }
+        self.longest_idle()?.cut.cancel();
+        tokio::time::timeout(LETTING_GO, Arc::clone(&self.places).acquire_owned()).await.ok()?.ok()
+    }
+
+    fn longest_idle(&self) -> Option<Arc<Presence>> {
+        let mut open = self.open.lock().unwrap_or_else(PoisonError::into_inner);
+        open.retain(|presence| presence.strong_count() > 0);
+        let idle = open.iter().filter_map(Weak::upgrade).filter(|presence| !presence.cut.is_cancelled());
+        idle.filter_map(|presence| presence.idle().map(|time| (time, presence)))
+            .max_by_key(|(time, _)| *time)
+            .map(|(_, p)| p)
+    }
+
+    fn welcome(&self) -> Arc<Presence> {
+        let presence = Presence::new(&self.cutting);
+        let mut open = self.open.lock().unwrap_or_else(PoisonError::into_inner);
+        if open.len() >= 2 * self.places.available_permits().max(64) {
+            open.retain(|presence| presence.strong_count() > 0);
+        }
+        open.push(Arc::downgrade(&presence));
+        presence
+    }
+
+    /// A connection in a place.
+    pub(super) fn tcp(&self, socket: TcpStream, place: OwnedSemaphorePermit) -> Connection {
+        self.connection(Socket::Tcp(socket), place)
+    }
+
+    /// The same over a Unix socket.
+    pub(super) fn unix(&self, socket: UnixStream, place: OwnedSemaphorePermit) -> Connection {
+        self.connection(Socket::Unix(socket), place)
+    }
+
+    fn connection(&self, socket: Socket, place: OwnedSemaphorePermit) -> Connection {
+        let presence = self.welcome();
+        let cut = Box::pin(presence.cut.clone().cancelled_owned());
+        let greeting = Some(Box::pin(tokio::time::sleep(self.handshake)));
+        Connection { socket, cut, presence, greeting, read: 0, _place: place }
+    }
+}
+
+/// How long a connection may take to let go of its place.
+const LETTING_GO: Duration = Duration::from_secs(1);
+
 /// One accepted connection.
 pub(super) struct Connection {
     socket: Socket,
     cut: Pin<Box<WaitForCancellationFutureOwned>>,
+    presence: Arc<Presence>,
+    /// Runs until the client has greeted.
+    greeting: Option<Pin<Box<Sleep>>>,
+    /// Bytes read until then.
+    read: usize,
     /// Its place among [`super::limits::Limits::connections`].
     _place: OwnedSemaphorePermit,
 }
 
 impl Connection {
-    pub(super) fn tcp(socket: TcpStream, cut: &CancellationToken, place: OwnedSemaphorePermit) -> Self {
-        Self { socket: Socket::Tcp(socket), cut: Box::pin(cut.clone().cancelled_owned()), _place: place }
-    }
-
-    pub(super) fn unix(socket: UnixStream, cut: &CancellationToken, place: OwnedSemaphorePermit) -> Self {
-        Self { socket: Socket::Unix(socket), cut: Box::pin(cut.clone().cancelled_owned()), _place: place }
-    }
-
     fn check(&mut self, cx: &mut Context<'_>) -> io::Result<()> {
         if self.cut.as_mut().poll(cx).is_ready() {
-            return Err(io::Error::new(io::ErrorKind::ConnectionAborted, "the server has stopped"));
+            return Err(io::Error::new(io::ErrorKind::ConnectionAborted, "the server has cut it"));
+        }
+        Ok(())
+    }
+
+    /// After a read of `bytes`: whether the client has greeted in time.
+    fn greet(&mut self, bytes: usize, cx: &mut Context<'_>) -> io::Result<()> {
+        let Some(greeting) = &mut self.greeting else { return Ok(()) };
+        self.read += bytes;
+        if self.read >= GREETING {
+            self.greeting = None;
+            self.presence.greeted.store(true, Ordering::Relaxed);
+        } else if greeting.as_mut().poll(cx).is_ready() {
+            return Err(io::Error::new(io::ErrorKind::TimedOut, "no greeting"));
         }
         Ok(())
     }
 }
 
 impl Connected for Connection {
-    type ConnectInfo = ();
-    fn connect_info(&self) {}
+    type ConnectInfo = Arc<Presence>;
+    fn connect_info(&self) -> Arc<Presence> {
+        Arc::clone(&self.presence)
+    }
 }
 
 impl AsyncRead for Connection {
     fn poll_read(mut self: Pin<&mut Self>, cx: &mut Context<'_>, buf: &mut ReadBuf<'_>) -> Poll<io::Result<()>> {
         self.check(cx)?;
-        match &mut self.socket {
+        let before = buf.filled().len();
+        let read = match &mut self.socket {
             Socket::Tcp(socket) => Pin::new(socket).poll_read(cx, buf),
             Socket::Unix(socket) => Pin::new(socket).poll_read(cx, buf),
-        }
+        };
+        self.greet(buf.filled().len() - before, cx)?;
+        read
     }
 }
 

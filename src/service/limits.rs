@@ -28,10 +28,31 @@ pub struct Limits {
     pub transient_values: usize,
     /// Most modes of one request, default 1 000.
     pub modes: usize,
+    /// Most unknowns times the square of the modes of one request, default 2e9: what one restart of the iteration takes, which
+    /// cannot be stopped half way.
+    pub mode_work: usize,
     /// Analyses computed at once, default the number of cores; others wait their turn. As many compilations and openings
     /// have places of their own, so that long transients do not keep a circuit from starting.
     pub analyses: usize,
-    /// Most connections at once, default 512; further ones are closed as they come.
+    /// Bytes that one computation may lay out, all together, default 512 MiB. Counted before they are laid out.
+    pub memory: usize,
+    /// Processor time of one computation, default 1 h. Unary calls end earlier, at `request_timeout`.
+    pub cpu: Duration,
+    /// Most signals, outputs, events or ports of one request, default 10 000.
+    pub signals: usize,
+    /// Most transients and tables being sent at once, default 64: each may wait for a reader that is slow.
+    pub result_streams: usize,
+    /// Most calls at once, streams among them, default 4 096.
+    pub calls: usize,
+    /// Most bytes of requests that are held at once, default 256 MiB: those being received, and those of unary calls until
+    /// they are answered.
+    pub held_bytes: usize,
+    /// Longest pause inside a request [s], default 20 s: a message that was begun must go on.
+    pub request_pause: Duration,
+    /// A connection that has not said what it speaks by then is closed [s], default 10 s.
+    pub handshake: Duration,
+    /// Most connections at once, default 512. A further one takes the place of the one without calls that was idle for
+    /// longest; with none such it is closed as it comes.
     pub connections: usize,
     /// Most HTTP/2 streams of one connection, default 128.
     pub streams_per_connection: u32,
@@ -60,7 +81,16 @@ impl Default for Limits {
             sweeps: 16,
             transient_values: 100_000_000,
             modes: 1_000,
+            mode_work: 2_000_000_000,
             analyses: std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
+            memory: 512 << 20,
+            cpu: Duration::from_secs(3600),
+            signals: 10_000,
+            result_streams: 64,
+            calls: 4096,
+            held_bytes: 256 << 20,
+            request_pause: Duration::from_secs(20),
+            handshake: Duration::from_secs(10),
             connections: 512,
             streams_per_connection: 128,
             request_timeout: Duration::from_secs(120),
@@ -85,6 +115,14 @@ impl Limits {
             transient_values: self.transient_values as u64,
             request_timeout_s: self.request_timeout.as_secs_f64(),
             idle_s: self.idle.as_secs_f64(),
+            memory_bytes: self.memory as u64,
+            cpu_s: self.cpu.as_secs_f64(),
+            signals: self.signals as u64,
+            modes: self.modes as u64,
+            result_streams: self.result_streams as u64,
+            calls: self.calls as u64,
+            held_bytes: self.held_bytes as u64,
+            connections: self.connections as u64,
         }
     }
 }

@@ -3,8 +3,9 @@
 //! # Layout
 //! [`proto`] is what travels and [`convert`] the only place that knows both it and the library's own types. [`client`]
 //! is built with the feature `remote` alone. The rest is the feature `server`: [`server`] listens and stops
-//! (`sockets`, `connection`, `shutdown`), `rpc` answers calls, `stream` is the Newton loop, `models`, `sessions` and
+//! (`sockets`, `connection`, `shutdown`), `intake` counts what comes in, `rpc` answers calls, `stream` is the Newton loop, `models`, `sessions` and
 //! `sweeps` keep what clients can name, `work` computes, `chunks` sends what is long, `status` says what went wrong,
+//! [`log`] says it without waiting, `ids` makes names that nobody guesses,
 //! and [`limits`] is what clients may ask for.
 
 pub mod address;
@@ -17,7 +18,13 @@ mod chunks;
 #[cfg(feature = "server")]
 mod connection;
 #[cfg(feature = "server")]
+mod ids;
+#[cfg(feature = "server")]
+mod intake;
+#[cfg(feature = "server")]
 pub mod limits;
+#[cfg(feature = "server")]
+pub mod log;
 #[cfg(feature = "server")]
 mod models;
 #[cfg(feature = "server")]

@@ -1,6 +1,6 @@
 //! The calls of `service.proto`: check, look up, compute, convert.
 
-use super::chunks::{HEARTBEAT, Outlet, send_table, send_transient};
+use super::chunks::{HEARTBEAT, Outlet, TableStream, send_transient};
 use super::convert::{
     self, Violation, analysis as results, model as text, options as options_wire, sweep as sweeps_wire,
 };
@@ -11,11 +11,12 @@ use super::sessions::{Question, Sessions};
 use super::shutdown::Shutdown;
 use super::stream::TrialStream;
 use super::sweeps::Sweeps;
-use super::work::{Work, guarded};
+use super::work::{Results, Work, guarded};
 use super::{proto, status};
 use crate::analysis::integrator::Integrator;
 use crate::analysis::transient::TransientOptions;
 use crate::analysis::{modes, pull_in, statics};
+use crate::budget::Budget;
 use crate::compile::{CompileError, CompileOptions, compile};
 use crate::device::Token;
 use crate::netlist::Bundle;
@@ -26,6 +27,7 @@ use proto::sweep_status::State;
 use std::pin::Pin;
 use std::sync::Arc;
 use std::time::Duration;
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Request, Response, Status, Streaming};
 
@@ -40,6 +42,10 @@ pub(super) struct Shared {
     pub(super) work: Work,
     /// Places for what a circuit waits for before it can start.
     pub(super) desk: Work,
+    /// Places for trials that take longer than may pass where requests arrive.
+    pub(super) trials: Work,
+    /// Places for results that are being sent.
+    pub(super) results: Arc<Semaphore>,
     pub(super) shutdown: Shutdown,
 }
 
@@ -62,6 +68,13 @@ impl Calls {
         let bundle = text::bundle_from_wire(bundle).map_err(status::violation)?;
         check_size(&bundle, &self.0.limits)?;
         Ok((bundle, options_wire::options_from_wire(options).map_err(status::violation)?))
+    }
+
+    /// A place for results that are being sent.
+    fn sending(&self) -> Result<OwnedSemaphorePermit, Status> {
+        let most = self.0.limits.result_streams;
+        let place = Arc::clone(&self.0.results).try_acquire_owned();
+        place.map_err(|_| status::limit("result_streams", most, "one more; read or end those that are open"))
     }
 
     /// Looks up a model, then computes on it.
@@ -114,18 +127,20 @@ impl proto::bimorph_server::Bimorph for Calls {
     async fn open(&self, request: Request<proto::OpenRequest>) -> Reply<proto::OpenResponse> {
         let (shared, request) = (Arc::clone(&self.0), request.into_inner());
         let model = shared.models.get(&request.model)?;
-        let job = move || {
+        count("ports", request.ports.len(), &shared.limits)?;
+        count("signals", request.signals.len(), &shared.limits)?;
+        let job = move |budget: &Budget| {
             let session = shared.sessions.create(&model, shared.make, &shared.limits)?;
-            match session.answer(Question::Open(request)) {
+            match session.answer(&Question::Open(request), budget) {
                 Some(ReplyKind::Opened(opened)) => Ok(opened),
                 Some(ReplyKind::Fault(fault)) => {
                     shared.sessions.close(session.id());
-                    Err(status::device(&convert::device::fault_from_wire(fault, "here")))
+                    Err(refusal(fault))
                 }
                 _ => Err(status::fault()),
             }
         };
-        self.0.desk.run(job).await.map(Response::new)
+        self.0.desk.run_with(job).await.map(Response::new)
     }
 
     type TrialStream = TrialStream;
@@ -137,7 +152,11 @@ impl proto::bimorph_server::Bimorph for Calls {
     async fn linearize(&self, request: Request<proto::LinearizeRequest>) -> Reply<proto::LinearizeResponse> {
         let request = request.into_inner();
         let session = self.0.sessions.get(&request.session)?;
-        let job = move || session.linearize(Token(request.token), &request.omega);
+        let turn = session.turn().await?;
+        let job = move || {
+            let _turn = turn;
+            session.linearize(Token(request.token), &request.omega)
+        };
         let points = self.0.desk.run(job).await?;
         Ok(Response::new(proto::LinearizeResponse { points }))
     }
@@ -164,7 +183,12 @@ impl proto::bimorph_server::Bimorph for Calls {
         if count > self.0.limits.modes {
             return Err(status::limit("modes", self.0.limits.modes, count));
         }
+        let most = self.0.limits.mode_work;
         let job = move |model: &Model| {
+            let work = model.unknowns().saturating_mul(count.saturating_mul(count));
+            if work > most {
+                return Err(status::limit("mode_work", most, work));
+            }
             let result = modes::modes(&model.compiled, count, &voltages).map_err(status::analysis)?;
             Ok(results::modes_to_wire(&result))
         };
@@ -183,7 +207,7 @@ impl proto::bimorph_server::Bimorph for Calls {
         self.analyse(&request.model, job).await
     }
 
-    type TransientStream = ReceiverStream<Result<proto::TransientEvent, Status>>;
+    type TransientStream = Results<ReceiverStream<Result<proto::TransientEvent, Status>>>;
 
     async fn transient(&self, request: Request<proto::TransientRequest>) -> Reply<Self::TransientStream> {
         let request = request.into_inner();
@@ -201,6 +225,8 @@ impl proto::bimorph_server::Bimorph for Calls {
         };
         let points = if request.points == 0 { TRAN_POINTS.count() } else { request.points as usize };
         given(&TRAN_POINTS, Value::Count(points))?;
+        count("signals", request.signals.len(), &self.0.limits)?;
+        count("events", request.events.len(), &self.0.limits)?;
         let values = points.saturating_mul(request.signals.len() + 1);
         if values > self.0.limits.transient_values {
             return Err(status::limit("transient_values", self.0.limits.transient_values, values));
@@ -231,11 +257,15 @@ impl proto::bimorph_server::Bimorph for Calls {
         };
         let events = convert::pairs(request.events);
         let (signals, voltages) = (request.signals, voltages(request.voltages)?);
+        let sending = self.sending()?;
         let place = self.0.work.place().await?;
+        let budget = self.0.work.budget();
         let (outlet, receiver) = Outlet::new(Arc::clone(&self.0));
+        let outlet = outlet.with_place(place);
+        let results = Results::new(ReceiverStream::new(receiver), budget.clone());
         let mut failed = outlet.also();
         tokio::task::spawn_blocking(move || {
-            let _place = place;
+            let _sending = sending;
             let job = || {
                 let release = release.as_ref().map(|model| &*model.compiled);
                 let options = TransientOptions {
@@ -248,16 +278,17 @@ impl proto::bimorph_server::Bimorph for Calls {
                     method,
                     step,
                     events,
+                    keep: false,
                     ..TransientOptions::default()
                 };
                 send_transient(&model.compiled, &options, outlet);
                 Ok(())
             };
-            if let Err(status) = guarded(job) {
+            if let Err(status) = guarded(&budget, job) {
                 failed.send(Err(status));
             }
         });
-        Ok(Response::new(ReceiverStream::new(receiver)))
+        Ok(Response::new(results))
     }
 
     async fn submit_sweep(&self, request: Request<proto::SubmitSweepRequest>) -> Reply<proto::SubmitSweepResponse> {
@@ -267,8 +298,21 @@ impl proto::bimorph_server::Bimorph for Calls {
         let request = request.into_inner();
         let (bundle, options) = self.netlist(request.bundle, request.options)?;
         let limits = &self.0.limits;
-        let spec = sweeps_wire::spec_from_wire(request.spec, limits.sweep_points).map_err(status::violation)?;
-        let (sweep, points) = self.0.sweeps.submit(spec, bundle, options, limits)?;
+        let points = request.spec.as_ref().map_or(0, sweeps_wire::grid_points);
+        if points > limits.sweep_points {
+            return Err(status::limit("sweep_points", limits.sweep_points, points));
+        }
+        if let Some(proto::sweep_spec::Analysis::Static(asked)) =
+            request.spec.as_ref().and_then(|s| s.analysis.as_ref())
+        {
+            count("outputs", asked.outputs.len(), limits)?;
+        }
+        let shared = Arc::clone(&self.0);
+        let job = move || {
+            let spec = sweeps_wire::spec_from_wire(request.spec).map_err(status::violation)?;
+            shared.sweeps.submit(spec, bundle, options, &shared.limits)
+        };
+        let (sweep, points) = self.0.desk.run(job).await?;
         Ok(Response::new(proto::SubmitSweepResponse { sweep, points }))
     }
 
@@ -300,7 +344,7 @@ impl proto::bimorph_server::Bimorph for Calls {
         Ok(Response::new(Box::pin(ReceiverStream::new(receiver))))
     }
 
-    type FetchSweepStream = ReceiverStream<Result<proto::SweepChunk, Status>>;
+    type FetchSweepStream = TableStream;
 
     async fn fetch_sweep(&self, request: Request<proto::FetchSweepRequest>) -> Reply<Self::FetchSweepStream> {
         let sweep = self.0.sweeps.get(&request.get_ref().sweep)?;
@@ -309,14 +353,25 @@ impl proto::bimorph_server::Bimorph for Calls {
             let text = format!("the sweep has no table: {done} of {points} points done {message}");
             return Err(Status::failed_precondition(text.trim_end()));
         }
-        let (mut outlet, receiver) = Outlet::new(Arc::clone(&self.0));
-        tokio::task::spawn_blocking(move || sweep.table().map(|table| send_table(table, &mut outlet)));
-        Ok(Response::new(ReceiverStream::new(receiver)))
+        Ok(Response::new(TableStream::new(sweep, self.sending()?, &self.0.shutdown)))
     }
 
     async fn cancel_sweep(&self, request: Request<proto::CancelSweepRequest>) -> Reply<proto::CancelSweepResponse> {
         self.0.sweeps.cancel(&request.get_ref().sweep)?;
         Ok(Response::new(proto::CancelSweepResponse {}))
+    }
+}
+
+/// Refuses a list that is longer than anyone needs, before anything is looked up for it.
+fn count(what: &str, got: usize, limits: &Limits) -> Result<(), Status> {
+    if got > limits.signals { Err(status::limit(what, limits.signals, got)) } else { Ok(()) }
+}
+
+/// A fault of a session as the status of a unary call.
+fn refusal(fault: proto::Fault) -> Status {
+    match fault.kind {
+        Some(proto::fault::Kind::Refused(proto::Refused { code })) => Status::new(code.into(), fault.message),
+        _ => status::device(&convert::device::fault_from_wire(fault, "here")),
     }
 }
 

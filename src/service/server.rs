@@ -1,7 +1,10 @@
 //! Runs the service: listen, serve, drain, stop.
 
 use super::address::Address;
+use super::connection::Connections;
+use super::intake::{Gate, Intake};
 use super::limits::Limits;
+use super::log::{self, Lines};
 use super::models::Models;
 use super::proto::{DESCRIPTORS, bimorph_server::BimorphServer};
 use super::rpc::{Calls, Shared};
@@ -14,7 +17,6 @@ use crate::compile::Compiled;
 use crate::device::Device;
 use crate::device::local::LocalDevice;
 use std::future::Future;
-use std::hash::{BuildHasher, RandomState};
 use std::io::IsTerminal;
 use std::sync::Arc;
 use std::time::Duration;
@@ -26,6 +28,11 @@ use tracing_subscriber::filter::{LevelFilter, Targets};
 use tracing_subscriber::layer::SubscriberExt;
 use tracing_subscriber::util::SubscriberInitExt;
 
+/// Bytes that a client may send ahead of what was read, over all streams of its connection.
+const CONNECTION_WINDOW: u32 = 256 << 10;
+/// How long the last log lines may take to be written.
+const LAST_WORDS: Duration = Duration::from_millis(200);
+
 /// What a server may be told.
 pub struct ServeOptions {
     /// Addresses to listen on; at least one. See [`Address`].
@@ -34,6 +41,9 @@ pub struct ServeOptions {
     pub insecure: bool,
     /// What clients may ask for.
     pub limits: Limits,
+    /// Whether [`run_until_signal`] also ends when standard input does: a program that starts a server for itself holds the
+    /// other end of a pipe, which the system closes however that program ends.
+    pub while_stdin: bool,
     /// Called once, when every address accepts connections, with the addresses as bound (port 0 replaced).
     pub ready: Ready,
 }
@@ -46,7 +56,13 @@ pub type MakeDevice = fn(Arc<Compiled>) -> Box<dyn Device>;
 
 impl Default for ServeOptions {
     fn default() -> Self {
-        Self { listen: Vec::new(), insecure: false, limits: Limits::default(), ready: Box::new(|_| {}) }
+        Self {
+            listen: Vec::new(),
+            insecure: false,
+            limits: Limits::default(),
+            while_stdin: false,
+            ready: Box::new(|_| {}),
+        }
     }
 }
 
@@ -111,7 +127,7 @@ pub async fn run_with(
     make: MakeDevice,
     shutdown: impl Future<Output = ()> + Send,
 ) -> Result<(), ServeError> {
-    let ServeOptions { listen, insecure, limits, ready } = options;
+    let ServeOptions { listen, insecure, limits, ready, while_stdin: _ } = options;
     if listen.is_empty() {
         return Err(ServeError::NoAddress);
     }
@@ -122,23 +138,23 @@ pub async fn run_with(
     let bound: Vec<Address> = listeners.iter().map(Listener::address).collect();
     let signals = Shutdown::default();
     let (sender, incoming) = mpsc::channel(16);
-    let places = Arc::new(Semaphore::new(limits.connections));
+    let connections = Arc::new(Connections::new(&limits, &signals.cutting));
     let mut accepting = tokio::task::JoinSet::new();
     for listener in listeners {
-        accepting.spawn(listener.accept(Arc::clone(&places), signals.clone(), sender.clone()));
+        accepting.spawn(listener.accept(Arc::clone(&connections), signals.clone(), sender.clone()));
     }
     drop(sender);
 
-    // Ids of one run mean nothing to the next.
-    let instance = RandomState::new().hash_one(std::process::id()) as u32;
     let shared = Arc::new(Shared {
-        work: Work::new(limits.analyses, limits.request_timeout, signals.clone()),
-        desk: Work::new(limits.analyses, limits.request_timeout, signals.clone()),
+        work: Work::new(limits.analyses, &limits, signals.clone()),
+        desk: Work::new(limits.analyses, &limits, signals.clone()),
+        trials: Work::new(2 * limits.analyses, &limits, signals.clone()),
+        results: Arc::new(Semaphore::new(limits.result_streams)),
         limits,
         make,
         models: Models::default(),
-        sessions: Sessions::new(instance),
-        sweeps: Sweeps::new(instance),
+        sessions: Sessions::default(),
+        sweeps: Sweeps::new(),
         shutdown: signals.clone(),
     });
     let calls = BimorphServer::new(Calls(Arc::clone(&shared)))
@@ -151,14 +167,22 @@ pub async fn run_with(
             .register_encoded_file_descriptor_set(DESCRIPTORS)
             .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
     };
+    let gate = Gate::new(&shared.limits);
+    let reflection = |error: &dyn Fn(&dyn std::error::Error) -> ServeError| {
+        let v1 = reflection().build_v1().map_err(|e| error(&e))?;
+        let v1alpha = reflection().build_v1alpha().map_err(|e| error(&e))?;
+        Ok::<_, ServeError>((Intake::new(v1, &gate), Intake::new(v1alpha, &gate)))
+    };
     let transport = |error: &dyn std::error::Error| ServeError::Transport(with_sources(error));
+    let (v1, v1alpha) = reflection(&transport)?;
     let mut serving = std::pin::pin!(
         Server::builder()
             .max_concurrent_streams(shared.limits.streams_per_connection)
-            .add_service(calls)
-            .add_service(health_service)
-            .add_service(reflection().build_v1().map_err(|error| transport(&error))?)
-            .add_service(reflection().build_v1alpha().map_err(|error| transport(&error))?)
+            .initial_connection_window_size(CONNECTION_WINDOW)
+            .add_service(Intake::new(calls, &gate))
+            .add_service(Intake::new(health_service, &gate))
+            .add_service(v1)
+            .add_service(v1alpha)
             .serve_with_incoming_shutdown(ReceiverStream::new(incoming), signals.draining.clone().cancelled_owned())
     );
     let expiry = tokio::spawn(expire(Arc::clone(&shared)));
@@ -188,7 +212,8 @@ pub async fn run_with(
     ended.unwrap_or(Ok(())).map_err(|error| transport(&error))
 }
 
-/// [`run`] on threads of its own, until SIGINT or SIGTERM: what `bimorph serve` calls. A second signal stops at once.
+/// [`run`] on threads of its own, until SIGINT or SIGTERM, or the end of standard input where
+/// [`ServeOptions::while_stdin`] says so: what `bimorph serve` calls. A second signal stops at once.
 /// What happens is logged on standard error: warnings and faults, or what the environment variable `BIMORPH_LOG` says
 /// (`info`, `debug`, …).
 ///
@@ -199,13 +224,14 @@ pub fn run_until_signal(options: ServeOptions) -> Result<(), ServeError> {
     let filter = wanted.unwrap_or_else(|| Targets::new().with_default(LevelFilter::WARN));
     // A host program that logs already goes on as it does.
     let ansi = std::io::stderr().is_terminal();
-    let log = tracing_subscriber::fmt().with_max_level(LevelFilter::TRACE).with_ansi(ansi).with_writer(std::io::stderr);
+    let log = tracing_subscriber::fmt().with_max_level(LevelFilter::TRACE).with_ansi(ansi).with_writer(|| Lines);
     let _ = log.finish().with(filter).try_init();
     let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build().map_err(ServeError::Runtime)?;
     let outcome = runtime.block_on(async {
         use tokio::signal::unix::{SignalKind, signal};
         let mut interrupt = signal(SignalKind::interrupt()).map_err(ServeError::Runtime)?;
         let mut terminate = signal(SignalKind::terminate()).map_err(ServeError::Runtime)?;
+        let input = input_ends(options.while_stdin);
         let (first, told) = tokio::sync::oneshot::channel();
         let mut serving = std::pin::pin!(run(options, async {
             let _ = told.await;
@@ -214,6 +240,7 @@ pub fn run_until_signal(options: ServeOptions) -> Result<(), ServeError> {
             outcome = &mut serving => return outcome,
             _ = interrupt.recv() => {}
             _ = terminate.recv() => {}
+            () = input => {}
         }
         let _ = first.send(());
         tokio::select! {
@@ -224,7 +251,22 @@ pub fn run_until_signal(options: ServeOptions) -> Result<(), ServeError> {
     });
     // A computation that nobody waits for any more must not hold the process.
     runtime.shutdown_background();
+    log::flush(LAST_WORDS);
     outcome
+}
+
+/// Resolves when standard input ends; never without `asked`.
+async fn input_ends(asked: bool) {
+    let (ended, end) = tokio::sync::oneshot::channel::<()>();
+    let reader = move || {
+        let _ = std::io::copy(&mut std::io::stdin().lock(), &mut std::io::sink());
+        drop(ended);
+    };
+    if asked && std::thread::Builder::new().name("stdin".into()).spawn(reader).is_ok() {
+        let _ = end.await;
+    } else {
+        std::future::pending::<()>().await;
+    }
 }
 
 /// Forgets what was not used for [`Limits::idle`], for as long as the server runs.

@@ -1,17 +1,21 @@
 //! Open devices: who may ask them, how many there are, and when one is forgotten.
 
 use super::convert::device as wire;
+use super::ids::Ids;
 use super::limits::Limits;
 use super::models::Model;
 use super::server::MakeDevice;
+use super::work::caught;
 use super::{proto, status};
+use crate::budget::{self, Allowance, Budget, Stopped};
 use crate::device::{Device, DeviceError, OpenRequest, SmallSignal, Token, TrialReply};
 use proto::device_reply::Kind as ReplyKind;
 use std::collections::BTreeMap;
-use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::panic::catch_unwind;
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 use std::time::{Duration, Instant};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tonic::Status;
 
 /// One device with its states.
@@ -20,14 +24,26 @@ pub(super) struct Session {
     model: String,
     device: Mutex<Box<dyn Device>>,
     description: Mutex<proto::DeviceDescription>,
-    /// Whether a trial is short enough to run where its request arrives.
-    pub(super) inline: bool,
+    /// Whether a trial is likely to be short enough to run where its request arrives.
+    inline: bool,
+    /// Questions that go to a thread before the next try.
+    slow: AtomicU32,
+    /// Held by who works on the device for long.
+    turn: Arc<Semaphore>,
     started: Instant,
     used_ms: AtomicU64,
     closed: AtomicBool,
     /// Streams that hold this session.
     streams: AtomicUsize,
 }
+
+/// A question that needs a thread.
+pub(super) struct Later;
+
+/// Longest computation where requests arrive.
+const SLICE: Duration = Duration::from_millis(5);
+/// After one that took longer, so many questions go to a thread at once.
+const AFTER_SLOW: u32 = 64;
 
 /// What a stream asks of its session.
 pub(super) enum Question {
@@ -46,27 +62,66 @@ impl Session {
         &self.model
     }
 
-    /// Answers one question; none for an accept. A fault inside closes this session and no other.
-    pub(super) fn answer(&self, question: Question) -> Option<ReplyKind> {
-        if self.is_closed() {
-            let silent = matches!(question, Question::Accept(_));
-            return (!silent).then(|| refused(&status::not_found("session", &self.id)));
+    /// Answers one question; none for an accept. Waits for the device. A fault inside closes this session and no other;
+    /// what the budget stops is refused, and the session goes on.
+    pub(super) fn answer(&self, question: &Question, budget: &Budget) -> Option<ReplyKind> {
+        let device = self.device.lock().unwrap_or_else(PoisonError::into_inner);
+        self.answer_with(device, question, budget).unwrap_or_else(|why| self.refuse(question, &status::stopped(why)))
+    }
+
+    /// The same where requests arrive, for which nothing may wait: answers only if the device is free and the answer takes
+    /// less than `SLICE`.
+    ///
+    /// # Errors
+    /// [`Later`]: to be asked again with [`Session::answer`], on a thread. Trials are pure, so nothing has happened.
+    pub(super) fn answer_at_once(&self, question: &Question) -> Result<Option<ReplyKind>, Later> {
+        if !self.inline || self.slow.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |n| n.checked_sub(1)).is_ok() {
+            return Err(Later);
         }
-        self.touch();
-        let outcome = catch_unwind(AssertUnwindSafe(|| {
-            let mut device = self.device.lock().unwrap_or_else(PoisonError::into_inner);
-            self.ask(device.as_mut(), question)
-        }));
-        outcome.unwrap_or_else(|_| {
-            self.fault();
-            Some(refused(&status::fault()))
+        let device = match self.device.try_lock() {
+            Ok(device) => device,
+            Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
+            Err(TryLockError::WouldBlock) => return Err(Later),
+        };
+        let deadline = Some(Instant::now() + SLICE);
+        let slice = Budget::new(Allowance { deadline, ..Allowance::default() });
+        self.answer_with(device, question, &slice).map_err(|_| {
+            self.slow.store(AFTER_SLOW, Ordering::Relaxed);
+            Later
         })
     }
 
-    fn ask(&self, device: &mut dyn Device, question: Question) -> Option<ReplyKind> {
+    fn answer_with(
+        &self,
+        mut device: MutexGuard<'_, Box<dyn Device>>,
+        question: &Question,
+        budget: &Budget,
+    ) -> Result<Option<ReplyKind>, Stopped> {
+        if self.is_closed() {
+            return Ok(self.refuse(question, &status::not_found("session", &self.id)));
+        }
+        self.touch();
+        match caught(budget, || self.ask(device.as_mut(), question)) {
+            Some(Ok(reply)) => Ok(reply),
+            Some(Err(why)) => {
+                device.recover();
+                Err(why)
+            }
+            None => {
+                self.fault();
+                Ok(self.refuse(question, &status::fault()))
+            }
+        }
+    }
+
+    fn refuse(&self, question: &Question, status: &Status) -> Option<ReplyKind> {
+        (!matches!(question, Question::Accept(_))).then(|| refused(status))
+    }
+
+    fn ask(&self, device: &mut dyn Device, question: &Question) -> Option<ReplyKind> {
         let answer = match question {
             Question::Open(request) => {
-                let request = OpenRequest { ports: request.ports, signals: request.signals };
+                let request = OpenRequest { ports: request.ports.clone(), signals: request.signals.clone() };
                 device.open(&request).map(|description| {
                     let description = wire::description_to_wire(&description);
                     *self.description.lock().unwrap_or_else(PoisonError::into_inner) = description;
@@ -75,12 +130,12 @@ impl Session {
             }
             Question::Trial(request) => {
                 let mut reply = TrialReply::default();
-                wire::trial_from_wire(&request)
+                wire::trial_from_wire(request)
                     .and_then(|trial| device.trial(&trial, &mut reply))
                     .map(|()| ReplyKind::Trial(wire::reply_to_wire(&mut reply)))
             }
             Question::Accept(token) => {
-                device.accept(token);
+                device.accept(*token);
                 return None;
             }
             Question::Linearize(request) => {
@@ -90,16 +145,24 @@ impl Session {
         Some(answer.unwrap_or_else(|error| ReplyKind::Fault(wire::fault_to_wire(&error))))
     }
 
-    /// Small-signal answers at several frequencies, for the unary call.
+    /// Waits for this session's turn, without a thread: who works on its device for long holds it.
+    pub(super) async fn turn(&self) -> Result<OwnedSemaphorePermit, Status> {
+        Arc::clone(&self.turn).acquire_owned().await.map_err(|_| status::fault())
+    }
+
+    /// Small-signal answers at several frequencies, for the unary call, which runs under a budget of its own.
     pub(super) fn linearize(&self, token: Token, omega: &[f64]) -> Result<Vec<proto::SmallSignal>, Status> {
         self.touch();
-        let outcome = catch_unwind(AssertUnwindSafe(|| {
-            let mut device = self.device.lock().unwrap_or_else(PoisonError::into_inner);
-            omega.iter().map(|&omega| small_signal(device.as_mut(), token, omega)).collect::<Result<_, _>>()
-        }));
-        match outcome {
-            Ok(answer) => answer.map_err(|error| status::device(&error)),
-            Err(_) => {
+        let mut device = self.device.lock().unwrap_or_else(PoisonError::into_inner);
+        let budget = budget::current().unwrap_or_else(|| Budget::new(Allowance::default()));
+        let one = |&omega: &f64, device: &mut dyn Device| small_signal(device, token, omega);
+        match caught(&budget, || omega.iter().map(|omega| one(omega, device.as_mut())).collect::<Result<_, _>>()) {
+            Some(Ok(answer)) => answer.map_err(|error| status::device(&error)),
+            Some(Err(why)) => {
+                device.recover();
+                Err(status::stopped(why))
+            }
+            None => {
                 self.fault();
                 Err(status::fault())
             }
@@ -167,27 +230,23 @@ pub(super) fn refused(status: &Status) -> ReplyKind {
 }
 
 /// The sessions of a server.
+#[derive(Default)]
 pub(super) struct Sessions {
     open: Mutex<BTreeMap<String, Arc<Session>>>,
-    instance: u32,
-    opened: AtomicU64,
+    ids: Ids,
 }
 
 impl Sessions {
-    /// No sessions yet; `instance` keeps ids of one server run from being taken for another's.
-    pub(super) fn new(instance: u32) -> Self {
-        Self { open: Mutex::default(), instance, opened: AtomicU64::new(0) }
-    }
-
     /// Makes a session with a device that is not open yet.
     pub(super) fn create(&self, model: &Model, make: MakeDevice, limits: &Limits) -> Result<Arc<Session>, Status> {
         let device = catch_unwind(|| make(Arc::clone(&model.compiled))).map_err(|_| status::fault())?;
-        let number = self.opened.fetch_add(1, Ordering::Relaxed) + 1;
         let session = Arc::new(Session {
-            id: format!("{:08x}-{number}", self.instance),
+            id: self.ids.make()?,
             model: model.id().to_owned(),
             device: Mutex::new(device),
             description: Mutex::default(),
+            slow: AtomicU32::new(0),
+            turn: Arc::new(Semaphore::new(1)),
             inline: model.unknowns() <= limits.inline_unknowns,
             started: Instant::now(),
             used_ms: AtomicU64::new(0),

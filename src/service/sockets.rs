@@ -1,7 +1,7 @@
 //! Opening the addresses of a server, and leaving no socket file behind.
 
 use super::address::Address;
-use super::connection::Connection;
+use super::connection::{Connection, Connections};
 use super::server::ServeError;
 use super::shutdown::Shutdown;
 use std::fs;
@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::net::{TcpListener, UnixListener};
-use tokio::sync::{Semaphore, mpsc};
+use tokio::sync::mpsc;
 
 /// Pause after a failed accept (no file descriptors left, say), so that it does not spin.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(50);
@@ -57,18 +57,18 @@ impl Listener {
     /// Accepts until draining starts; the socket file goes with the listener.
     pub(super) async fn accept(
         self,
-        places: Arc<Semaphore>,
+        connections: Arc<Connections>,
         shutdown: Shutdown,
-        connections: mpsc::Sender<io::Result<Connection>>,
+        accepted: mpsc::Sender<io::Result<Connection>>,
     ) {
         loop {
-            let accepted = tokio::select! {
-                accepted = self.next(&places, &shutdown) => accepted,
+            let next = tokio::select! {
+                next = self.next(&connections) => next,
                 () = shutdown.draining.cancelled() => return,
             };
-            match accepted {
+            match next {
                 Ok(Some(connection)) => {
-                    if connections.send(Ok(connection)).await.is_err() {
+                    if accepted.send(Ok(connection)).await.is_err() {
                         return;
                     }
                 }
@@ -82,18 +82,17 @@ impl Listener {
     }
 
     /// One connection; none when there is no place for it.
-    async fn next(&self, places: &Arc<Semaphore>, shutdown: &Shutdown) -> io::Result<Option<Connection>> {
-        let place = || Arc::clone(places).try_acquire_owned().ok();
+    async fn next(&self, connections: &Connections) -> io::Result<Option<Connection>> {
         match self {
             Self::Tcp(listener, _) => {
                 let (socket, _) = listener.accept().await?;
                 // Without this, replies wait for the peer's delayed acknowledgement: 40 ms a trial.
                 socket.set_nodelay(true)?;
-                Ok(place().map(|place| Connection::tcp(socket, &shutdown.cutting, place)))
+                Ok(connections.place().await.map(|place| connections.tcp(socket, place)))
             }
             Self::Unix(listener, _) => {
                 let (socket, _) = listener.accept().await?;
-                Ok(place().map(|place| Connection::unix(socket, &shutdown.cutting, place)))
+                Ok(connections.place().await.map(|place| connections.unix(socket, place)))
             }
         }
     }

@@ -5,6 +5,7 @@
 
 use super::convert::{Violation, options};
 use crate::analysis::AnalysisError;
+use crate::budget::Stopped;
 use crate::compile::CompileError;
 use crate::device::DeviceError;
 use crate::netlist::{Diagnostics, Severity};
@@ -80,6 +81,15 @@ pub(super) fn device(error: &DeviceError) -> Status {
         DeviceError::UnknownToken(_) => Status::not_found(message),
         DeviceError::NotOpen => Status::failed_precondition(message),
         DeviceError::Remote { .. } => Status::unavailable(cut(message, MESSAGE_BYTES)),
+    }
+}
+
+/// A computation that was stopped.
+pub(super) fn stopped(why: Stopped) -> Status {
+    match why {
+        Stopped::Cancelled => Status::cancelled("cancelled"),
+        Stopped::Late => Status::deadline_exceeded("its time is over"),
+        limit => Status::resource_exhausted(format!("{limit}; Info lists the limits of this server")),
     }
 }
 

@@ -1,13 +1,14 @@
 //! The Trial stream: a state machine that answers each request where it arrives.
 //!
 //! A trial of a small model takes microseconds, less than handing it to another task. So the reply stream polls the
-//! request stream and computes in between; nothing is spawned and nothing crosses a channel. Models above
-//! [`Limits::inline_unknowns`](super::limits::Limits::inline_unknowns) go to a blocking thread instead, one at a time,
-//! which keeps replies in order.
+//! request stream and computes in between; nothing is spawned and nothing crosses a channel. What takes longer after all
+//! is stopped there and asked again on a blocking thread, as are models above
+//! [`Limits::inline_unknowns`](super::limits::Limits::inline_unknowns), one at a time, which keeps replies in order.
 
 use super::rpc::Shared;
 use super::sessions::{Question, Session, refused};
 use super::{proto, status};
+use crate::budget::Budget;
 use crate::device::Token;
 use proto::device_reply::Kind as ReplyKind;
 use proto::device_request::Kind as RequestKind;
@@ -15,7 +16,6 @@ use std::future::Future;
 use std::pin::Pin;
 use std::sync::Arc;
 use std::task::{Context, Poll, ready};
-use tokio::task::JoinHandle;
 use tokio_stream::Stream;
 use tokio_util::sync::WaitForCancellationFutureOwned;
 use tonic::{Status, Streaming};
@@ -31,7 +31,7 @@ pub(super) struct TrialStream {
     session: Option<Arc<Session>>,
     /// Whether the session ends with this stream.
     owned: bool,
-    running: Option<JoinHandle<Option<ReplyKind>>>,
+    running: Option<Pin<Box<dyn Future<Output = Option<ReplyKind>> + Send>>>,
     finished: bool,
 }
 
@@ -62,11 +62,10 @@ impl TrialStream {
             let fault = super::convert::device::fault_to_wire(&crate::device::DeviceError::NotOpen);
             return (!silent).then_some(ReplyKind::Fault(fault));
         };
-        if session.inline {
-            return session.answer(question);
+        if let Ok(reply) = session.answer_at_once(&question) {
+            return reply;
         }
-        let session = Arc::clone(session);
-        self.running = Some(tokio::task::spawn_blocking(move || session.answer(question)));
+        self.running = Some(Box::pin(later(Arc::clone(&self.shared), Arc::clone(session), question)));
         None
     }
 
@@ -77,6 +76,10 @@ impl TrialStream {
             return Ok(());
         }
         self.leave();
+        let (limits, asked) = (&self.shared.limits, open.ports.len().max(open.signals.len()));
+        if asked > limits.signals {
+            return Err(status::limit("signals", limits.signals, asked));
+        }
         let model = self.shared.models.get(&open.model)?;
         let session = self.shared.sessions.create(&model, self.shared.make, &self.shared.limits)?;
         session.hold();
@@ -109,6 +112,20 @@ impl TrialStream {
     }
 }
 
+/// Answers on a thread, in the session's turn. Dropped, it stops the computation.
+async fn later(shared: Arc<Shared>, session: Arc<Session>, question: Question) -> Option<ReplyKind> {
+    let turn = match session.turn().await {
+        Ok(turn) => turn,
+        Err(status) => return Some(refused(&status)),
+    };
+    let silent = matches!(question, Question::Accept(_));
+    let job = move |budget: &Budget| {
+        let _turn = turn;
+        Ok(session.answer(&question, budget))
+    };
+    shared.trials.run_with(job).await.unwrap_or_else(|status| (!silent).then(|| refused(&status)))
+}
+
 impl Drop for TrialStream {
     fn drop(&mut self) {
         self.leave();
@@ -129,7 +146,7 @@ impl Stream for TrialStream {
         }
         for _ in 0..BURST {
             let reply = if let Some(running) = &mut this.running {
-                let reply = ready!(Pin::new(running).poll(cx)).unwrap_or_else(|_| Some(refused(&status::fault())));
+                let reply = ready!(running.as_mut().poll(cx));
                 this.running = None;
                 reply
             } else {

@@ -1,16 +1,19 @@
 //! Sweeps that run while clients come and go.
 
+use super::ids::Ids;
 use super::limits::Limits;
+use super::work::{allowance, caught};
 use super::{proto, status};
+use crate::budget::Budget;
 use crate::compile::CompileOptions;
 use crate::jobs::sweep::{self, SweepError, SweepProgress, SweepSpec, SweepTable};
 use crate::netlist::Bundle;
 use proto::sweep_status::State;
 use std::collections::BTreeMap;
-use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
+use tokio::runtime::Handle;
 use tokio::sync::{Semaphore, watch};
 use tonic::Status;
 
@@ -18,6 +21,7 @@ use tonic::Status;
 pub(super) struct Sweep {
     status: watch::Sender<proto::SweepStatus>,
     table: OnceLock<SweepTable>,
+    budget: Budget,
     cancelled: AtomicBool,
     used: Mutex<Instant>,
 }
@@ -40,6 +44,7 @@ impl Sweep {
 
     fn cancel(&self) {
         self.cancelled.store(true, Ordering::Relaxed);
+        self.budget.cancel();
     }
 
     fn progress(&self, progress: SweepProgress) -> bool {
@@ -77,14 +82,15 @@ pub(super) struct Sweeps {
     kept: Mutex<BTreeMap<String, Arc<Sweep>>>,
     /// A sweep uses every core, so one runs at a time and the others wait.
     turn: Arc<Semaphore>,
-    instance: u32,
-    submitted: AtomicU64,
+    ids: Ids,
+    runtime: Handle,
 }
 
 impl Sweeps {
-    /// No sweeps yet; `instance` as for sessions.
-    pub(super) fn new(instance: u32) -> Self {
-        Self { kept: Mutex::default(), turn: Arc::new(Semaphore::new(1)), instance, submitted: AtomicU64::new(0) }
+    /// No sweeps yet.
+    pub(super) fn new() -> Self {
+        let turn = Arc::new(Semaphore::new(1));
+        Self { kept: Mutex::default(), turn, ids: Ids::default(), runtime: Handle::current() }
     }
 
     /// Starts a sweep; its id and its points.
@@ -101,15 +107,16 @@ impl Sweeps {
             return Err(status::limit("sweep_points", limits.sweep_points, points));
         }
         let points = spec.point_numbers().map_err(violation)?.len() as u64;
+        sweep::check_names(&spec, &bundle, &options).map_err(violation)?;
         let first = proto::SweepStatus { state: State::Running.into(), points, ..Default::default() };
         let sweep = Arc::new(Sweep {
             status: watch::Sender::new(first),
             table: OnceLock::new(),
+            budget: Budget::new(allowance(limits)),
             cancelled: AtomicBool::new(false),
             used: Mutex::new(Instant::now()),
         });
-        let number = self.submitted.fetch_add(1, Ordering::Relaxed) + 1;
-        let id = format!("{:08x}-w{number}", self.instance);
+        let id = self.ids.make()?;
         {
             let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
             if kept.len() >= limits.sweeps {
@@ -118,19 +125,15 @@ impl Sweeps {
             kept.insert(id.clone(), Arc::clone(&sweep));
         }
         let turn = Arc::clone(&self.turn);
-        tokio::spawn(async move {
+        self.runtime.spawn(async move {
             let _turn = turn.acquire_owned().await;
             let ran = Arc::clone(&sweep);
             let job = tokio::task::spawn_blocking(move || {
-                let outcome = catch_unwind(AssertUnwindSafe(|| {
-                    if ran.cancelled.load(Ordering::Relaxed) {
-                        return Err(SweepError::Cancelled { done: 0, points });
-                    }
-                    sweep::run(&spec, &bundle, &options, &|progress| ran.progress(progress))
-                }));
-                match outcome {
-                    Ok(outcome) => ran.finish(outcome),
-                    Err(_) => ran.finish(Err(SweepError::Threads { reason: "internal fault".to_owned() })),
+                let run = || sweep::run(&spec, &bundle, &options, &|progress| ran.progress(progress));
+                match caught(&ran.budget, run) {
+                    Some(Ok(outcome)) => ran.finish(outcome),
+                    Some(Err(_)) => ran.finish(Err(SweepError::Cancelled { done: 0, points })),
+                    None => ran.finish(Err(SweepError::Threads { reason: "internal fault".to_owned() })),
                 }
             });
             let _ = job.await;

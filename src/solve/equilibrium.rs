@@ -177,6 +177,7 @@ impl Equilibrium {
         path.at(s, &mut self.drive);
         let mut last = f64::INFINITY;
         for _ in 0..self.options.iterations {
+            crate::budget::check();
             done.iterations += 1;
             system.tangent(&self.trial, &self.drive, &mut self.tangent, &mut self.residual);
             system.model.project_matrix(&mut self.tangent);
@@ -233,6 +234,7 @@ impl Equilibrium {
         let longest = 0.05 * system.length_scale;
         let mut damping = 0.0;
         for _ in 0..self.options.fall_steps {
+            crate::budget::check();
             done.iterations += 1;
             system.tangent(q, &self.drive, &mut self.tangent, &mut self.residual);
             let first_damping = 1e-6 * mean_ratio(system, &self.tangent);

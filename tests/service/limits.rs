@@ -124,7 +124,26 @@ fn analyses_do_not_block_circuits() {
     block_on(async {
         let mut client = server.client().await;
         let model = compiled(&mut client).await;
-        // Its reader is slow on purpose, so it keeps its place.
+        // Some 500 million steps and two samples: it keeps its place.
+        let (stop_s, step_s) = (0.5, 1e-9);
+        let request = proto::TransientRequest { model: model.clone(), stop_s, step_s, points: 2, ..Default::default() };
+        let _running = client.transient(request).await.expect("starts");
+        let late = client.r#static(proto::StaticRequest { model: model.clone(), voltages: vec![] }).await;
+        assert_eq!(late.expect_err("waits in vain").code(), Code::DeadlineExceeded);
+        let options = Some(proto::CompileOptions { tol: Some(1e-4), ..Default::default() });
+        client.compile(proto::CompileRequest { bundle: wire_bundle(), options }).await.expect("compiles");
+        client.open(proto::OpenRequest { model, ..Default::default() }).await.expect("opens");
+    });
+}
+
+/// A transient whose reader is slow gives its place to others.
+#[test]
+fn slow_readers_keep_no_place() {
+    let limits = Limits { analyses: 1, ..Limits::default() };
+    let server = start_with("127.0.0.1:0", limits, |compiled| Box::new(LocalDevice::new(compiled)));
+    block_on(async {
+        let mut client = server.client().await;
+        let model = compiled(&mut client).await;
         let request = proto::TransientRequest {
             model: model.clone(),
             stop_s: 1e-3,
@@ -132,12 +151,8 @@ fn analyses_do_not_block_circuits() {
             points: 300_000,
             ..Default::default()
         };
-        let _running = client.transient(request).await.expect("starts");
-        let late = client.r#static(proto::StaticRequest { model: model.clone(), voltages: vec![] }).await;
-        assert_eq!(late.expect_err("waits in vain").code(), Code::DeadlineExceeded);
-        let options = Some(proto::CompileOptions { tol: Some(1e-4), ..Default::default() });
-        client.compile(proto::CompileRequest { bundle: wire_bundle(), options }).await.expect("compiles");
-        client.open(proto::OpenRequest { model, ..Default::default() }).await.expect("opens");
+        let _unread = client.transient(request).await.expect("starts");
+        client.r#static(proto::StaticRequest { model, voltages: vec![] }).await.expect("has a place");
     });
 }
 

@@ -1,6 +1,7 @@
 //! The service from outside: every call over a real socket, on port 0 or a temporary path.
 #![cfg(feature = "server")]
 
+mod attacks;
 mod calls;
 mod echo;
 mod endings;
@@ -10,3 +11,4 @@ mod random;
 mod refusals;
 mod running;
 mod same_bits;
+mod victim;

@@ -1,10 +1,17 @@
 //! One point of a grid: compile with its parameter values, run the analysis, keep named numbers.
 
-use super::{SweepAnalysis, SweepSpec};
+use super::{SweepAnalysis, SweepError, SweepSpec};
 use crate::analysis::{modes, pull_in, statics};
+use crate::budget::{self, Budget};
 use crate::compile::{CompileError, CompileOptions, Compiled, compile};
 use crate::netlist::{Bundle, Setting, Severity};
+use std::collections::HashSet;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+
+/// What columns of a static sweep are called.
+const OUTPUTS: &str = "NODE.x, NODE.y, NODE.rz, BEAM.T, PORT.i or PORT.q";
+/// The code of the diagnostic for a setting that names no parameter.
+const NO_PARAMETER: &str = "E048";
 
 /// A result: its column, its unit, and its value; none: the quantity does not exist at this point.
 pub(super) struct Value {
@@ -20,12 +27,81 @@ pub(super) struct Outcome {
     pub(super) values: Result<Vec<Value>, String>,
 }
 
-/// Runs point `number`. A fault inside is that point's error: it must not take the other points with it.
-pub(super) fn run(spec: &SweepSpec, number: usize, bundle: &Bundle, options: &CompileOptions) -> Outcome {
+impl Outcome {
+    /// Bytes that it takes until the table is made, about.
+    pub(super) fn bytes(&self) -> usize {
+        let parameter = |value: &Setting| if let Setting::Text(text) = value { text.len() } else { 0 };
+        let parameters: usize = self.parameters.iter().map(|value| size_of::<Setting>() + parameter(value)).sum();
+        let values = match &self.values {
+            Ok(values) => values.iter().map(|value| size_of::<Value>() + value.name.len()).sum(),
+            Err(error) => error.len(),
+        };
+        // and once more in the table
+        2 * (size_of::<Self>() + parameters + values)
+    }
+}
+
+/// Runs point `number`, under `part` of the sweep's budget. A fault inside is that point's error: it must not take the other points with it.
+pub(super) fn run(
+    spec: &SweepSpec,
+    number: usize,
+    bundle: &Bundle,
+    options: &CompileOptions,
+    part: Option<Budget>,
+) -> Outcome {
     let settings = spec.settings(number);
-    let values = catch_unwind(AssertUnwindSafe(|| solve(spec, &settings, bundle, options)))
-        .unwrap_or_else(|_| Err("internal fault at this point".to_owned()));
+    let solve = || solve(spec, &settings, bundle, options);
+    let values = catch_unwind(AssertUnwindSafe(|| match part {
+        Some(part) => budget::within(&part, solve).unwrap_or_else(|why| Err(why.to_string())),
+        None => solve(),
+    }));
+    let values = values.unwrap_or_else(|_| Err("internal fault at this point".to_owned()));
     Outcome { number, parameters: settings.into_iter().map(|(_, value)| value).collect(), values }
+}
+
+/// Refuses parameters and outputs that the netlist does not have: at every point they would be an error.
+pub(super) fn check_names(spec: &SweepSpec, bundle: &Bundle, options: &CompileOptions) -> Result<(), SweepError> {
+    let refused =
+        |what: &str, expected: String, got: String| Err(SweepError::BadSpec { what: what.into(), expected, got });
+    let compiled = match compile(bundle, &at(options, &spec.settings(0))) {
+        Ok(compiled) => compiled,
+        Err(CompileError::Netlist(diagnostics)) => {
+            let Some(d) = diagnostics.items.iter().find(|d| d.code == NO_PARAMETER) else { return Ok(()) };
+            let name = d.message.split('`').nth(1).unwrap_or_default();
+            return refused("parameters", format!("parameters of the netlist ({})", d.help), format!("\"{name}\""));
+        }
+        // the points will say it
+        Err(_) => return Ok(()),
+    };
+    let SweepAnalysis::Static { outputs, .. } = &spec.analysis else { return Ok(()) };
+    let structure = &compiled.structure;
+    let nodes = structure.nodes.iter().filter(|node| node.mechanical).map(|node| (node.name.as_str(), 'n'));
+    let beams = structure.beams.iter().map(|beam| (beam.name.as_str(), 'b'));
+    let ports = structure.ports.iter().map(|port| (port.name.as_str(), 'p'));
+    let known: HashSet<(&str, char)> = nodes.chain(beams).chain(ports).collect();
+    let unknown = outputs.iter().find(|output| {
+        let kind = |quantity: &str| match quantity {
+            "x" | "y" | "rz" => Some('n'),
+            "T" => Some('b'),
+            "i" | "q" => Some('p'),
+            _ => None,
+        };
+        let found = output.rsplit_once('.').and_then(|(part, quantity)| Some((part, kind(quantity)?)));
+        found.is_none_or(|found| !known.contains(&found))
+    });
+    match unknown {
+        Some(name) => refused("outputs", OUTPUTS.to_owned(), format!("\"{name}\"")),
+        None => Ok(()),
+    }
+}
+
+/// Options with the settings of a point.
+fn at(options: &CompileOptions, settings: &[(String, Setting)]) -> CompileOptions {
+    let mut options = options.clone();
+    let swept: HashSet<&str> = settings.iter().map(|(name, _)| name.as_str()).collect();
+    options.set.retain(|(name, _)| !swept.contains(name.as_str()));
+    options.set.extend_from_slice(settings);
+    options
 }
 
 fn solve(
@@ -34,10 +110,7 @@ fn solve(
     bundle: &Bundle,
     options: &CompileOptions,
 ) -> Result<Vec<Value>, String> {
-    let mut options = options.clone();
-    options.set.retain(|(name, _)| settings.iter().all(|(swept, _)| swept != name));
-    options.set.extend_from_slice(settings);
-    let compiled = compile(bundle, &options).map_err(|error| brief(&error))?;
+    let compiled = compile(bundle, &at(options, settings)).map_err(|error| brief(&error))?;
     analyse(&compiled, &spec.analysis)
 }
 
@@ -89,9 +162,9 @@ fn static_values(result: &statics::StaticResult, outputs: &[String]) -> Result<V
     all.extend(result.charges_c.iter().map(|(name, q)| value(format!("{name}.q"), "C", Some(*q))));
     let pick = |name: &String| {
         let found = all.iter().find(|v| v.name == *name);
-        found.map(|v| value(v.name.clone(), v.unit, v.value)).ok_or_else(|| {
-            format!("no output named \"{name}\"; expected NODE.x, NODE.y, NODE.rz, BEAM.T, PORT.i or PORT.q")
-        })
+        found
+            .map(|v| value(v.name.clone(), v.unit, v.value))
+            .ok_or_else(|| format!("no output named \"{name}\"; expected {OUTPUTS}"))
     };
     finite(outputs.iter().map(pick).collect::<Result<_, _>>()?)
 }

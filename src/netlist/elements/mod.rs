@@ -80,6 +80,7 @@ pub(crate) fn stray_actuals<'a>(
     sink: &mut Sink,
 ) {
     for argument in given {
+        crate::budget::check();
         if formals.clone().any(|formal| formal == argument.name) || argument.name.len() < 3 {
             continue;
         }

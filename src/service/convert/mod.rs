@@ -10,6 +10,7 @@ pub mod options;
 pub mod sweep;
 
 use super::proto;
+use std::collections::HashSet;
 
 /// A field of a request that cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -53,11 +54,13 @@ pub(crate) fn pairs(values: Vec<proto::Named>) -> Vec<(String, f64)> {
 
 /// Port voltages of a request: finite, each port once.
 pub(crate) fn voltages(field: &str, values: Vec<proto::Named>) -> Result<Vec<(String, f64)>, Violation> {
+    let mut seen = HashSet::with_capacity(values.len());
     for (i, named) in values.iter().enumerate() {
-        let field = format!("{field}[{i}]");
-        number(&field, named.value, false)?;
-        if values[..i].iter().any(|other| other.name == named.name) {
-            return Err(Violation::new(field, format!("port \"{}\" is given twice", named.name)));
+        if !named.value.is_finite() {
+            number(&format!("{field}[{i}]"), named.value, false)?;
+        }
+        if !seen.insert(named.name.as_str()) {
+            return Err(Violation::new(format!("{field}[{i}]"), format!("port \"{}\" is given twice", named.name)));
         }
     }
     Ok(pairs(values))

@@ -37,15 +37,25 @@ pub fn spec_to_wire(spec: &SweepSpec) -> proto::SweepSpec {
     }
 }
 
-/// A checked specification. `most` bounds the values of an axis before they are laid out in memory.
+/// Points of a grid as it came, before any axis is laid out; an axis without values counts as one.
+pub fn grid_points(spec: &proto::SweepSpec) -> usize {
+    let values = |axis: &proto::SweepParameter| match &axis.values {
+        Some(Values::Linear(linear)) => linear.count as usize,
+        Some(Values::List(list)) => list.values.len(),
+        None => 0,
+    };
+    spec.parameters.iter().fold(1, |points, axis| points.saturating_mul(values(axis).max(1)))
+}
+
+/// A checked specification. Lays out every axis: [`grid_points`] says before how long they are.
 ///
 /// # Errors
 /// Anything missing, empty, or not finite.
-pub fn spec_from_wire(spec: Option<proto::SweepSpec>, most: usize) -> Result<SweepSpec, Violation> {
+pub fn spec_from_wire(spec: Option<proto::SweepSpec>) -> Result<SweepSpec, Violation> {
     let spec = required("spec", spec)?;
     let mut parameters = Vec::with_capacity(spec.parameters.len());
     for (i, axis) in spec.parameters.into_iter().enumerate() {
-        parameters.push(axis_from_wire(&format!("spec.parameters[{i}]"), axis, most)?);
+        parameters.push(axis_from_wire(&format!("spec.parameters[{i}]"), axis)?);
     }
     let analysis = match required("spec.analysis", spec.analysis)? {
         Analysis::Static(s) => {
@@ -64,13 +74,12 @@ pub fn spec_from_wire(spec: Option<proto::SweepSpec>, most: usize) -> Result<Swe
     Ok(SweepSpec { parameters, analysis, shard, threads: None })
 }
 
-fn axis_from_wire(field: &str, axis: proto::SweepParameter, most: usize) -> Result<SweepParameter, Violation> {
+fn axis_from_wire(field: &str, axis: proto::SweepParameter) -> Result<SweepParameter, Violation> {
     let values = match required(&format!("{field}.values"), axis.values)? {
         Values::Linear(l) => {
             let low = number(&format!("{field}.linear.low"), l.low, false)?;
             let high = number(&format!("{field}.linear.high"), l.high, false)?;
-            // One more than the limit is enough to be refused, and is not laid out for nothing.
-            linear(low, high, (l.count as usize).min(most.saturating_add(1)))
+            linear(low, high, l.count as usize)
         }
         Values::List(list) => {
             let convert = |(i, value)| setting_from_wire(&format!("{field}.list.values[{i}]"), value);
@@ -122,6 +131,25 @@ mod tests {
     use super::*;
     use crate::netlist::Setting;
 
+    /// However many and long the axes are, their product is known without them.
+    #[test]
+    fn grids_are_counted_before_they_are_laid_out() {
+        let axis = |count| proto::SweepParameter {
+            name: "V".into(),
+            values: Some(Values::Linear(proto::Linear { low: 0.0, high: 1.0, count })),
+        };
+        let points = |counts: &[u32]| {
+            grid_points(&proto::SweepSpec {
+                parameters: counts.iter().map(|c| axis(*c)).collect(),
+                ..Default::default()
+            })
+        };
+        assert_eq!(points(&[]), 1);
+        assert_eq!(points(&[3, 4]), 12);
+        assert_eq!(points(&[0, 4_000_000_000]), 4_000_000_000);
+        assert_eq!(points(&[4_000_000_000; 600]), usize::MAX);
+    }
+
     #[test]
     fn specifications_and_rows_survive_the_wire() {
         let spec = SweepSpec {
@@ -130,7 +158,7 @@ mod tests {
             shard: Shard { index: 1, count: 4 },
             threads: None,
         };
-        assert_eq!(spec_from_wire(Some(spec_to_wire(&spec)), 10), Ok(spec));
+        assert_eq!(spec_from_wire(Some(spec_to_wire(&spec))), Ok(spec));
         for values in [Ok(vec![Some(1.0), None]), Err("no equilibrium".to_owned())] {
             let row = SweepRow { point: 5, parameters: vec![Setting::Number(1e-6)], values };
             let mut table = SweepTable::default();

@@ -60,6 +60,7 @@ struct Operator<'a, 'b> {
 impl Operator<'_, '_> {
     /// (K − σM)⁻¹·M^½·y.
     fn displacement(&mut self, y: &[f64]) -> Vec<Pose> {
+        crate::budget::check();
         let weigh = |(k, r): (usize, &Pose)| Pose::new(r.x * y[3 * k], r.y * y[3 * k + 1], r.z * y[3 * k + 2]);
         let mut x: Vec<Pose> = self.root.iter().enumerate().map(weigh).collect();
         if self.corrected {

@@ -35,6 +35,8 @@ pub fn largest(
     most: usize,
 ) -> Pairs {
     let most = most.min(rank).max(1);
+    // the basis, then vectors as they are wanted, as shapes of bodies and of nodes
+    crate::budget::lay_out_matrix(n, most + 4 * wanted.min(most));
     let mut basis = DMatrix::<f64>::zeros(n, most);
     let (mut diagonal, mut beside): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
     let mut begun = 0;

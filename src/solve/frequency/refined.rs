@@ -117,6 +117,7 @@ impl<'a> Refined<'a> {
         let mut settled = Settled { first: 0.0, left: 0.0 };
         let mut last = 1.0;
         for round in 0..MOST {
+            crate::budget::check();
             self.multiply();
             for (j, (rest, b)) in self.correction.iter_mut().zip(&right).enumerate() {
                 let m = model.mass(j) * shift;

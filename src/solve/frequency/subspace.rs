@@ -63,6 +63,7 @@ pub fn iterate(
         let z = weigh(&x);
         let mut y = z.clone();
         for mut column in y.column_iter_mut() {
+            crate::budget::check();
             for (k, pose) in scratch.iter_mut().enumerate() {
                 *pose = Pose::new(column[3 * k], column[3 * k + 1], column[3 * k + 2]);
             }

@@ -117,6 +117,7 @@ impl<M: Method> Adaptive<M> {
             if steps == max_steps {
                 return Ok(Advance::OutOfSteps(s));
             }
+            crate::budget::check();
             let left = ramp.dt - s;
             let step = step_size::fitted(*h, left);
             self.keep(motion);
@@ -160,6 +161,7 @@ impl<M: Method> Adaptive<M> {
             if k == max_steps {
                 return Ok(Advance::OutOfSteps(at(k)));
             }
+            crate::budget::check();
             let (s, h) = (at(k), at(k + 1) - at(k));
             self.keep(motion);
             self.method.step(system, ramp, s, h, motion, &mut self.error).map_err(|e| failed(system, s, h, e))?;

@@ -105,6 +105,7 @@ impl JointAdaptive {
         let (mut t, mut rejected) = (start, 0);
         let mut h = self.first_step(motion, (start, end), now, tol)?;
         while t < end {
+            crate::budget::check();
             let left = end - t;
             let step = step_size::fitted(h, left);
             self.carried.copy(&self.method.carried.q, &self.method.carried.v);
@@ -151,6 +152,7 @@ impl JointAdaptive {
         let count = step_size::count(end - start, step);
         let at = |k: usize| if k == count { end } else { start + (end - start) * (k as f64 / count as f64) };
         for k in 0..count {
+            crate::budget::check();
             let (t, h) = (at(k), at(k + 1) - at(k));
             let tolerance = EQUAL * (motion.norm(&now.q) + FLOOR);
             self.method

@@ -1,12 +1,15 @@
-"""One gRPC channel per process.
+"""One gRPC channel per process and server, shared by all who talk to that server.
 
-gRPC does not survive a fork: a child that uses its parent's channel hangs. So a channel is made when it is first used,
-remembers its process, and in another process a new one is made.
+gRPC does not survive a fork: a child that uses its parent's channel hangs. So a channel is made when it is first used, and in
+another process a new one is made. Clients and models that were sent to a worker process share its channel, however many of
+them come: a server has a bounded number of connections.
 """
 
 from __future__ import annotations
 
 import os
+import threading
+import weakref
 from collections.abc import Callable, Iterator
 from typing import Any, TypeVar
 
@@ -27,28 +30,65 @@ _OPTIONS = [
 ]
 
 
+class _Connection:
+    """A gRPC channel of this process; closed when nobody holds it any more."""
+
+    def __init__(self, target: str) -> None:
+        self._pid = os.getpid()
+        self._channel = grpc.insecure_channel(target, options=_OPTIONS)
+        self.stub: Any = service_pb2_grpc.BimorphStub(self._channel)
+
+    def __del__(self) -> None:
+        # A channel of another process is left alone: closing it here could hang.
+        if self._pid == os.getpid():
+            self._channel.close()
+
+
+_connections: weakref.WeakValueDictionary[str, _Connection] = weakref.WeakValueDictionary()
+_lock = threading.Lock()
+_inherited: list[Any] = []
+
+
+def _forked() -> None:
+    """In a child: nothing of the parent's is used, or even let go of."""
+    global _connections, _lock
+    _inherited.append(list(_connections.values()))
+    _connections = weakref.WeakValueDictionary()
+    _lock = threading.Lock()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_forked)
+
+
+def _connect(target: str) -> _Connection:
+    with _lock:
+        connection = _connections.get(target)
+        if connection is None:
+            connection = _connections[target] = _Connection(target)
+        return connection
+
+
 class Channel:
-    """The connection to one server, made when first used."""
+    """The way to one server, connected when first used."""
 
     def __init__(self, address: str, timeout: float) -> None:
         self.address = address
         self.timeout = timeout
         self._pid: int | None = None
-        self._channel: grpc.Channel | None = None
-        self._stub: Any = None
+        self._connection: _Connection | None = None
 
     @property
     def stub(self) -> Any:
         """The stub of this process."""
-        if self._pid != os.getpid():
-            # A channel of another process is left alone: closing it here could hang.
+        connection = self._connection
+        if connection is None or self._pid != os.getpid():
             target = self.address
             for scheme in ("http://", "grpc://"):
                 target = target.removeprefix(scheme)
-            self._channel = grpc.insecure_channel(target, options=_OPTIONS)
-            self._stub = service_pb2_grpc.BimorphStub(self._channel)
+            self._connection = connection = _connect(target)
             self._pid = os.getpid()
-        return self._stub
+        return connection.stub
 
     def call(self, method: str, request: Any) -> Any:
         """A unary call within the timeout."""
@@ -76,7 +116,11 @@ class Channel:
             raise from_rpc(error, self.address) from None
 
     def close(self) -> None:
-        """Closes the connection of this process."""
-        if self._channel is not None and self._pid == os.getpid():
-            self._channel.close()
-        self._pid = self._channel = self._stub = None
+        """Lets go of the connection of this process; it closes when nobody else uses it."""
+        self._connection = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {"address": self.address, "timeout": self.timeout}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__init__(state["address"], state["timeout"])  # type: ignore[misc]

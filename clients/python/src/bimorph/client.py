@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from . import sweep as sweeps
 from .channel import Channel
-from .errors import Diagnostic, InvalidRequest, NetlistError, Unavailable
+from .errors import Diagnostic, InvalidRequest, NetlistError, NotFound, Unavailable
 from .netlist import Netlist
 from .options import WIRE, Options
 from .results import ModesResult, NodeMotion, PullInResult, StaticResult, TransientResult
@@ -70,7 +70,7 @@ class Client:
                 raise
             diagnostics = [_diagnostic(d) for d in checked.diagnostics]
             raise NetlistError(checked.rendered, error.violations, diagnostics) from None
-        return Model(self._channel, answer.model)
+        return Model(self._channel, answer.model, request)
 
     def sweep(
         self,
@@ -107,18 +107,17 @@ class Client:
     ) -> None:
         self.close()
 
-    def __getstate__(self) -> dict[str, Any]:
-        return {"address": self._channel.address, "timeout": self._channel.timeout}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        self._channel = Channel(state["address"], state["timeout"])
-
 
 class Model:
-    """A compiled netlist on a server. Make one with :meth:`Client.compile`."""
+    """A compiled netlist on a server. Make one with :meth:`Client.compile`.
 
-    def __init__(self, channel: Channel, description: Any) -> None:
+    It may be sent to worker processes. A server that has forgotten it, or was started anew, is given the netlist again.
+    """
+
+    def __init__(self, channel: Channel, description: Any, source: Any) -> None:
         self._channel = channel
+        self._description = description
+        self._source = source
         self.id: str = description.id
         """Hash of text and options."""
         self.ports: tuple[str, ...] = tuple(description.ports)
@@ -132,13 +131,30 @@ class Model:
         self.warnings: tuple[Diagnostic, ...] = tuple(_diagnostic(d) for d in description.warnings)
         """Warnings of the netlist."""
 
+    def __getstate__(self) -> dict[str, Any]:
+        description, source = self._description.SerializeToString(), self._source.SerializeToString()
+        return {"channel": self._channel, "description": description, "source": source}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        description = model_pb2.ModelDescription.FromString(state["description"])
+        source = model_pb2.CompileRequest.FromString(state["source"])
+        self.__init__(state["channel"], description, source)  # type: ignore[misc]
+
+    def _call(self, method: str, request: Any) -> Any:
+        """A call about this model, which the server may have forgotten: the same netlist gives the same model."""
+        try:
+            return self._channel.call(method, request)
+        except NotFound:
+            self._channel.call("Compile", self._source)
+            return self._channel.call(method, request)
+
     def __repr__(self) -> str:
         return f"Model({self.id[:8]}…, ports={list(self.ports)}, {self.unknowns} unknowns)"
 
     def static(self, voltages: Voltages | None = None) -> StaticResult:
         """Static equilibrium reached from rest at these port voltages [V]."""
         request = analysis_pb2.StaticRequest(model=self.id, voltages=_named(voltages))
-        answer = self._channel.call("Static", request)
+        answer = self._call("Static", request)
         return StaticResult(
             nodes={n.name: NodeMotion(n.x, n.y, n.rz) for n in answer.nodes},
             temperatures_k=_dict(answer.temperatures_k),
@@ -152,7 +168,7 @@ class Model:
     def modes(self, count: int = 6, voltages: Voltages | None = None) -> ModesResult:
         """The ``count`` lowest modes about the equilibrium at these port voltages [V]."""
         request = analysis_pb2.ModesRequest(model=self.id, count=count, voltages=_named(voltages))
-        answer = self._channel.call("Modes", request)
+        answer = self._call("Modes", request)
         shapes = [
             {name: NodeMotion(x, y, rz) for name, x, y, rz in zip(answer.nodes, s.x, s.y, s.rz)}
             for s in answer.shapes
@@ -168,7 +184,7 @@ class Model:
     def pull_in(self, max_v: float, port: str = "") -> PullInResult:
         """Pull-in and release voltage [V] of ``port`` (default: the first), looking up to ``max_v`` [V]."""
         request = analysis_pb2.PullInRequest(model=self.id, port=port, max_v=max_v)
-        answer = self._channel.call("PullIn", request)
+        answer = self._call("PullIn", request)
         release = answer.release_v if answer.HasField("release_v") else None
         return PullInResult(answer.port, answer.pull_in_v, release)
 
@@ -198,6 +214,9 @@ class Model:
             voltages=_named(voltages),
             release_model=release.id if release else "",
         )
+        for model in (self, release):
+            if model is not None:
+                model._describe()
         t: list[float] = []
         columns: list[list[float]] = [[] for _ in signals]
         for event in self._channel.stream("Transient", request):
@@ -222,7 +241,12 @@ class Model:
         ``signals`` are read with every reply. ``ports`` chooses ports and their order; those left out are held at 0 V.
         ``timeout`` [s] bounds each call.
         """
+        self._describe()
         return Session(self._channel, self.id, tuple(ports), tuple(signals), timeout)
+
+    def _describe(self) -> None:
+        """Makes sure that the server has this model."""
+        self._call("Describe", model_pb2.DescribeRequest(model=self.id))
 
 
 def _bundle(netlist: str | os.PathLike[str] | Netlist, include: Iterable[str | os.PathLike[str]]) -> Any:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import grpc
 from google.rpc import error_details_pb2, status_pb2
@@ -48,6 +49,10 @@ class InvalidRequest(BimorphError):
         super().__init__(message)
         self.violations = tuple(violations)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Errors of worker processes arrive as what they were.
+        return (type(self), (str(self), self.violations))
+
 
 class NetlistError(InvalidRequest):
     """A netlist with errors; its text is the rendered diagnostics."""
@@ -55,6 +60,9 @@ class NetlistError(InvalidRequest):
     def __init__(self, message: str, violations: Sequence[Violation], diagnostics: Sequence[Diagnostic]) -> None:
         super().__init__(message, violations)
         self.diagnostics = tuple(diagnostics)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return (type(self), (str(self), self.violations, self.diagnostics))
 
 
 class NotFound(BimorphError):

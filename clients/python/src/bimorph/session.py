@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import collections
 import itertools
 import os
 import queue
 import threading
+import time
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from types import TracebackType
-from typing import Any
+from typing import Any, NamedTuple
 
 import grpc
 
@@ -20,12 +23,18 @@ from .v1 import device_pb2
 _SHORTEST = 1e-9
 """A step that would have to be shorter than this fraction of what was asked for has failed."""
 
+_LOOK = 0.2
+"""While a call waits, it looks this often whether the stream is over [s]."""
+
 
 class Session:
     """A device with states of its own. Make one with :meth:`Model.session`, use it in a ``with`` block.
 
     A trial is a pure function of its parent state, its step and its voltages: trying leaves no trace, and the same trial
     gives the same bits. ``accept`` makes a state the parent of the next trials; ``step`` does both.
+
+    Threads may share a session: each call is one whole. A call that is interrupted (Ctrl-C, a time-out of a test runner)
+    leaves the accepted state as it was, and the next call gets its own answer.
     """
 
     def __init__(
@@ -34,8 +43,12 @@ class Session:
         self._channel = channel
         self._timeout = timeout
         self._pid = os.getpid()
-        self._requests: queue.SimpleQueue[Any] = queue.SimpleQueue()
-        self._replies: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        # A step is taken as a whole. Each question has a place for its own reply: that of an interrupted call stays there,
+        # and is not taken for the next.
+        self._lock = threading.RLock()
+        self._requests: queue.SimpleQueue[_Question | None] = queue.SimpleQueue()
+        self._sent: collections.deque[_Question] = collections.deque()
+        self._over: BimorphError | None = None
         self._call = channel.stub.Trial(self._outgoing())
         threading.Thread(target=self._receive, args=(self._call,), daemon=True).start()
         self.t = 0.0
@@ -66,7 +79,10 @@ class Session:
         ``parent`` is the state to start from, by default the accepted one. A reply with ``need_dt`` asks for a shorter
         step.
         """
-        parent = parent or self.accepted
+        with self._lock:
+            return self._trial(voltages, dt, parent or self.accepted)
+
+    def _trial(self, voltages: Mapping[str, float], dt: float | None, parent: TrialReply | None) -> TrialReply:
         transient = dt is not None
         t = (parent.t if parent else 0.0) + dt if dt is not None else self.t
         request = device_pb2.TrialRequest(
@@ -82,20 +98,25 @@ class Session:
         """Makes a trial's state the one that later trials start from."""
         if reply.need_dt is not None:
             raise ValueError("a reply that asks for a shorter step has no state to accept")
-        self._put(device_pb2.DeviceRequest(accept=device_pb2.Accept(token=reply.token)))
-        self.accepted, self.t = reply, reply.t
-        if voltages is not None:
-            self._voltages = dict(zip(self.ports, self._vector(voltages)))
+        with self._lock:
+            kept = self._voltages if voltages is None else dict(zip(self.ports, self._vector(voltages)))
+            # Here first: the server only frees memory, and an interrupted call must not leave half of this done.
+            self.accepted, self.t, self._voltages = reply, reply.t, kept
+            self._put(_Question(device_pb2.DeviceRequest(accept=device_pb2.Accept(token=reply.token)), None))
 
     def operating_point(self, voltages: Mapping[str, float]) -> TrialReply:
         """Static equilibrium at these port voltages [V], accepted, at t = 0."""
-        self.t = 0.0
-        reply = self.trial(voltages)
-        self.accept(reply, voltages)
-        return reply
+        with self._lock:
+            reply = replace(self.trial(voltages), t=0.0)
+            self.accept(reply, voltages)
+            return reply
 
     def step(self, voltages: Mapping[str, float], dt: float) -> TrialReply:
         """Goes ``dt`` [s] on, the voltages [V] going linearly to these, in as many steps as the device asks for."""
+        with self._lock:
+            return self._step(voltages, dt)
+
+    def _step(self, voltages: Mapping[str, float], dt: float) -> TrialReply:
         start = dict(self._voltages)
         end = dict(zip(self.ports, self._vector(voltages)))
         done, h = 0.0, 1.0
@@ -135,8 +156,9 @@ class Session:
         return NodeMotion(*(self.read(f"{node}.{axis}") for axis in ("x", "y", "rz")))
 
     def close(self) -> None:
-        """Ends the stream; the server forgets the states."""
+        """Ends the stream; the server forgets the states. Later calls raise."""
         if self._pid == os.getpid():
+            self._over = self._over or BimorphError("the session is closed; open another one")
             self._requests.put(None)
             self._call.cancel()
 
@@ -173,36 +195,63 @@ class Session:
             need_dt=need,
         )
 
-    def _put(self, request: Any) -> None:
+    def _put(self, question: _Question) -> None:
         if self._pid != os.getpid():
             raise BimorphError("a session does not survive a fork; open one in this process")
-        self._requests.put(request)
+        if self._over is not None:
+            raise self._over
+        self._requests.put(question)
 
     def _ask(self, request: Any) -> Any:
-        self._put(request)
-        try:
-            reply = self._replies.get(timeout=self._timeout)
-        except queue.Empty:
-            self.close()
-            raise Unavailable(f"server {self._channel.address}: no answer within {self._timeout} s") from None
-        if isinstance(reply, BimorphError):
-            self._replies.put(reply)
-            raise reply
+        question = _Question(request, queue.SimpleQueue())
+        with self._lock:
+            self._put(question)
+            reply = self._answer(question)
         if reply.WhichOneof("kind") == "fault":
             kind = reply.fault.WhichOneof("kind")
             raise (NotFound if kind == "unknown_token" else InvalidRequest)(reply.fault.message)
         return reply
 
+    def _answer(self, question: _Question) -> Any:
+        assert question.replies is not None
+        deadline = time.monotonic() + self._timeout
+        while True:
+            left = deadline - time.monotonic()
+            try:
+                return question.replies.get(timeout=max(min(left, _LOOK), 0.0))
+            except queue.Empty:
+                if self._over is not None and question.replies.empty():
+                    raise self._over from None
+                if left <= 0.0:
+                    self._over = Unavailable(f"server {self._channel.address}: no answer within {self._timeout} s")
+                    self.close()
+                    raise self._over from None
+
     def _outgoing(self) -> Iterator[Any]:
-        return iter(self._requests.get, None)
+        for question in iter(self._requests.get, None):
+            if question.replies is not None:
+                self._sent.append(question)
+            yield question.request
 
     def _receive(self, call: Any) -> None:
+        # The server answers every question but an accept once, in the order in which they were sent.
+        over: BimorphError
         try:
             for reply in call:
-                self._replies.put(reply)
-            self._replies.put(Unavailable(f"server {self._channel.address}: the stream has ended"))
+                replies = self._sent.popleft().replies
+                if replies is not None:
+                    replies.put(reply)
+            over = Unavailable(f"server {self._channel.address}: the stream has ended")
         except grpc.RpcError as error:
-            self._replies.put(from_rpc(error, self._channel.address))
+            over = from_rpc(error, self._channel.address)
+        self._over = self._over or over
+
+
+class _Question(NamedTuple):
+    """A request, and where its reply goes; none: it has no reply."""
+
+    request: Any
+    replies: queue.SimpleQueue[Any] | None
 
 
 def _matrix(rows: tuple[str, ...], columns: tuple[str, ...], values: Any) -> dict[str, dict[str, Any]]:

@@ -70,7 +70,9 @@ class Table:
     rows: list[Row]
 
     def column(self, name: str) -> list[float | str | None]:
-        """One column; None where a point has no such value."""
+        """One column; None where a point has no such value. Raises :class:`KeyError` for a name that is no column."""
+        if name not in self.parameters and name not in self.results:
+            raise KeyError(f"no column {name!r}; there are {', '.join([*self.parameters, *self.results])}")
         return [row.parameters.get(name, row.results.get(name)) for row in self.rows]
 
     def to_csv(self) -> str:

@@ -112,6 +112,7 @@ impl DormandPrince {
         let (mut last_error, mut rejected, mut steps) = (1e-4, 0, 0);
         let mut now = Pair { q: q.to_vec(), v: v.to_vec() };
         while (end - t) * sign > 0.0 {
+            crate::budget::check();
             if steps == max_steps {
                 return Err(IntegrationError::TooManySteps { t, steps });
             }

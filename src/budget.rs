@@ -1,0 +1,345 @@
+//! What a computation may use: bytes, unknowns, processor time, wall time; and how it is told to stop.
+//!
+//! A budget belongs to a thread for the time of [`within`], so that solvers ask it where their loops turn and no signature
+//! carries it. Without one (the command, the plug-in, a library user) every question is a load of a thread-local and
+//! nothing is refused. [`check`] stands in every inner loop that a request can make long; [`lay_out`] and [`unknowns`] stand
+//! before what a request can make large.
+//!
+//! What has to stop unwinds to its [`within`] as a panic does, but without one: no hook runs and nothing is logged
+//! (`std::panic::resume_unwind`; Salsa stops its queries this way). Whatever was half computed is dropped on the way. A
+//! value that outlives a stopped computation, as the storage of a device does, must be made anew:
+//! [`Device::recover`](crate::device::Device::recover).
+
+use std::cell::{Cell, RefCell};
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU8, AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
+use thiserror::Error;
+
+/// Checks between two looks at the clock; a look costs some 30 ns.
+const CHECKS_PER_LOOK: u32 = 16;
+/// Time between two looks at the thread's processor time, which the system tells in a file.
+const CPU_INTERVAL: Duration = Duration::from_millis(100);
+
+/// Why a computation was stopped.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum Stopped {
+    /// Nobody waits for it any more.
+    #[error("cancelled")]
+    Cancelled,
+    /// Its wall time is over.
+    #[error("its time is over")]
+    Late,
+    /// It used up its processor time.
+    #[error("processor time: at most {seconds} s")]
+    Cpu {
+        /// What it had [s].
+        seconds: u64,
+    },
+    /// It would lay out more than it may.
+    #[error("memory: at most {most} bytes, needs at least {needed}")]
+    Bytes {
+        /// What it may lay out [byte].
+        most: usize,
+        /// What it would have laid out by now [byte].
+        needed: usize,
+    },
+    /// A model with more unknowns than it may have.
+    #[error("unknowns: at most {most}, got at least {got}")]
+    Unknowns {
+        /// What it may have.
+        most: usize,
+        /// What it would have.
+        got: usize,
+    },
+}
+
+/// What a computation may use.
+#[derive(Debug, Clone)]
+pub struct Allowance {
+    /// Bytes that it may lay out, all together.
+    pub bytes: usize,
+    /// Mechanical unknowns of a model that it makes.
+    pub unknowns: usize,
+    /// Processor time of each of its threads; none: any.
+    pub cpu: Option<Duration>,
+    /// When it must have ended; none: any time.
+    pub deadline: Option<Instant>,
+}
+
+impl Default for Allowance {
+    fn default() -> Self {
+        Self { bytes: usize::MAX, unknowns: usize::MAX, cpu: None, deadline: None }
+    }
+}
+
+/// An allowance with what was used of it. Clones are the same budget.
+#[derive(Debug, Clone)]
+pub struct Budget(Arc<Shared>);
+
+#[derive(Debug)]
+struct Shared {
+    allowance: Allowance,
+    used: AtomicUsize,
+    /// 0 while it may go on; shared with budgets that are parts of one another.
+    order: Arc<AtomicU8>,
+}
+
+const CANCELLED: u8 = 1;
+const LATE: u8 = 2;
+
+impl Budget {
+    /// A fresh budget.
+    pub fn new(allowance: Allowance) -> Self {
+        Self(Arc::new(Shared { allowance, used: AtomicUsize::new(0), order: Arc::default() }))
+    }
+
+    /// The same allowance unused, for a part of the computation: stopped together with it.
+    #[must_use]
+    pub fn part(&self) -> Self {
+        let Shared { allowance, order, .. } = &*self.0;
+        Self(Arc::new(Shared { allowance: allowance.clone(), used: AtomicUsize::new(0), order: Arc::clone(order) }))
+    }
+
+    /// Takes `bytes` of what may be laid out.
+    ///
+    /// # Errors
+    /// [`Stopped::Bytes`]; nothing is taken then.
+    pub fn take(&self, bytes: usize) -> Result<(), Stopped> {
+        let most = self.0.allowance.bytes;
+        let before = self.0.used.fetch_add(bytes, Ordering::Relaxed);
+        let needed = before.saturating_add(bytes);
+        if needed <= most {
+            return Ok(());
+        }
+        self.0.used.fetch_sub(bytes, Ordering::Relaxed);
+        Err(Stopped::Bytes { most, needed })
+    }
+
+    /// Stops what runs under it, at its next check.
+    pub fn cancel(&self) {
+        self.0.order.store(CANCELLED, Ordering::Relaxed);
+    }
+
+    /// The same for want of time.
+    pub fn late(&self) {
+        self.0.order.store(LATE, Ordering::Relaxed);
+    }
+
+    /// Bytes laid out so far.
+    pub fn used(&self) -> usize {
+        self.0.used.load(Ordering::Relaxed)
+    }
+}
+
+/// The budget of a thread, and when it was last looked at.
+struct Held {
+    budget: Budget,
+    checks: Cell<u32>,
+    cpu_at_start: Option<Duration>,
+    cpu_next: Cell<Instant>,
+}
+
+thread_local! {
+    static HELD: RefCell<Option<Held>> = const { RefCell::new(None) };
+}
+
+/// Puts back what the thread held before, also while unwinding.
+struct Restore(Option<Held>);
+
+impl Drop for Restore {
+    fn drop(&mut self) {
+        let before = self.0.take();
+        HELD.with(|held| *held.borrow_mut() = before);
+    }
+}
+
+/// The payload of the unwinding.
+struct Stop(Stopped);
+
+/// Runs `job` under a budget.
+///
+/// # Errors
+/// Why it was stopped. A panic of the job goes on as one.
+pub fn within<T>(budget: &Budget, job: impl FnOnce() -> T) -> Result<T, Stopped> {
+    let held = Held {
+        budget: budget.clone(),
+        checks: Cell::new(0),
+        cpu_at_start: budget.0.allowance.cpu.and_then(|_| thread_cpu()),
+        cpu_next: Cell::new(Instant::now() + CPU_INTERVAL),
+    };
+    let restore = Restore(HELD.with(|h| h.borrow_mut().replace(held)));
+    let outcome = catch_unwind(AssertUnwindSafe(|| {
+        check();
+        job()
+    }));
+    drop(restore);
+    outcome.or_else(|payload| match payload.downcast::<Stop>() {
+        Ok(stop) => Err(stop.0),
+        Err(panic) => resume_unwind(panic),
+    })
+}
+
+/// The budget of this thread, to be handed to others that work for it.
+pub fn current() -> Option<Budget> {
+    HELD.with(|held| held.borrow().as_ref().map(|held| held.budget.clone()))
+}
+
+/// Stops here if this thread's budget is used up or withdrawn.
+#[inline]
+pub fn check() {
+    if let Some(why) = HELD.with(|held| held.borrow().as_ref().and_then(Held::look)) {
+        unwind(why);
+    }
+}
+
+/// Stops here if `bytes` more are beyond the budget. Counts what is laid out in all, also what was freed since.
+pub fn lay_out(bytes: usize) {
+    let taken = HELD.with(|held| held.borrow().as_ref().map_or(Ok(()), |held| held.budget.take(bytes)));
+    if let Err(why) = taken {
+        unwind(why);
+    }
+}
+
+/// [`lay_out`] for `rows`·`columns` doubles.
+pub fn lay_out_matrix(rows: usize, columns: usize) {
+    lay_out(rows.saturating_mul(columns).saturating_mul(8));
+}
+
+/// Stops here if a model of `got` unknowns is beyond the budget.
+pub fn unknowns(got: usize) {
+    let most = HELD.with(|held| held.borrow().as_ref().map_or(usize::MAX, |held| held.budget.0.allowance.unknowns));
+    if got > most {
+        unwind(Stopped::Unknowns { most, got });
+    }
+}
+
+fn unwind(why: Stopped) -> ! {
+    resume_unwind(Box::new(Stop(why)))
+}
+
+impl Held {
+    #[inline]
+    fn look(&self) -> Option<Stopped> {
+        match self.budget.0.order.load(Ordering::Relaxed) {
+            0 => {}
+            LATE => return Some(Stopped::Late),
+            _ => return Some(Stopped::Cancelled),
+        }
+        let checks = self.checks.get();
+        self.checks.set(checks.wrapping_add(1));
+        if checks.is_multiple_of(CHECKS_PER_LOOK) { self.look_at_clocks() } else { None }
+    }
+
+    fn look_at_clocks(&self) -> Option<Stopped> {
+        let Allowance { deadline, cpu, .. } = self.budget.0.allowance;
+        if deadline.is_none() && cpu.is_none() {
+            return None;
+        }
+        let now = Instant::now();
+        if deadline.is_some_and(|deadline| now >= deadline) {
+            return Some(Stopped::Late);
+        }
+        let (Some(most), Some(start)) = (cpu, self.cpu_at_start) else { return None };
+        if now < self.cpu_next.get() {
+            return None;
+        }
+        self.cpu_next.set(now + CPU_INTERVAL);
+        let used = thread_cpu()?.saturating_sub(start);
+        (used > most).then_some(Stopped::Cpu { seconds: most.as_secs() })
+    }
+}
+
+/// Processor time of this thread, where the system tells it (Linux); elsewhere deadlines alone hold.
+fn thread_cpu() -> Option<Duration> {
+    let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
+    text.split_whitespace().next()?.parse().ok().map(Duration::from_nanos)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn allowed(change: impl FnOnce(&mut Allowance)) -> Budget {
+        let mut allowance = Allowance::default();
+        change(&mut allowance);
+        Budget::new(allowance)
+    }
+
+    /// Without a budget nothing is refused.
+    #[test]
+    fn nothing_is_refused_without_one() {
+        check();
+        lay_out(usize::MAX);
+        unknowns(usize::MAX);
+        assert!(current().is_none());
+    }
+
+    /// Each limit stops what would pass it, and says by how much; what is inside it passes.
+    #[test]
+    fn limits_stop() {
+        let bytes = allowed(|a| a.bytes = 100);
+        let laid = within(&bytes, || {
+            lay_out(60);
+            lay_out_matrix(2, 3);
+        });
+        assert_eq!(laid, Err(Stopped::Bytes { most: 100, needed: 108 }));
+        assert_eq!(within(&bytes, || lay_out(40)), Ok(()), "what was refused was not laid out");
+        assert_eq!(within(&bytes, || lay_out(usize::MAX)), Err(Stopped::Bytes { most: 100, needed: usize::MAX }));
+        let small = allowed(|a| a.unknowns = 9);
+        assert_eq!(within(&small, || unknowns(9)), Ok(()));
+        assert_eq!(within(&small, || unknowns(10)), Err(Stopped::Unknowns { most: 9, got: 10 }));
+        let late = allowed(|a| a.deadline = Some(Instant::now()));
+        assert_eq!(within(&late, || ()), Err(Stopped::Late));
+    }
+
+    /// A cancelled loop stops at its next check, from another thread too, and the thread has no budget afterwards.
+    #[test]
+    fn cancelling_stops_a_loop() {
+        let budget = Budget::new(Allowance::default());
+        let other = budget.clone();
+        std::thread::scope(|scope| {
+            let loops = scope.spawn(|| {
+                within(&budget, || {
+                    loop {
+                        check();
+                    }
+                })
+            });
+            other.cancel();
+            assert_eq!(loops.join().expect("no panic"), Err(Stopped::Cancelled));
+        });
+        assert_eq!(within(&other, || ()), Err(Stopped::Cancelled), "and it stays so");
+        assert!(current().is_none());
+    }
+
+    /// Processor time is that of the thread: a spinning one uses it up.
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn processor_time_ends() {
+        let budget = allowed(|a| a.cpu = Some(Duration::from_millis(20)));
+        let spun = within(&budget, || {
+            loop {
+                check();
+            }
+        });
+        assert_eq!(spun, Err(Stopped::Cpu { seconds: 0 }));
+    }
+
+    /// A panic inside goes on as a panic, and the budget of the outer computation is held again after an inner one.
+    #[test]
+    fn panics_pass_and_budgets_nest() {
+        let outer = allowed(|a| a.unknowns = 5);
+        let inner = allowed(|a| a.unknowns = 50);
+        let nested = within(&outer, || {
+            assert_eq!(within(&inner, || unknowns(20)), Ok(()));
+            unknowns(20);
+        });
+        assert_eq!(nested, Err(Stopped::Unknowns { most: 5, got: 20 }));
+        let panicked = catch_unwind(AssertUnwindSafe(|| within(&outer, || panic!("a fault"))));
+        assert!(panicked.is_err());
+        assert!(current().is_none());
+    }
+}

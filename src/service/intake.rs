@@ -1,0 +1,271 @@
+//! What comes in before anyone looks at it: how many calls there are, what their requests hold, and how long one may pause.
+//!
+//! A client may announce a large message and send little of it, begin many and finish none, or ask for more at once than
+//! the server can hold. So every call enters here: it counts among the calls of the server and of its connection, its
+//! bytes count from the first (those of a stream until each message is whole, those of a unary request until it is
+//! answered), and a message that was begun must go on.
+
+use super::connection::Presence;
+use super::limits::Limits;
+use super::status;
+use http_body::{Frame, SizeHint};
+use std::convert::Infallible;
+use std::future::Future;
+use std::pin::Pin;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::task::{Context, Poll};
+use std::time::Duration;
+use tokio::time::{Instant, Sleep};
+use tonic::body::Body;
+use tonic::codegen::{Bytes, Service, http};
+use tonic::server::NamedService;
+use tonic::{Code, Status};
+
+/// Calls whose requests are streams: silence between two messages is no pause.
+const STREAMS: [&str; 2] = ["/Trial", "/ServerReflectionInfo"];
+
+/// Counts for all services of a server.
+#[derive(Debug)]
+pub(super) struct Gate {
+    calls: AtomicUsize,
+    held: AtomicUsize,
+    most_calls: usize,
+    most_held: usize,
+    pause: Duration,
+}
+
+impl Gate {
+    pub(super) fn new(limits: &Limits) -> Arc<Self> {
+        Arc::new(Self {
+            calls: AtomicUsize::new(0),
+            held: AtomicUsize::new(0),
+            most_calls: limits.calls,
+            most_held: limits.held_bytes,
+            pause: limits.request_pause,
+        })
+    }
+
+    fn enter(self: &Arc<Self>, presence: Option<Arc<Presence>>) -> Result<Call, Status> {
+        let call = Call { gate: Arc::clone(self), presence, held: AtomicUsize::new(0) };
+        if let Some(presence) = &call.presence {
+            presence.begin();
+        }
+        // from here the call gives back what it took when it is dropped
+        if self.calls.fetch_add(1, Ordering::Relaxed) >= self.most_calls {
+            return Err(status::limit("calls", self.most_calls, "one more; end some"));
+        }
+        Ok(call)
+    }
+}
+
+/// One call, from its first byte until its answer is sent.
+struct Call {
+    gate: Arc<Gate>,
+    presence: Option<Arc<Presence>>,
+    held: AtomicUsize,
+}
+
+impl Call {
+    fn hold(&self, bytes: usize) -> Result<(), Status> {
+        self.held.fetch_add(bytes, Ordering::Relaxed);
+        let held = self.gate.held.fetch_add(bytes, Ordering::Relaxed) + bytes;
+        if held > self.gate.most_held {
+            return Err(status::limit("held_bytes", self.gate.most_held, held));
+        }
+        Ok(())
+    }
+
+    fn release(&self) {
+        let bytes = self.held.swap(0, Ordering::Relaxed);
+        self.gate.held.fetch_sub(bytes, Ordering::Relaxed);
+    }
+}
+
+impl Drop for Call {
+    fn drop(&mut self) {
+        self.release();
+        self.gate.calls.fetch_sub(1, Ordering::Relaxed);
+        if let Some(presence) = &self.presence {
+            presence.end();
+        }
+    }
+}
+
+/// A service whose calls enter through a [`Gate`].
+#[derive(Clone)]
+pub(super) struct Intake<S> {
+    service: S,
+    gate: Arc<Gate>,
+}
+
+impl<S> Intake<S> {
+    pub(super) fn new(service: S, gate: &Arc<Gate>) -> Self {
+        Self { service, gate: Arc::clone(gate) }
+    }
+}
+
+impl<S: NamedService> NamedService for Intake<S> {
+    const NAME: &'static str = S::NAME;
+}
+
+type Answer = Pin<Box<dyn Future<Output = Result<http::Response<Body>, Infallible>> + Send>>;
+
+impl<S> Service<http::Request<Body>> for Intake<S>
+where
+    S: Service<http::Request<Body>, Response = http::Response<Body>, Error = Infallible>,
+    S::Future: Send + 'static,
+{
+    type Response = http::Response<Body>;
+    type Error = Infallible;
+    type Future = Answer;
+
+    fn poll_ready(&mut self, cx: &mut Context<'_>) -> Poll<Result<(), Infallible>> {
+        self.service.poll_ready(cx)
+    }
+
+    fn call(&mut self, request: http::Request<Body>) -> Answer {
+        let call = match self.gate.enter(request.extensions().get::<Arc<Presence>>().cloned()) {
+            Ok(call) => Arc::new(call),
+            Err(status) => return Box::pin(std::future::ready(Ok(status.into_http()))),
+        };
+        let stream = STREAMS.iter().any(|name| request.uri().path().ends_with(name));
+        let received = Arc::clone(&call);
+        let request = request
+            .map(|body| Body::new(Received { body, call: received, framing: Framing::default(), stream, pause: None }));
+        let answer = self.service.call(request);
+        Box::pin(async move { Ok(answer.await?.map(|body| Body::new(Answering { body, _call: call }))) })
+    }
+}
+
+/// The body of a request, counted.
+struct Received {
+    body: Body,
+    call: Arc<Call>,
+    framing: Framing,
+    stream: bool,
+    pause: Option<Pin<Box<Sleep>>>,
+}
+
+impl http_body::Body for Received {
+    type Data = Bytes;
+    type Error = Status;
+
+    fn poll_frame(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<Option<Result<Frame<Bytes>, Status>>> {
+        let this = &mut *self;
+        match Pin::new(&mut this.body).poll_frame(cx) {
+            Poll::Ready(Some(Ok(frame))) => {
+                this.pause = None;
+                if let Some(data) = frame.data_ref() {
+                    this.call.hold(data.len())?;
+                    this.framing.take(data);
+                    if this.stream && this.framing.whole() {
+                        this.call.release();
+                    }
+                }
+                Poll::Ready(Some(Ok(frame)))
+            }
+            Poll::Ready(end) => Poll::Ready(end),
+            Poll::Pending => {
+                if this.stream && this.framing.whole() {
+                    return Poll::Pending;
+                }
+                let longest = this.call.gate.pause;
+                let pause =
+                    this.pause.get_or_insert_with(|| Box::pin(tokio::time::sleep_until(Instant::now() + longest)));
+                if pause.as_mut().poll(cx).is_ready() {
+                    let text = format!("request_pause: a request was begun and did not go on for {longest:?}");
+                    return Poll::Ready(Some(Err(Status::new(Code::DeadlineExceeded, text))));
+                }
+                Poll::Pending
+            }
+        }
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.body.is_end_stream()
+    }
+
+    fn size_hint(&self) -> SizeHint {
+        self.body.size_hint()
+    }
+}
+
+/// The body of an answer; the call is over when it is dropped.
+struct Answering {
+    body: Body,
+    _call: Arc<Call>,
+}
+
+impl http_body::Body for Answering {
+    type Data = Bytes;
+    type Error = Status;
+
+    fn poll_frame(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<Option<Result<Frame<Bytes>, Status>>> {
+        Pin::new(&mut self.body).poll_frame(cx)
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.body.is_end_stream()
+    }
+
+    fn size_hint(&self) -> SizeHint {
+        self.body.size_hint()
+    }
+}
+
+/// Where a stream of gRPC messages stands: each has five bytes before it, a flag and the length.
+#[derive(Debug, Default)]
+struct Framing {
+    head: [u8; 5],
+    have: usize,
+    left: usize,
+}
+
+impl Framing {
+    fn take(&mut self, mut data: &[u8]) {
+        while !data.is_empty() {
+            if self.left > 0 {
+                let n = self.left.min(data.len());
+                self.left -= n;
+                data = &data[n..];
+                continue;
+            }
+            let n = (5 - self.have).min(data.len());
+            self.head[self.have..self.have + n].copy_from_slice(&data[..n]);
+            self.have += n;
+            data = &data[n..];
+            if self.have == 5 {
+                let [_, a, b, c, d] = self.head;
+                self.left = u32::from_be_bytes([a, b, c, d]) as usize;
+                self.have = 0;
+            }
+        }
+    }
+
+    /// Between two messages.
+    fn whole(&self) -> bool {
+        self.left == 0 && self.have == 0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! However messages are cut into frames, their ends are found.
+    use super::*;
+
+    #[test]
+    fn ends_of_messages_are_found() {
+        let bytes = [0, 0, 0, 0, 3, 7, 7, 7, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 9];
+        let ends = [8, 13, 19];
+        for size in 1..=bytes.len() {
+            let mut framing = Framing::default();
+            let mut at = 0;
+            for chunk in bytes.chunks(size) {
+                framing.take(chunk);
+                at += chunk.len();
+                assert_eq!(framing.whole(), ends.contains(&at), "{size} {at}");
+            }
+        }
+    }
+}

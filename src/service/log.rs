@@ -1,0 +1,85 @@
+//! Log lines that never wait: a thread of its own writes them to standard error.
+//!
+//! Standard error may be a pipe that nobody reads, or whose reader is gone. Neither may stop the service: lines go through a
+//! queue of bounded length, those that find it full are counted and dropped, and failed writes are forgotten.
+
+use std::io::{self, Write};
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::time::Duration;
+
+/// Lines that wait at most.
+const QUEUE: usize = 1024;
+
+static LINES: OnceLock<SyncSender<Item>> = OnceLock::new();
+static DROPPED: AtomicUsize = AtomicUsize::new(0);
+
+enum Item {
+    Text(Vec<u8>),
+    /// Everything before this is written.
+    Mark(SyncSender<()>),
+}
+
+/// Says one line, without waiting.
+pub fn line(text: &str) {
+    Lines.put(format!("{text}\n").into_bytes());
+}
+
+/// Waits until the lines so far are written, but no longer than `most`.
+pub(super) fn flush(most: Duration) {
+    let (done, written) = sync_channel(1);
+    if LINES.get().is_some_and(|lines| lines.try_send(Item::Mark(done)).is_ok()) {
+        let _ = written.recv_timeout(most);
+    }
+}
+
+/// A writer for the subscriber: each write is one line.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Lines;
+
+impl Lines {
+    fn put(self, text: Vec<u8>) {
+        if queue().try_send(Item::Text(text)).is_err() {
+            DROPPED.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+}
+
+impl Write for Lines {
+    fn write(&mut self, text: &[u8]) -> io::Result<usize> {
+        self.put(text.to_vec());
+        Ok(text.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+fn queue() -> &'static SyncSender<Item> {
+    LINES.get_or_init(|| {
+        let (sender, lines) = sync_channel(QUEUE);
+        // without a thread the queue fills, and lines are dropped
+        let _ = std::thread::Builder::new().name("log".into()).spawn(move || write(&lines));
+        sender
+    })
+}
+
+fn write(lines: &Receiver<Item>) {
+    for item in lines {
+        let text = match item {
+            Item::Text(text) => text,
+            Item::Mark(done) => {
+                let _ = done.send(());
+                continue;
+            }
+        };
+        let dropped = DROPPED.swap(0, Ordering::Relaxed);
+        let mut out = io::stderr();
+        if dropped > 0 {
+            let _ = writeln!(out, "… {dropped} lines of this log were dropped: nobody read them in time");
+        }
+        let _ = out.write_all(&text);
+    }
+}
