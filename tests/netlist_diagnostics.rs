@@ -266,6 +266,20 @@ fn slips() {
     warning("anchor p1 [a] []\nbeam2d p1 [a b] [l=10u w=1u oz=90]", "W003", "90 looks like degrees");
     warning("anchor p1 [a] []\nbeam2d p1 [a b] [l=100 w=1u]", "W005", "`l` is 100 m long");
     warning("anchor p1 [a] []\nbeam2d p1 [a b] [l=10u w=1u Youngsmodulus=165]", "W008", "165 Pa");
+    warning("anchor p1 [a] []\nbeam2d p1 [a b] [l=10u w=1u density=2.3]", "W035", "2.3 kg/m³");
+    warning("anchor p1 [a] []\nbeam2d p1 [a b] [l=10u w=1u stress=1e12]", "W036", "1e12 Pa");
+    warning("anchor p1 [a] []\nbeam2d p1 [a b] [l=10u w=1u ambienttemperature=293 T=10293]", "W037", "10293 K");
+    warning(
+        "anchor p1 [a] []\nfor k=0:9 [ beam2d p1 [a b(k)] [l=10u w=1u oz=45] ]",
+        "W003",
+        "45 looks like degrees (10 elements)",
+    );
+    warning(
+        "anchor p1 [a] []\nanchor p1 [b] []\nanchor p1 [c] []\nanchor p1 [d] []\n\
+         gap2de p1 [a b c d] [l=100u w1=2u w2=2u gap=4u R=1]\neground * [c] []\nv port * [a c] []",
+        "W015",
+        "bends nothing",
+    );
     warning(
         "anchor p1 [a] []\nbeam2d p1 [a b] [l=10u w=1u]\neground * [a] []\nport * [a] []",
         "W009",

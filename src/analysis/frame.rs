@@ -91,6 +91,8 @@ pub fn frame_modes(
         errors: vec![None; found.residuals.len()],
         residuals: found.residuals,
         unknowns: frame.system.unknowns(),
+        deflection_m: 0.0,
+        warnings: Vec::new(),
     };
     Ok((result, curves))
 }

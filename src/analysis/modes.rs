@@ -5,10 +5,11 @@ use super::{AnalysisError, BeamMotions, NodeMotions, PortVoltages};
 use crate::compile::Compiled;
 use crate::gaps::Point;
 use crate::multibody::BlockMatrix;
-use crate::multibody::forces::add_inertia;
+use crate::multibody::forces::{add_inertia, add_stress_stiffness};
 use crate::multibody::planar::Pose;
-use crate::refine::order_error::{of_modes, own_stiffness};
-use crate::solve::eigen::{RELIABLE, lowest_modes};
+use crate::refine::axial::axial_forces;
+use crate::refine::order_error::{of_loaded_modes, own_stiffness};
+use crate::solve::eigen::{Modes, RELIABLE, lowest_modes};
 use serde::Serialize;
 
 /// Undamped modes.
@@ -27,7 +28,20 @@ pub struct ModesResult {
     pub errors: Vec<Option<f64>>,
     /// Mechanical unknowns.
     pub unknowns: usize,
+    /// Largest displacement of a node at the equilibrium that the modes are about [m].
+    pub deflection_m: f64,
+    /// What the numbers do not say by themselves.
+    pub warnings: Vec<String>,
 }
+
+/// Modes beyond those asked for, which keep the last of these apart from what follows.
+const GUARDS: usize = 2;
+/// Deflection, as a share of the drawing's size, from which modes are said to be about another shape.
+const FAR: f64 = 0.02;
+/// Below this share of a mode in its reference nothing is said about its error.
+const ALIKE: f64 = 0.5;
+/// An estimate is not told where rounding in the stiffness may be more.
+const ROUNDED: f64 = 1e-4;
 
 /// The `count` lowest modes about the static equilibrium at these voltages.
 ///
@@ -64,12 +78,14 @@ pub fn modes_with_curves(
     let mut tangent = BlockMatrix::new(&system.model.pattern);
     let mut residual = q.clone();
     system.tangent(&q, &drive, &mut tangent, &mut residual);
-    let found = lowest_modes(system, (&q, &drive), &tangent, count)?;
+    // what stress and heat do to the stiffness belongs to the vibration, in a linear model too
+    add_stress_stiffness(&system.model, &q, &drive.rest(), &mut tangent);
+    let mut found = lowest_modes(system, (&q, &drive), &tangent, count + GUARDS)?;
     if found.lambda.is_empty() {
         let detail = "no mode came out: nothing that moves has mass, or the stiffness is not finite".into();
         return Err(AnalysisError::NotConverged { detail });
     }
-    if let Some(k) = found.residuals.iter().position(|&r| r.is_nan() || r > RELIABLE) {
+    if let Some(k) = found.residuals.iter().take(count).position(|&r| r.is_nan() || r > RELIABLE) {
         let (residual, rounding) = (found.residuals[k], found.rounding);
         let size = if residual.is_nan() { "that rounding hides".into() } else { format!("of {residual:.1e}") };
         let detail = format!(
@@ -84,7 +100,13 @@ pub fn modes_with_curves(
             detail: format!("there are more than {count} modes below the highest one found; ask for more modes"),
         });
     }
-    let errors = estimated(compiled, &tangent, loaded, &found.lambda, &found.shapes);
+    let forces = if loaded { axial_forces(&compiled.structure, &compiled.parts, &q, &drive) } else { Vec::new() };
+    let mut errors = estimated(compiled, &tangent, &forces, &found);
+    let warnings = told(compiled, count, &q, &found.lambda);
+    errors.truncate(count);
+    found.lambda.truncate(count);
+    found.shapes.truncate(count);
+    found.residuals.truncate(count);
     let (shapes, curves) = found.shapes.iter().map(|x| shape(compiled, &q, x)).unzip();
     let result = ModesResult {
         frequencies_hz: found.lambda.iter().map(|&l| l.max(0.0).sqrt() / std::f64::consts::TAU).collect(),
@@ -92,23 +114,21 @@ pub fn modes_with_curves(
         residuals: found.residuals,
         errors,
         unknowns: system.model.unknowns(),
+        deflection_m: deflection(compiled, &q),
+        warnings,
     };
     Ok((result, curves))
 }
 
-/// Estimated errors of modes about an equilibrium with this tangent.
-fn estimated(
-    compiled: &Compiled,
-    tangent: &BlockMatrix<f64, 3>,
-    loaded: bool,
-    lambda: &[f64],
-    shapes: &[Vec<Pose>],
-) -> Vec<Option<f64>> {
+/// Estimated errors of modes about an equilibrium with this tangent, where the beams carry these axial forces.
+fn estimated(compiled: &Compiled, tangent: &BlockMatrix<f64, 3>, forces: &[f64], found: &Modes) -> Vec<Option<f64>> {
     let options = &compiled.options;
     let model = &compiled.parts.system.model;
-    let none = vec![None; lambda.len()];
+    let (lambda, none) = (&found.lambda, vec![None; found.lambda.len()]);
     let own = own_stiffness(options, &compiled.parts);
-    let (Some(highest), true) = (lambda.last(), own || !loaded) else { return none };
+    let (Some(highest), true) = (lambda.last(), (own || forces.is_empty()) && found.rounding < ROUNDED) else {
+        return none;
+    };
     let mut shift = 0.0;
     let mut factor = tangent.clone();
     model.project_matrix(&mut factor);
@@ -121,8 +141,46 @@ fn estimated(
             return none;
         }
     }
-    of_modes(&compiled.structure, options, &compiled.parts, (&factor, shift), lambda, shapes)
-        .map_or(none, |errors| errors.relative.into_iter().map(Some).collect())
+    let modes = (lambda.as_slice(), found.shapes.as_slice());
+    let compared = of_loaded_modes(&compiled.structure, options, &compiled.parts, (&factor, shift), forces, modes);
+    let sure = |(error, like): (f64, f64)| (error.is_finite() && like >= ALIKE).then_some(error);
+    compared.map_or(none, |e| e.relative.into_iter().zip(e.likeness).map(sure).collect())
+}
+
+/// Largest displacement of a node [m].
+fn deflection(compiled: &Compiled, q: &[Pose]) -> f64 {
+    let linear = compiled.parts.system.model.linear;
+    let moved = |point: &Option<Point>| point.map_or(0.0, |p| p.displacement(q, linear).norm());
+    compiled.parts.nodes.iter().map(moved).fold(0.0, f64::max)
+}
+
+/// What modes do not say by themselves: that there are fewer, that the equilibrium is far from the drawing or unstable.
+fn told(compiled: &Compiled, count: usize, q: &[Pose], lambda: &[f64]) -> Vec<String> {
+    let mut warnings = Vec::new();
+    if lambda.len() < count {
+        let found = lambda.len();
+        warnings.push(format!(
+            "only {found} of {count} modes: the model has no more; take a higher --band, or more --segments"
+        ));
+    }
+    let size = compiled.structure.extent();
+    let moved = deflection(compiled, q);
+    if moved > FAR * size {
+        let share = 100.0 * moved / size;
+        let moved = 1e6 * moved;
+        warnings.push(format!(
+            "these modes are about a largely deflected equilibrium: {moved:.3} µm away from the drawing, {share:.0} % of its size"
+        ));
+    }
+    let highest = lambda.last().map_or(0.0, |l| l.abs());
+    let unstable = lambda.iter().filter(|l| **l < -1e-9 * highest).count();
+    if unstable > 0 {
+        warnings.push(format!(
+            "the equilibrium is unstable: {unstable} of the modes do not swing but grow, and are shown at 0 Hz (buckled, if \
+             compressed)"
+        ));
+    }
+    warnings
 }
 
 /// Displacements of the nodes and along the beams in a mode, the largest translation of a node scaled to 1.

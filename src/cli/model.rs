@@ -106,6 +106,21 @@ pub(crate) struct Context<'a> {
     warnings: Vec<&'a str>,
 }
 
+impl<'a> Context<'a> {
+    /// With what an analysis warns of.
+    pub(crate) fn with(mut self, warnings: &'a [String]) -> Self {
+        self.warnings.extend(warnings.iter().map(String::as_str));
+        self
+    }
+}
+
+/// Shows what an analysis warns of on standard error.
+pub(crate) fn warn_of(warnings: &[String]) {
+    for warning in warnings {
+        eprintln!("warning: {warning}");
+    }
+}
+
 /// The options of a model as keys of a document, but the number of segments: `check` tells it of each beam.
 #[derive(Debug)]
 struct Keys<'a>(&'a CompileOptions);

@@ -1,7 +1,7 @@
 //! `bimorph modes`: how it rings.
 
 use super::failure::Failure;
-use super::model::{Context, ModelArgs, Named};
+use super::model::{Context, ModelArgs, Named, warn_of};
 use super::output::OutputArgs;
 use super::solver::ModelChoice;
 use super::{progress, report, statics, value};
@@ -28,7 +28,7 @@ const MOST_SHAPES: usize = 12;
 ///
 /// JSON: "frequencies_hz" ascending [Hz]; "shapes": for each mode the displacement of every node, the largest
 /// translation being 1; "residuals": about the relative error of each shape; "estimated_errors": relative, by the number of segments, signed,
-/// null where there is none.
+/// null where there is none; "deflection_m": how far the equilibrium that they are about is from the drawing.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  bimorph modes bank.net --count 10 --band 1.3M\n  \
                         bimorph modes bank.net --port sense=40 --json      about the equilibrium at 40 V\n  \
@@ -60,6 +60,8 @@ struct Document<'a> {
     residuals: &'a [f64],
     estimated_errors: &'a [Option<f64>],
     unknowns: usize,
+    /// Largest displacement of a node at the equilibrium that the modes are about [m].
+    deflection_m: f64,
     solver: ModelChoice,
     port_voltages_v: Named<'a, f64>,
     #[serde(flatten)]
@@ -83,15 +85,17 @@ impl Modes {
         };
         busy.finish_and_clear();
         let (result, curves) = result?;
+        warn_of(&result.warnings);
         let document = Document {
             frequencies_hz: &result.frequencies_hz,
             shapes: result.shapes.iter().map(|shape| Named(shape)).collect(),
             residuals: &result.residuals,
             estimated_errors: &result.errors,
             unknowns: result.unknowns,
+            deflection_m: result.deflection_m,
             solver: self.solver,
             port_voltages_v: Named(&self.ports),
-            context: self.model.context(&compiled),
+            context: self.model.context(&compiled).with(&result.warnings),
         };
         let title = self.model.title();
         let rows: Vec<Vec<String>> = result
@@ -106,6 +110,7 @@ impl Modes {
             .collect();
         let text = report::columns(&["mode", "frequency", "error", "residual"], &rows)
             + "\n"
+            + &about(result.deflection_m)
             + &report::footing(&compiled, result.unknowns);
         if self.output.format() == Some(Format::Html) {
             return self.output.finish_page(|| page(&compiled, &title, &result, &curves), &document, &text);
@@ -116,6 +121,15 @@ impl Modes {
             &document,
             &text,
         )
+    }
+}
+
+/// What the modes are about, where that is not the drawing.
+fn about(deflection: f64) -> String {
+    if deflection > 0.0 {
+        format!("about the equilibrium, {} away from the drawing\n", quantity(deflection, "m"))
+    } else {
+        String::new()
     }
 }
 

@@ -109,6 +109,29 @@ pub fn second_mass(bar: &Bar, h: f64) -> Matrix6<f64> {
     join(&long, &across)
 }
 
+/// What an axial force N (tension positive) adds to the second term of the dynamic stiffness, which with it is
+/// D = K + N·G − λ·(M + A) − λ²·M₂ − B: A = N·(…) [kg, kg·m, kg·m²] and B = N²·(…) [N/m, N, N·m]. The load of the element's
+/// shapes on the clamped beam is N·w″ + λ·m·w; shear is left out.
+pub fn second_tension(bar: &Bar, h: f64, force: f64) -> (Matrix6<f64>, Matrix6<f64>) {
+    #[rustfmt::skip]
+    let cross = Matrix4::new(
+        -8.0,  -20.0,  8.0,  15.0,
+        -20.0, -8.0,  -15.0, 7.0,
+        8.0,   -15.0, -8.0,  20.0,
+        15.0,   7.0,   20.0, -8.0,
+    ) / 25200.0;
+    #[rustfmt::skip]
+    let twice = Matrix4::new(
+        18.0,  9.0,  -18.0,  9.0,
+        9.0,   22.0, -9.0,  -13.0,
+        -18.0, -9.0,  18.0, -9.0,
+        9.0,  -13.0, -9.0,   22.0,
+    ) / 12600.0;
+    let lengths = Matrix4::from_diagonal(&[1.0, h, 1.0, h].into());
+    let across = |m: Matrix4<f64>, factor: f64| join(&Matrix2::zeros(), &(lengths * m * lengths * (factor / bar.ei)));
+    (across(cross, force * bar.line_mass * h.powi(3)), across(twice, force * force * h))
+}
+
 fn join(long: &Matrix2<f64>, across: &Matrix4<f64>) -> Matrix6<f64> {
     let mut whole = Matrix6::zeros();
     for (i, &r) in LONG.iter().enumerate() {
@@ -148,6 +171,17 @@ mod tests {
             assert!((second - second.transpose()).norm() < 1e-15);
             assert!(second.symmetric_eigenvalues().min() > -1e-15);
         }
+    }
+
+    /// One element of a clamped-pinned column buckles at 20.19·EI/h² (tan x = x). The element alone says 30; with the term in
+    /// N² it is 23.05, the root of 4 + 4·N/30 − 22·N²/12600.
+    #[test]
+    fn one_element_buckles() {
+        let free = |force: f64| 4.0 + force * 4.0 / 30.0 - second_tension(&SLENDER, 1.0, force).1[(5, 5)];
+        assert!(free(-23.0) > 0.0 && free(-23.1) < 0.0, "{} {}", free(-23.0), free(-23.1));
+        // symmetric, and nothing for a rigid turn without force
+        let (a, b) = second_tension(&SLENDER, 0.7, 3.0);
+        assert!((a - a.transpose()).norm() < 1e-15 && (b - b.transpose()).norm() < 1e-15);
     }
 
     /// One element of a cantilever, with M₂: λ₁ of (1.875104)⁴ to 2.2e-4, where the element alone is off by 9.5e-3 (root of

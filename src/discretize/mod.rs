@@ -105,6 +105,11 @@ pub enum DiscretizeError {
     /// Everything is ground.
     #[error("nothing can move: every node is anchored")]
     NothingMoves,
+    /// No elements.
+    #[error(
+        "nothing is drawn: only layers, subnets and parameters here; name this file in `uses` of a netlist that has elements"
+    )]
+    NothingDrawn,
 }
 
 /// Turns a drawing into a system.
@@ -131,6 +136,9 @@ pub fn discretize_with(
     // inner bodies of beams alone: what they come to at least is refused before anything is laid out
     budget::unknowns(3 * segments.iter().map(|n| n.saturating_sub(1)).sum::<usize>());
     budget::lay_out(total * SEGMENT_BYTES);
+    if structure.nodes.is_empty() {
+        return Err(DiscretizeError::NothingDrawn);
+    }
     let stiff: Vec<bool> = segments.iter().map(|n| *n == 0).collect();
     let mut rigid = rigid::Assembly::new(structure, &stiff);
     let mut laid = beam::Joints::default();

@@ -2,7 +2,7 @@
 
 use super::model::{Coupling, Model};
 use super::planar::factored::FactoredTangent;
-use super::planar::{HalfTurn, JointKinematics, PairTangent, Pose};
+use super::planar::{HalfTurn, JointKinematics, PairTangent, Pose, Symmetric};
 use super::section::{LaidJoint, NONE, Place, Section};
 use super::{BlockMatrix, BodyId};
 use nalgebra::{Matrix6, Vector3};
@@ -181,15 +181,27 @@ pub fn add_tangent(
     add_coupling_tangent(model, tangent);
 }
 
-/// The tangents of the joints, unsummed; their sum is that of [`add_tangent`] without couplings.
+/// `tangent +=` the stiffness that the stress of the joints brings to a linear model about the drawn geometry, as stress and
+/// heat do. Equilibria of a linear model do not have it; vibrations about them do.
+pub fn add_stress_stiffness(model: &Model, q: &[Pose], rest: &RestStrain<'_>, tangent: &mut BlockMatrix<f64, 3>) {
+    let mut turns = Turns::new();
+    for joint in model.joints.iter().filter(|_| model.linear) {
+        let section = model.section(joint);
+        let k = turns.kinematics(true, joint, section, q);
+        let h = k.tangent(&Symmetric::default(), &joint.stress(section, &k, rest), &section.second);
+        joint.place.add_pair(tangent, &h);
+    }
+}
+
+/// The tangents of the joints with their stress, unsummed; their sum is that of [`add_tangent`], and for a linear model of
+/// [`add_stress_stiffness`], without couplings.
 pub(crate) fn factored(model: &Model, q: &[Pose], rest: &RestStrain<'_>) -> Vec<(Place, FactoredTangent)> {
     let mut turns = Turns::new();
     let one = |joint: &LaidJoint| {
         let section = model.section(joint);
         let k = turns.kinematics(model.linear, joint, section, q);
         let stress = joint.stress(section, &k, rest);
-        let stressed = (!model.linear).then_some((&stress, &section.second));
-        (joint.place, k.factored(&section.stiffness, stressed))
+        (joint.place, k.factored(&section.stiffness, &stress, &section.second))
     };
     model.joints.iter().map(one).collect()
 }

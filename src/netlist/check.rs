@@ -28,6 +28,24 @@ pub(crate) fn check(drawing: &Drawing, sink: &mut Sink) {
     loose_nodes(drawing, &connected, sink);
     unheld_parts(drawing, &connected, &mut parts, sink);
     floating_potentials(drawing, sink);
+    gaps_between_anchors(drawing, sink);
+}
+
+/// A gap along beams acts on their ends; where those are anchored it bends nothing.
+fn gaps_between_anchors(drawing: &Drawing, sink: &mut Sink) {
+    let structure = &drawing.structure;
+    let mut anchored = vec![false; structure.nodes.len()];
+    for support in structure.supports.iter().filter(|support| support.held == [true; 3]) {
+        anchored[support.node.0] = true;
+    }
+    let held: Vec<_> = structure.beam_gaps.iter().filter(|g| g.nodes.iter().all(|n| anchored[n.0])).collect();
+    if let Some(gap) = held.first() {
+        let more = if held.len() > 1 { format!(" ({} such gaps in all)", held.len()) } else { String::new() };
+        let message =
+            format!("`{}` acts on the ends of its beams, which are all anchored: it bends nothing{more}", gap.name);
+        let help = "divide the beams: draw several gaps in a row between further nodes";
+        sink.warning("W015", drawing.first_named[gap.nodes[0].0], message, help);
+    }
 }
 
 fn facts(drawing: &Drawing, sink: &mut Sink) {
@@ -64,6 +82,26 @@ fn facts(drawing: &Drawing, sink: &mut Sink) {
                 "W034",
                 format!("the layer's `thermcond` = {number} W/(m·K) is small for a conductivity ({elements})"),
                 "silicon has 30 to 150 W/(m·K); SUGAR's process files hold 2.33 here, which is none",
+            ),
+            Fact::Degrees => (
+                "W003",
+                format!("angles are in radians; {number} looks like degrees ({elements})"),
+                "for degrees write `deg(…)` around the number",
+            ),
+            Fact::OddDensity => (
+                "W035",
+                format!("`density` = {number} kg/m³ is that of no solid ({elements})"),
+                "it is in kg/m³: polysilicon has 2330",
+            ),
+            Fact::OddStress => (
+                "W036",
+                format!("`stress` = {number} Pa is beyond the strength of any solid ({elements})"),
+                "it is in pascals, tension positive: films have some 1e6 to 1e9",
+            ),
+            Fact::OddRise => (
+                "W037",
+                format!("`T` = {number} K: nothing that structures are made of is solid there ({elements})"),
+                "it is an absolute temperature in kelvin",
             ),
             Fact::Capacitor => (
                 "W021",

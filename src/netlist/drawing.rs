@@ -46,6 +46,14 @@ pub(crate) enum Fact {
     OddModulus,
     /// A layer's thermal conductivity is too small to be one.
     SmallConductivity,
+    /// An angle of whole degrees beyond a full turn in radians.
+    Degrees,
+    /// A density that is no solid's, as in g/cm³ by mistake.
+    OddDensity,
+    /// A residual stress beyond what any solid bears.
+    OddStress,
+    /// A temperature at which no structural solid is one.
+    OddRise,
     /// Capacitors, which are open in statics and are left out.
     Capacitor,
 }

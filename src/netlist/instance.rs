@@ -1,13 +1,13 @@
 //! Elements and subnet instances: parameters evaluated, layers looked up, frames opened.
 
 use super::ast::{Element, Layer, LayerRef};
-use super::drawing::{ELEMENT_BYTES, NAME_COPIES};
+use super::drawing::{ELEMENT_BYTES, Fact, NAME_COPIES};
 use super::elaborate::{Elaborator, Frame, LayerValues};
 use super::elements::{self, Argument, Arguments, Instance};
 use super::rotation::Rotation;
 use super::sink::Reported;
 use super::source::Span;
-use super::value::{Value, short};
+use super::value::Value;
 use crate::budget;
 use crate::structure::NodeId;
 use std::collections::HashMap;
@@ -71,7 +71,7 @@ impl<'p> Elaborator<'p> {
             match (axis, &value) {
                 (Some(axis), Value::Number(angle)) => {
                     angles[axis] = *angle;
-                    self.check_angle(&def.name.name, *angle, def.value.span);
+                    self.check_angle(*angle, def.value.span);
                 }
                 (Some(_), other) => {
                     let message = format!("`{}` must be a number, this is {}", def.name.name, other.called());
@@ -117,12 +117,10 @@ impl<'p> Elaborator<'p> {
         }
     }
 
-    fn check_angle(&mut self, name: &str, angle: f64, span: Span) {
+    fn check_angle(&mut self, angle: f64, span: Span) {
         let divides = 360.0 % angle.abs() == 0.0;
         if angle.abs() > std::f64::consts::TAU && (divides || angle.fract() == 0.0) {
-            let help = format!("for degrees write `{name}=deg({})`", short(angle));
-            let message = format!("angles are in radians; {} looks like degrees", short(angle));
-            self.sink.warning("W003", span, message, help);
+            self.drawing.note_number(Fact::Degrees, span, angle);
         }
     }
 

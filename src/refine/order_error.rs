@@ -20,8 +20,14 @@
 //! Why M₂: the cubic element's own error is +(kh)⁴/1440 where that of E4 is −(kh)⁴/1440, so that the distance of the two is
 //! twice the error inside a long beam, and anything between once and many times it where the ends weigh in.
 //!
+//! Under an axial force N the exact dynamic stiffness of a beam has further terms of the second order, N·λ·A and N²·B
+//! ([`cubic::second_tension`]), which segments do not have: the reference is K − N²B with M_r + N·A. Compression makes the model
+//! too stiff, tension may make it too soft or too stiff.
+//!
+//! Modes of the model and of the reference are paired by shape ([`mac`]), not by place: their frequencies may cross.
+//!
 //! Directions along and across a beam are those of the drawing, also about an equilibrium: right as long as beams turn by
-//! small angles. What axial force does to the stiffness within a segment is not part of the estimate.
+//! small angles.
 //!
 //! Valid for modes that the nodes can show: kh < 4.73, which [`model_order`](super::model_order) sees to.
 
@@ -34,9 +40,13 @@ use crate::multibody::linear_system::LinearSystem;
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, BodyId, Model, Pattern};
 use crate::options::{CompileOptions, Scheme};
+use crate::solve::frequency::mac;
 use crate::solve::subspace::{columns, ritz};
 use crate::structure::Structure;
-use nalgebra::{Matrix6, Vector2, Vector3, Vector6};
+use nalgebra::{DMatrix, Matrix6, Vector2, Vector3, Vector6};
+
+/// Frequencies this close, relatively, in λ, count as equal.
+const NEAR: f64 = 1e-2;
 
 /// Estimated errors of modes.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,6 +55,8 @@ pub struct OrderError {
     pub relative: Vec<f64>,
     /// For each mode, λ = ω² of the beams [rad²/s²].
     pub reference: Vec<f64>,
+    /// For each mode, how much of it is in the reference modes of that frequency, 0…1; near 1 where the pairing is sure.
+    pub likeness: Vec<f64>,
     /// For each mode, what each beam contributes to it [1].
     pub shares: Vec<Vec<f64>>,
 }
@@ -81,6 +93,8 @@ struct Span {
     mass: Matrix6<f64>,
     /// M₂ of a segment.
     second: Matrix6<f64>,
+    /// N²·B of a segment.
+    softer: Matrix6<f64>,
     /// Lumps of the model at the points.
     lumps: Vec<Part>,
 }
@@ -98,7 +112,7 @@ impl Span {
         self.points.iter().map(at).collect()
     }
 
-    /// (M_r − M)·x of this beam, over its points.
+    /// (M_r − M)·x of this beam, over its points, N·A included.
     fn defect(&self, x: &[Vector3<f64>], lambda: f64) -> Vec<Vector3<f64>> {
         let mut f = self.segments(x, &(self.mass + self.second * lambda));
         for ((f, x), lump) in f.iter_mut().zip(x).zip(&self.lumps) {
@@ -107,6 +121,13 @@ impl Span {
             f.z -= lump.first * x.y + lump.second * x.z;
         }
         f
+    }
+
+    /// Takes the axial force of the beam into account.
+    fn tighten(&mut self, bar: &Bar, force: f64) {
+        let (cross, twice) = cubic::second_tension(bar, self.length / (self.points.len() - 1) as f64, force);
+        self.mass += cross;
+        self.softer = twice;
     }
 
     /// The same matrix for every segment, times x.
@@ -148,14 +169,26 @@ pub fn own_stiffness(options: &CompileOptions, parts: &Discretized) -> bool {
     exact && parts.beams.iter().all(|points| points.len() > 2 || points[0].body != points[1].body)
 }
 
-/// Errors of modes of a model. `factor` is that of K − `shift`·M at the operating point.
+/// Errors of modes of a model about the drawn geometry. `factor` is that of K − `shift`·M.
 pub fn of_modes(
     structure: &Structure,
     options: &CompileOptions,
     parts: &Discretized,
-    (factor, shift): (&BlockMatrix<f64, 3>, f64),
+    factor: (&BlockMatrix<f64, 3>, f64),
     lambda: &[f64],
     shapes: &[Vec<Pose>],
+) -> Option<OrderError> {
+    of_loaded_modes(structure, options, parts, factor, &[], (lambda, shapes))
+}
+
+/// The same at an operating point where the beams carry these axial forces, tension positive [N]; none: no beam has any.
+pub fn of_loaded_modes(
+    structure: &Structure,
+    options: &CompileOptions,
+    parts: &Discretized,
+    (factor, shift): (&BlockMatrix<f64, 3>, f64),
+    axial: &[f64],
+    (lambda, shapes): (&[f64], &[Vec<Pose>]),
 ) -> Option<OrderError> {
     let model = &parts.system.model;
     if !own_stiffness(options, parts) {
@@ -165,26 +198,32 @@ pub fn of_modes(
         }
         return by_frame(structure, options, parts, lambda, shapes);
     }
-    let spans = spans(structure, options, (&parts.beams, &parts.offsets), true);
+    let mut spans = spans(structure, options, (&parts.beams, &parts.offsets), true);
+    for ((span, beam), force) in spans.iter_mut().zip(&structure.beams).zip(axial) {
+        span.tighten(&bar(beam, options.shear, options.rotary_inertia), *force);
+    }
     let mass = |x: &[Pose]| x.iter().enumerate().map(|(k, x)| model.mass(k).component_mul(x)).collect();
     let project = |x: &mut [Pose]| model.project(x);
     let pencil = Pencil { factor, pattern: &model.pattern, shift, mass: &mass, project: &project };
-    let (reference, x, norms) = compare(&pencil, &spans, lambda, shapes)?;
+    let Compared { reference, likeness, x, norms } = compare(&pencil, &spans, lambda, shapes)?;
     let shares = (shapes.iter().zip(&x).zip(lambda.iter().zip(&norms)))
         .map(|((y, x), (&lambda, norm))| {
             let share = |span: &Span| {
-                let f = span.defect(&span.local(y), lambda);
-                0.5 * f.iter().zip(span.local(x)).map(|(f, x)| f.dot(&x)).sum::<f64>() / norm
+                let (y, x) = (span.local(y), span.local(x));
+                let of = |f: Vec<Vector3<f64>>| f.iter().zip(&x).map(|(f, x)| f.dot(x)).sum::<f64>();
+                let softer = if lambda > 0.0 { of(span.segments(&y, &span.softer)) / lambda } else { 0.0 };
+                0.5 * (of(span.defect(&y, lambda)) + softer) / norm
             };
             spans.iter().map(share).collect()
         })
         .collect();
-    Some(OrderError { relative: relative(lambda, &reference), reference, shares })
+    Some(OrderError { relative: relative(lambda, &reference), reference, likeness, shares })
 }
 
 /// Relative errors of frequencies; 0 for rigid motions.
 pub fn relative(lambda: &[f64], reference: &[f64]) -> Vec<f64> {
-    let rigid = 1e-9 * lambda.last().map_or(0.0, |l| l.abs());
+    // a rigid motion has what rounding leaves of 0
+    let rigid = 1e-13 * lambda.last().map_or(0.0, |l| l.abs());
     let error = |(l, r): (&f64, &f64)| if *l <= rigid || *r <= rigid { 0.0 } else { (l / r).sqrt() - 1.0 };
     lambda.iter().zip(reference).map(error).collect()
 }
@@ -210,17 +249,34 @@ fn spans(
             along,
             mass: if lumped { cubic::mass(&bar, h) } else { Matrix6::zeros() },
             second: cubic::second_mass(&bar, h),
+            softer: Matrix6::zeros(),
             lumps: if lumped { options.scheme.cut(&bar, n, false).parts } else { Vec::new() },
         }
     };
     structure.beams.iter().zip(beams).zip(offsets).map(span).collect()
 }
 
-type Compared = (Vec<f64>, Vec<Vec<Pose>>, Vec<f64>);
+/// What the reference says of each mode.
+struct Compared {
+    /// λ_r.
+    reference: Vec<f64>,
+    likeness: Vec<f64>,
+    /// The inverse iterates.
+    x: Vec<Vec<Pose>>,
+    /// xᵀM_r·y.
+    norms: Vec<f64>,
+}
 
-/// λ_r; the inverse iterates x; and xᵀM_r·y.
+/// Modes by inverse iteration and Rayleigh–Ritz with the reference.
 fn compare(pencil: &Pencil<'_>, spans: &[Span], lambda: &[f64], shapes: &[Vec<Pose>]) -> Option<Compared> {
     let count = lambda.len();
+    let softer = |x: &[Pose]| {
+        let mut f = vec![Pose::zeros(); x.len()];
+        for span in spans.iter().filter(|span| span.softer != Matrix6::zeros()) {
+            span.scatter(&span.segments(&span.local(x), &span.softer), &mut f);
+        }
+        f
+    };
     let weigh = |x: &[Pose], lambda: f64| {
         let mut z = (pencil.mass)(x);
         let base = z.clone();
@@ -230,17 +286,21 @@ fn compare(pencil: &Pencil<'_>, spans: &[Span], lambda: &[f64], shapes: &[Vec<Po
         (z, base)
     };
     let (mut x, mut kx, mut norms) = (Vec::new(), Vec::new(), Vec::new());
-    let (mut mx, mut second) = (Vec::new(), Vec::new());
+    let (mut mx, mut second, mut plain) = (Vec::new(), Vec::new(), Vec::new());
     for (y, &lambda) in shapes.iter().zip(lambda) {
         let (full, base) = weigh(y, lambda);
-        let mut z: Vec<Pose> = full.iter().zip(&base).map(|(f, b)| f * lambda - b * pencil.shift).collect();
+        let give = softer(y);
+        let mut z: Vec<Pose> =
+            full.iter().zip(&base).zip(&give).map(|((f, b), s)| f * lambda + s - b * pencil.shift).collect();
         (pencil.project)(&mut z);
         let mut solved = z.clone();
         pencil.factor.solve(pencil.pattern, &mut solved);
         (pencil.project)(&mut solved);
         norms.push(dot(&solved, &full));
+        plain.push(base);
         let (full, base) = weigh(&solved, 0.0);
-        kx.push(z.iter().zip(&base).map(|(z, b)| z + b * pencil.shift).collect::<Vec<Pose>>());
+        let give = softer(&solved);
+        kx.push(z.iter().zip(&base).zip(&give).map(|((z, b), s)| z + b * pencil.shift - s).collect::<Vec<Pose>>());
         mx.push(full);
         let mut bent = vec![Pose::zeros(); solved.len()];
         for span in spans {
@@ -260,8 +320,19 @@ fn compare(pencil: &Pencil<'_>, spans: &[Span], lambda: &[f64], shapes: &[Vec<Po
             b[(i, j)] += mean(i, j) * bent[(i, j)];
         }
     }
-    let (reference, _) = ritz(&a, &b)?;
-    Some((reference, x, norms))
+    let (found, v) = ritz(&a, &b)?;
+    // how much of mode i is in reference mode k
+    let lengths: Vec<f64> = shapes.iter().zip(&plain).map(|(y, m)| dot(y, m)).collect();
+    let common = columns(&plain).transpose() * columns(&x) * &v;
+    let own = v.transpose() * (&transposed * columns(&mx)) * &v;
+    let alike = DMatrix::from_fn(count, count, |i, k| (common[(i, k)].powi(2) / (lengths[i] * own[(k, k)])).min(1.0));
+    let pairs = mac::pair(&alike);
+    let reference: Vec<f64> = pairs.iter().map(|k| k.map_or(f64::NAN, |k| found[k])).collect();
+    // equal frequencies share their shapes
+    let near = |k: usize, r: f64| (found[k] - r).abs() <= NEAR * r.abs();
+    let sum = |(i, r): (usize, &f64)| (0..count).filter(|&k| near(k, *r)).map(|k| alike[(i, k)]).sum::<f64>().min(1.0);
+    let likeness = reference.iter().enumerate().map(sum).collect();
+    Some(Compared { reference, likeness, x, norms })
 }
 
 fn dot(a: &[Pose], b: &[Pose]) -> f64 {
@@ -291,7 +362,7 @@ fn by_frame(
     let mass = |x: &[Pose]| multiply(system, x);
     let project = |x: &mut [Pose]| system.project(x);
     let pencil = Pencil { factor: &factor, pattern: &system.pattern, shift, mass: &mass, project: &project };
-    let (reference, ..) = compare(&pencil, &spans, lambda, &shapes)?;
+    let Compared { reference, likeness, .. } = compare(&pencil, &spans, lambda, &shapes)?;
     let relative = relative(lambda, &reference);
     let shares = (shapes.iter().zip(lambda).zip(&relative))
         .map(|((y, &lambda), error)| {
@@ -307,7 +378,7 @@ fn by_frame(
             weights.iter().map(|w| if sum > 0.0 { error * w / sum } else { 0.0 }).collect()
         })
         .collect();
-    Some(OrderError { relative, reference, shares })
+    Some(OrderError { relative, reference, likeness, shares })
 }
 
 fn multiply(system: &LinearSystem, x: &[Pose]) -> Vec<Pose> {

@@ -362,6 +362,19 @@ impl Structure {
         self.index.find(&self.nodes, name)
     }
 
+    /// Larger side of the box around the nodes as drawn [m].
+    pub fn extent(&self) -> f64 {
+        let side = |i: usize| {
+            let (low, high) = self
+                .nodes
+                .iter()
+                .map(|n| n.position[i])
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |r, x| (r.0.min(x), r.1.max(x)));
+            (high - low).max(0.0)
+        };
+        side(0).max(side(1))
+    }
+
     /// The port of that name, as an index into [`Structure::ports`].
     pub fn port(&self, name: &str) -> Option<usize> {
         self.ports.iter().position(|p| p.name == name)

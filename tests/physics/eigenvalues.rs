@@ -70,3 +70,48 @@ fn stout_pieces_have_modes() {
     settled(&result);
     assert_eq!(result.frequencies_hz.len(), 3);
 }
+
+/// A clamped beam under residual stress, so that N·L²/EI is −20 (half of the buckling load) and +200: the estimate has the sign and,
+/// within a factor of 2 where its terms nearly cancel, the size of what six segments are off against sixty.
+#[test]
+fn estimates_hold_under_stress() {
+    let text =
+        |stress: f64| format!("anchor p1 [a] []\nbeam2d p1 [a b] [l=300u w=2u stress={stress:e}]\nanchor p1 [b] []");
+    // σ = k·E·w²/(12·L²)
+    for k in [-20.0, 200.0] {
+        let stress = k * 165e9 * 4e-12 / (12.0 * 9e-8);
+        let (few, many) = (found(&text(stress), 6, 3).unwrap(), found(&text(stress), 60, 3).unwrap());
+        for mode in 0..3 {
+            let off = few.frequencies_hz[mode] / many.frequencies_hz[mode] - 1.0;
+            let told = few.errors[mode].unwrap();
+            assert!((0.5..2.0).contains(&(told / off)), "{k} mode {mode}: told {told:e}, off {off:e}");
+        }
+    }
+}
+
+/// Small displacements keep what stress does to vibrations: with and without `linear` a clamped beam at half of its buckling load
+/// has the same first frequency, far below that without stress; beyond the load the linear model says that it is unstable.
+#[test]
+fn linear_models_keep_the_stiffness_of_stress() {
+    let first = |stress: f64, linear: bool| {
+        let text = format!("anchor p1 [a] []\nbeam2d p1 [a b] [l=300u w=2u stress={stress:e}]\nanchor p1 [b] []");
+        modes(&model(&text, &CompileOptions { linear, segments: Some(10), ..CompileOptions::default() }), 1, &[])
+            .unwrap()
+    };
+    let buckles = -4.0 * std::f64::consts::PI.powi(2) * 165e9 * 4e-12 / (12.0 * 9e-8);
+    let (free, half) = (first(0.0, true), first(0.5 * buckles, true));
+    close(half.frequencies_hz[0], first(0.5 * buckles, false).frequencies_hz[0], 1e-6);
+    assert!(half.frequencies_hz[0] < 0.8 * free.frequencies_hz[0] && half.warnings.is_empty());
+    let beyond = first(1.5 * buckles, true);
+    assert!(beyond.frequencies_hz[0] == 0.0 && beyond.warnings[0].contains("unstable"), "{:?}", beyond.warnings);
+}
+
+/// Modes about a state that is bent far from the drawing say so, and that there are fewer than asked for is said too.
+#[test]
+fn modes_say_what_they_are_about() {
+    let text = "anchor p1 [a] []\nbeam2d p1 [a b] [l=200u w=2u]\nf2d * [b] [F=20u oz=pi/2]";
+    let result = found(text, 8, 2).unwrap();
+    assert!(result.deflection_m > 4e-6 && result.warnings[0].contains("largely deflected"), "{:?}", result.warnings);
+    let few = found("anchor p1 [a] []\nbeam2d p1 [a b] [l=200u w=2u]", 1, 20).unwrap();
+    assert!(few.frequencies_hz.len() < 20 && few.warnings[0].contains("of 20 modes"), "{:?}", few.warnings);
+}

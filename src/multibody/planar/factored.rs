@@ -32,35 +32,24 @@ pub(crate) struct PairForce {
 }
 
 impl JointKinematics {
-    /// The tangent of [`JointKinematics::tangent`]; without `stressed`, of [`JointKinematics::elastic`]. `stressed` is the
-    /// stress (N, V, M) and Q.
-    pub(crate) fn factored(
-        &self,
-        stiffness: &Symmetric,
-        stressed: Option<(&Vector3<f64>, &[f64; 3])>,
-    ) -> FactoredTangent {
+    /// The tangent of [`JointKinematics::tangent`]: `stress` is (N, V, M), `second` is Q.
+    pub(crate) fn factored(&self, stiffness: &Symmetric, stress: &Vector3<f64>, second: &[f64; 3]) -> FactoredTangent {
         let s = self.slopes();
-        let mut factored = FactoredTangent {
+        let double = 2.0 * stress.x;
+        let [uu, ug, up, gg, gp, pp] = stiffness.0;
+        let [bend_gg, bend_gp, bend_pp] = second.map(|q| double * q);
+        let n = self.e1 * stress.x + turn(self.e1) * (stress.y + double * self.bent.x);
+        let quarter = 0.25 * n.dot(&self.opening);
+        let between = 0.5 * (n.dot(&self.radius_b) - n.dot(&self.radius_a));
+        FactoredTangent {
             u: s.u,
             g: s.g,
             turn_a: s.turn_a,
             turn_b: s.turn_b,
-            stiffness: *stiffness,
-            half: Vector2::zeros(),
-            turn: [0.0; 3],
-        };
-        if let Some((stress, second)) = stressed {
-            let double = 2.0 * stress.x;
-            let [uu, ug, up, gg, gp, pp] = stiffness.0;
-            let [bend_gg, bend_gp, bend_pp] = second.map(|q| double * q);
-            factored.stiffness = Symmetric([uu, ug, up, gg + bend_gg, gp + bend_gp, pp + bend_pp]);
-            let n = self.e1 * stress.x + turn(self.e1) * (stress.y + double * self.bent.x);
-            factored.half = turn(n) * 0.5;
-            let quarter = 0.25 * n.dot(&self.opening);
-            let between = 0.5 * (n.dot(&self.radius_b) - n.dot(&self.radius_a));
-            factored.turn = [-quarter, between - quarter, -quarter];
+            stiffness: Symmetric([uu, ug, up, gg + bend_gg, gp + bend_gp, pp + bend_pp]),
+            half: turn(n) * 0.5,
+            turn: [-quarter, between - quarter, -quarter],
         }
-        factored
     }
 }
 

@@ -11,6 +11,12 @@ const POISSON: f64 = 0.3;
 const NO_FILM: f64 = 1.0;
 /// Young's moduli of structural solids, from rubber to diamond [Pa].
 const SOLID: std::ops::Range<f64> = 1e6..2e12;
+/// Densities of solids, from foam to osmium [kg/m³].
+const DENSE: std::ops::Range<f64> = 10.0..25e3;
+/// Strain of a residual stress beyond which any solid has failed: that of whiskers and defect-free crystals [1].
+const STRONGEST: f64 = 0.1;
+/// Temperature at which all structural solids have melted; tungsten does at 3695 K [K].
+const MOLTEN: f64 = 4000.0;
 /// Permittivity of vacuum, as SUGAR's process files round it [F/m].
 pub(super) const VACUUM: f64 = 8.854e-12;
 
@@ -24,6 +30,11 @@ impl Site<'_, '_> {
             let span = self.span_of("Youngsmodulus");
             self.drawing.note_number(Fact::OddModulus, span, youngs_modulus);
         }
+        let stress = self.number_or("stress", 0.0)?;
+        if stress.abs() > STRONGEST * youngs_modulus {
+            let span = self.span_of("stress");
+            self.drawing.note_number(Fact::OddStress, span, stress);
+        }
         if self.number_or("straingradient", 0.0)? != 0.0 {
             self.drawing.note(Fact::StrainGradient, span);
         }
@@ -35,13 +46,17 @@ impl Site<'_, '_> {
             fluid,
             thermal_expansion: self.number_or("thermalexpansion", 0.0)?,
             ambient_temperature: self.number_or("ambienttemperature", 0.0)?,
-            stress: self.number_or("stress", 0.0)?,
+            stress,
         })
     }
 
     /// Density [kg/m³]; 0, with a warning, when there is none.
     pub(super) fn density(&mut self) -> Result<f64, Reported> {
         if let Some(density) = self.number("density")? {
+            if density > 0.0 && !DENSE.contains(&density) {
+                let span = self.span_of("density");
+                self.drawing.note_number(Fact::OddDensity, span, density);
+            }
             return if density < 0.0 { self.non_negative_or("density", 0.0) } else { Ok(density) };
         }
         let span = self.instance.span;
@@ -75,6 +90,10 @@ impl Site<'_, '_> {
         if material.ambient_temperature == 0.0 && temperature != 0.0 {
             let span = self.span_of("T");
             self.drawing.note_number(Fact::AmbientZero, span, temperature);
+        }
+        if (temperature - material.ambient_temperature).abs() > MOLTEN {
+            let span = self.span_of("T");
+            self.drawing.note_number(Fact::OddRise, span, temperature);
         }
         Ok(Some(temperature))
     }

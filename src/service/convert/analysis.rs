@@ -73,7 +73,8 @@ pub fn modes_from_wire(wire: proto::ModesResponse) -> ModesResult {
     // a server that sends no estimates, or none for a mode
     let mut errors: Vec<_> = errors.into_iter().map(|e| e.is_finite().then_some(e)).collect();
     errors.resize(frequencies_hz.len(), None);
-    ModesResult { frequencies_hz, shapes, residuals, errors, unknowns: size(unknowns) }
+    let (unknowns, warnings) = (size(unknowns), Vec::new());
+    ModesResult { frequencies_hz, shapes, residuals, errors, unknowns, deflection_m: 0.0, warnings }
 }
 
 /// Pull-in as it travels.

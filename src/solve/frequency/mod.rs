@@ -5,6 +5,7 @@
 //! | [`eigen`] | lowest natural frequencies: shift-invert Lanczos on the same factor |
 //! | [`lanczos`] | largest eigenvalues of an operator |
 //! | [`inverse_iteration`] | the last digits of modes, and how good each is |
+//! | [`mac`] | which mode of one model is which of another |
 //! | [`refined`] | solves that correct themselves in extended precision |
 //! | [`subspace`] | many of them at once |
 //! | [`fastest`] | the highest natural frequency in joint coordinates |
@@ -15,5 +16,6 @@ pub mod fastest;
 pub mod harmonic;
 pub mod inverse_iteration;
 pub mod lanczos;
+pub mod mac;
 pub mod refined;
 pub mod subspace;
