@@ -24,6 +24,18 @@ pub(crate) struct Serve {
     #[arg(long)]
     insecure: bool,
 
+    /// Most sessions open at once; as --limit sessions=N
+    #[arg(long, value_name = "N")]
+    max_sessions: Option<String>,
+
+    /// Most connections at once; as --limit connections=N
+    #[arg(long, value_name = "N")]
+    max_connections: Option<String>,
+
+    /// Set a limit of docs/service.md: bytes as 64M or 2G, times in seconds. Repeatable
+    #[arg(long = "limit", value_name = "NAME=VALUE")]
+    limits: Vec<String>,
+
     /// Stop when standard input ends, as it does when the program that started this server ends
     #[arg(long)]
     while_stdin: bool,
@@ -40,10 +52,29 @@ impl Serve {
         let options = ServeOptions {
             listen,
             insecure: self.insecure,
-            limits: Limits::default(),
+            limits: self.limits()?,
             while_stdin: self.while_stdin,
             ready: Box::new(ready),
         };
         Ok(run_until_signal(options)?)
+    }
+
+    fn limits(&self) -> Result<Limits, Failure> {
+        let mut limits = Limits::default();
+        for text in &self.limits {
+            let (name, value) = text
+                .split_once('=')
+                .ok_or_else(|| Failure::bad("--limit", "NAME=VALUE, as sessions=1000", text.clone()))?;
+            limits.set(name, value).map_err(|error| Failure::bad("--limit", "a limit of docs/service.md", error))?;
+        }
+        for (flag, name, value) in [
+            ("--max-sessions", "sessions", &self.max_sessions),
+            ("--max-connections", "connections", &self.max_connections),
+        ] {
+            if let Some(value) = value {
+                limits.set(name, value).map_err(|_| Failure::bad(flag, "a whole number above 0", value.clone()))?;
+            }
+        }
+        Ok(limits)
     }
 }

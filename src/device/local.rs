@@ -4,7 +4,8 @@
 //! copy, and stores the result under a token that is a hash of the request: the same request always gives the same token
 //! and the same bits, whatever was asked in between.
 
-use super::states::States;
+use super::saved;
+use super::states::{Snapshot, States};
 use super::{
     Description, Device, DeviceError, Mode, OpenRequest, PortInfo, SignalInfo, SmallSignal, Status, Token, Trial,
     TrialReply,
@@ -118,6 +119,28 @@ impl Device for LocalDevice {
         session.respond(&self.compiled, token, &state, omega, reply)
     }
 
+    fn save(&self, only: Option<Token>) -> Result<Vec<u8>, DeviceError> {
+        let session = self.session.as_ref().ok_or(DeviceError::NotOpen)?;
+        match only {
+            Some(token) => {
+                let alone = session.states.only(token).ok_or(DeviceError::UnknownToken(token))?;
+                Ok(saved::write(&session.opened, &alone))
+            }
+            None => Ok(saved::write(&session.opened, &session.states)),
+        }
+    }
+
+    fn load(&mut self, bytes: &[u8]) -> Result<Description, DeviceError> {
+        let (opened, states) = saved::read(bytes)?;
+        let (mut session, description) = Session::open(&self.compiled, &opened)?;
+        if !states.in_order().all(|(_, _, state)| session.fits(state)) {
+            return Err(saved::refused("states of this model", "states of another one"));
+        }
+        session.states = states;
+        self.session = Some(session);
+        Ok(description)
+    }
+
     fn recover(&mut self) {
         // a state is stored whole or not at all; all else is storage that every trial fills again
         let Some(mut session) = self.session.take() else { return };
@@ -192,6 +215,24 @@ impl Session {
             response: vec![ComplexPose::zeros(); n],
         };
         Ok((session, description))
+    }
+
+    /// Whether a state has the sizes and the sense that one of this session has.
+    fn fits(&self, state: &Snapshot) -> bool {
+        let n = self.zeros.len();
+        let poses = |poses: &[Pose]| poses.len() == n && poses.iter().all(|p| p.iter().all(|x| x.is_finite()));
+        let numbers = |numbers: &[f64], count: usize| numbers.len() == count && numbers.iter().all(|x| x.is_finite());
+        let carried = self.stepper.method.state();
+        let alike = |(a, b): (&Motion, &Motion)| a.q.len() == b.q.len() && a.v.len() == b.v.len();
+        let followed = state.shown.followed();
+        poses(&state.q)
+            && poses(&state.v)
+            && numbers(&state.rise, self.rise.len())
+            && numbers(&state.sources, self.sources.len())
+            && state.next_step > 0.0
+            && (followed == 0 || followed == self.signals.len() + self.ports.len())
+            && (state.carried.is_empty()
+                || state.carried.len() == carried.len() && state.carried.iter().zip(carried).all(alike))
     }
 
     fn check(&self, request: &Trial<'_>) -> Result<(), DeviceError> {

@@ -11,6 +11,7 @@
 //! knows the steps that were accepted.
 
 pub mod local;
+mod saved;
 pub mod shown;
 mod small_signal;
 pub mod states;
@@ -201,4 +202,23 @@ pub trait Device: Send {
     /// Makes the device fit to go on after a call that was stopped in the middle ([`crate::budget`]): its storage is made
     /// anew, its states stay as they are. A device that holds no half computed storage does nothing.
     fn recover(&mut self) {}
+
+    /// What is open and its states, as bytes from which a device of the same model goes on with the same bits. `only`: that
+    /// state alone.
+    ///
+    /// # Errors
+    /// [`DeviceError::NotOpen`], [`DeviceError::UnknownToken`], [`DeviceError::BadRequest`] where a device cannot do it.
+    fn save(&self, only: Option<Token>) -> Result<Vec<u8>, DeviceError> {
+        let _ = only;
+        Err(saved::refused("a device that can be saved", "another kind"))
+    }
+
+    /// Starts an epoch with the states of [`Device::save`] in place of none. Returns what was opened.
+    ///
+    /// # Errors
+    /// [`DeviceError::BadRequest`] for bytes that are not those of a device of this model.
+    fn load(&mut self, saved: &[u8]) -> Result<Description, DeviceError> {
+        let _ = saved;
+        Err(saved::refused("a device that can be restored", "another kind"))
+    }
 }

@@ -69,6 +69,29 @@ impl Shown {
         (next, bound)
     }
 
+    /// Lists of numbers that [`Shown::numbers`] gives.
+    pub const PARTS: usize = 6;
+
+    /// Everything it holds, to be put away; [`Shown::from_numbers`] takes it back.
+    pub fn numbers(&self) -> [&[f64]; Self::PARTS] {
+        [&self.now, &self.slopes, &self.bends, &self.steps, &self.low, &self.high]
+    }
+
+    /// What [`Shown::numbers`] gave; none for lists that do not fit together.
+    pub fn from_numbers(parts: [Vec<f64>; Self::PARTS]) -> Option<Self> {
+        let [now, slopes, bends, steps, low, high] = parts;
+        let fits = |list: &[f64]| list.is_empty() || list.len() == now.len();
+        if !fits(&slopes) || !fits(&bends) || low.len() != now.len() || high.len() != now.len() {
+            return None;
+        }
+        Some(Self { slopes, bends, steps: steps.try_into().ok()?, low, high, now })
+    }
+
+    /// Values that it follows.
+    pub fn followed(&self) -> usize {
+        self.now.len()
+    }
+
     /// Doubles held.
     pub fn doubles(&self) -> usize {
         self.now.len() + self.slopes.len() + self.bends.len() + self.low.len() + self.high.len()

@@ -10,6 +10,8 @@ use std::sync::Arc;
 
 /// States held at most; the least recently used goes first. A circuit needs its last accepted state and its trials.
 const MOST: usize = 64;
+/// Bytes of states held beyond [`KEPT`] of them.
+const MOST_BYTES: usize = 32 << 20;
 /// States kept when the circuit says which one it accepted.
 const KEPT: usize = 8;
 
@@ -37,6 +39,7 @@ pub struct Snapshot {
 pub struct States {
     held: HashMap<Token, (Option<Token>, Arc<Snapshot>)>,
     used: VecDeque<Token>,
+    bytes: usize,
 }
 
 impl States {
@@ -50,14 +53,45 @@ impl States {
     /// Stores the outcome of a request under the request's token.
     pub fn insert(&mut self, request: &Trial<'_>, snapshot: Snapshot) -> Token {
         let token = name(request);
-        self.held.insert(token, (request.parent, Arc::new(snapshot)));
+        self.put(token, request.parent, snapshot);
+        token
+    }
+
+    /// Stores a state under a token that it had before.
+    pub(super) fn put(&mut self, token: Token, parent: Option<Token>, snapshot: Snapshot) {
+        self.forget(token);
+        self.bytes += size(&snapshot);
+        self.held.insert(token, (parent, Arc::new(snapshot)));
         self.touch(token);
-        while self.used.len() > MOST {
+        while self.used.len() > MOST || (self.used.len() > KEPT && self.bytes > MOST_BYTES) {
             if let Some(old) = self.used.pop_front() {
-                self.held.remove(&old);
+                self.forget(old);
             }
         }
-        token
+    }
+
+    /// States held.
+    pub(super) fn len(&self) -> usize {
+        self.used.len()
+    }
+
+    /// Tokens, parents and states, the least recently used first.
+    pub(super) fn in_order(&self) -> impl Iterator<Item = (Token, Option<Token>, &Snapshot)> {
+        self.used.iter().filter_map(|token| self.held.get(token).map(|(parent, state)| (*token, *parent, &**state)))
+    }
+
+    /// One of them alone, as it was.
+    pub(super) fn only(&self, token: Token) -> Option<Self> {
+        let (parent, state) = self.held.get(&token)?;
+        let mut alone = Self::default();
+        alone.put(token, *parent, Snapshot::clone(state));
+        Some(alone)
+    }
+
+    fn forget(&mut self, token: Token) {
+        if let Some((_, state)) = self.held.remove(&token) {
+            self.bytes -= size(&state);
+        }
     }
 
     /// Frees the other trials of the accepted state's parent, and all but the last used states.
@@ -67,26 +101,20 @@ impl States {
             .filter(|t| *t != token && self.held.get(t).is_some_and(|(p, _)| *p == parent && parent.is_some()))
             .collect();
         for rival in rivals {
-            self.held.remove(&rival);
+            self.forget(rival);
         }
         self.used.retain(|t| self.held.contains_key(t));
         self.touch(token);
         while self.used.len() > KEPT {
             if let Some(old) = self.used.pop_front() {
-                self.held.remove(&old);
+                self.forget(old);
             }
         }
     }
 
     /// Bytes that the states take, about.
     pub fn bytes(&self) -> usize {
-        let size = |s: &Snapshot| {
-            (s.q.len() + s.v.len()) * size_of::<Pose>()
-                + s.carried.iter().map(|m| m.q.len() + m.v.len()).sum::<usize>() * size_of::<Pose>()
-                + (s.rise.len() + s.sources.len() + s.shown.doubles()) * 8
-                + size_of::<Snapshot>()
-        };
-        self.held.values().map(|(_, s)| size(s)).sum()
+        self.bytes
     }
 
     fn touch(&mut self, token: Token) {
@@ -96,6 +124,13 @@ impl States {
         }
         self.used.push_back(token);
     }
+}
+
+fn size(s: &Snapshot) -> usize {
+    (s.q.len() + s.v.len()) * size_of::<Pose>()
+        + s.carried.iter().map(|m| m.q.len() + m.v.len()).sum::<usize>() * size_of::<Pose>()
+        + (s.rise.len() + s.sources.len() + s.shown.doubles()) * 8
+        + size_of::<Snapshot>()
 }
 
 /// The token of a request: FNV-1a over all that its answer depends on, folded to 53 bits and never 0.

@@ -49,6 +49,7 @@ impl End {
     /// out: a beam so short has no room for its junctions.
     pub fn settle(&mut self, beam: &Beam, most: f64) {
         let old = self.spring;
+        let most = f64::min(most, MOST_WIDTHS * beam.width);
         let mut rod = 0.0;
         while rod < most && !gives(&self.spring, beam) {
             rod = f64::min(rod + ROD * beam.width, most);
@@ -72,6 +73,8 @@ impl End {
 
 /// Step by which an edge is moved outwards, in widths.
 const ROD: f64 = 1.0 / 64.0;
+/// No junction reaches so far [widths].
+const MOST_WIDTHS: f64 = 64.0;
 
 /// A spring's compliance under loads at a distance `d` [m] outwards from its edge.
 fn moved(spring: &Matrix3<f64>, d: f64) -> Matrix3<f64> {

@@ -17,6 +17,8 @@ pub struct Limits {
     pub inline_unknowns: usize,
     /// Most compiled models kept, default 64; the one unused for longest is forgotten first.
     pub models: usize,
+    /// Most bytes of compiled models kept, default 512 MiB, counted by what their compilation laid out.
+    pub model_memory: usize,
     /// Most sessions open at once, default 256. Each holds a bounded number of states: the device forgets the least
     /// recently used.
     pub sessions: usize,
@@ -76,6 +78,7 @@ impl Default for Limits {
             unknowns: 200_000,
             inline_unknowns: 2_000,
             models: 64,
+            model_memory: 512 << 20,
             sessions: 256,
             sweep_points: 1_000_000,
             sweeps: 16,
@@ -101,7 +104,109 @@ impl Default for Limits {
     }
 }
 
+/// A limit by its name.
+enum Field<'a> {
+    Count(&'a mut usize),
+    Count32(&'a mut u32),
+    Bytes(&'a mut usize),
+    Time(&'a mut Duration),
+}
+
+/// Names of all limits, as `--limit NAME=VALUE` and docs/service.md have them.
+pub const NAMES: [&str; 27] = [
+    "message_bytes",
+    "netlist_bytes",
+    "unknowns",
+    "inline_unknowns",
+    "models",
+    "model_memory",
+    "sessions",
+    "sweep_points",
+    "sweeps",
+    "transient_values",
+    "modes",
+    "mode_work",
+    "analyses",
+    "memory",
+    "cpu",
+    "signals",
+    "result_streams",
+    "calls",
+    "held_bytes",
+    "request_pause",
+    "handshake",
+    "connections",
+    "streams_per_connection",
+    "request_timeout",
+    "idle",
+    "stream_idle",
+    "drain",
+];
+
 impl Limits {
+    fn field(&mut self, name: &str) -> Option<Field<'_>> {
+        Some(match name {
+            "message_bytes" => Field::Bytes(&mut self.message_bytes),
+            "netlist_bytes" => Field::Bytes(&mut self.netlist_bytes),
+            "unknowns" => Field::Count(&mut self.unknowns),
+            "inline_unknowns" => Field::Count(&mut self.inline_unknowns),
+            "models" => Field::Count(&mut self.models),
+            "model_memory" => Field::Bytes(&mut self.model_memory),
+            "sessions" => Field::Count(&mut self.sessions),
+            "sweep_points" => Field::Count(&mut self.sweep_points),
+            "sweeps" => Field::Count(&mut self.sweeps),
+            "transient_values" => Field::Count(&mut self.transient_values),
+            "modes" => Field::Count(&mut self.modes),
+            "mode_work" => Field::Count(&mut self.mode_work),
+            "analyses" => Field::Count(&mut self.analyses),
+            "memory" => Field::Bytes(&mut self.memory),
+            "cpu" => Field::Time(&mut self.cpu),
+            "signals" => Field::Count(&mut self.signals),
+            "result_streams" => Field::Count(&mut self.result_streams),
+            "calls" => Field::Count(&mut self.calls),
+            "held_bytes" => Field::Bytes(&mut self.held_bytes),
+            "request_pause" => Field::Time(&mut self.request_pause),
+            "handshake" => Field::Time(&mut self.handshake),
+            "connections" => Field::Count(&mut self.connections),
+            "streams_per_connection" => Field::Count32(&mut self.streams_per_connection),
+            "request_timeout" => Field::Time(&mut self.request_timeout),
+            "idle" => Field::Time(&mut self.idle),
+            "stream_idle" => Field::Time(&mut self.stream_idle),
+            "drain" => Field::Time(&mut self.drain),
+            _ => return None,
+        })
+    }
+
+    /// Sets a limit by name: a whole number, bytes with an optional k, M or G (times 1024), or seconds.
+    ///
+    /// # Errors
+    /// A name that is none, with the names there are, or a value that is not positive.
+    pub fn set(&mut self, name: &str, value: &str) -> Result<(), String> {
+        let unknown = || format!("no limit named \"{name}\"; expected one of {}", NAMES.join(", "));
+        let whole = |text: &str| text.parse::<usize>().ok().filter(|n| *n > 0);
+        let set = match self.field(name).ok_or_else(unknown)? {
+            Field::Count(to) => whole(value).map(|n| *to = n).ok_or("a whole number above 0"),
+            Field::Count32(to) => {
+                whole(value).and_then(|n| n.try_into().ok()).map(|n| *to = n).ok_or("a whole number above 0")
+            }
+            Field::Bytes(to) => {
+                let (digits, shift) = match value.char_indices().last() {
+                    Some((at, 'k')) => (&value[..at], 10),
+                    Some((at, 'M')) => (&value[..at], 20),
+                    Some((at, 'G')) => (&value[..at], 30),
+                    _ => (value, 0),
+                };
+                let bytes = whole(digits).and_then(|n| n.checked_mul(1 << shift));
+                bytes.map(|n| *to = n).ok_or("bytes above 0, as 1000000, 64M or 2G")
+            }
+            Field::Time(to) => {
+                let seconds = value.parse::<f64>().ok().filter(|s| *s > 0.0 && *s <= 1e9);
+                seconds.map(|s| *to = Duration::from_secs_f64(s)).ok_or("seconds above 0, at most 1e9")
+            }
+        };
+        set.map_err(|expected| format!("{name}: expected {expected}, got \"{value}\""))
+    }
+
     /// The limits as Info tells them.
     pub(super) fn to_wire(&self) -> proto::Limits {
         proto::Limits {
@@ -123,6 +228,41 @@ impl Limits {
             calls: self.calls as u64,
             held_bytes: self.held_bytes as u64,
             connections: self.connections as u64,
+            stream_idle_s: self.stream_idle.as_secs_f64(),
+            model_memory_bytes: self.model_memory as u64,
+            mode_work: self.mode_work as u64,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! Every limit is set by its name, and docs/service.md has it.
+    use super::*;
+
+    #[test]
+    fn every_limit_has_a_name() {
+        for name in NAMES {
+            let mut limits = Limits::default();
+            limits.set(name, "7").unwrap_or_else(|error| panic!("{error}"));
+            assert_ne!(limits, Limits::default(), "{name}");
+            for bad in ["0", "-1", "x", "", "1e99", "G"] {
+                let error = limits.set(name, bad).expect_err("means nothing");
+                assert!(error.starts_with(name), "{error}");
+            }
+        }
+        let error = Limits::default().set("session", "1").expect_err("no such limit");
+        assert!(error.contains("sessions"), "{error}");
+        let mut limits = Limits::default();
+        limits.set("memory", "2G").expect("bytes");
+        assert_eq!(limits.memory, 2 << 30);
+    }
+
+    #[test]
+    fn every_limit_is_documented() {
+        let docs = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/docs/service.md")).expect("readable");
+        for name in NAMES {
+            assert!(docs.contains(&format!("`{name}`")), "{name}");
         }
     }
 }

@@ -4,7 +4,7 @@
 //! [`proto`] is what travels and [`convert`] the only place that knows both it and the library's own types. [`client`]
 //! is built with the feature `remote` alone. The rest is the feature `server`: [`server`] listens and stops
 //! (`sockets`, `connection`, `shutdown`), `intake` counts what comes in, `rpc` answers calls, `stream` is the Newton loop, `models`, `sessions` and
-//! `sweeps` keep what clients can name, `work` computes, `chunks` sends what is long, `status` says what went wrong,
+//! `sweeps` keep what clients can name, `snapshots` puts sessions into bytes, `work` computes, `chunks` sends what is long, `status` says what went wrong,
 //! [`log`] says it without waiting, `ids` makes names that nobody guesses,
 //! and [`limits`] is what clients may ask for.
 
@@ -35,6 +35,8 @@ pub mod server;
 mod sessions;
 #[cfg(feature = "server")]
 mod shutdown;
+#[cfg(feature = "server")]
+mod snapshots;
 #[cfg(feature = "server")]
 mod sockets;
 #[cfg(feature = "server")]

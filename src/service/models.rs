@@ -4,6 +4,7 @@ use super::convert::model::{bundle_bytes, diagnostics_to_wire, setting_to_wire};
 use super::limits::Limits;
 use super::server::MakeDevice;
 use super::{proto, status};
+use crate::budget;
 use crate::compile::{CompileOptions, Compiled, compile};
 use crate::device::OpenRequest;
 use crate::netlist::{Bundle, Setting};
@@ -17,6 +18,8 @@ pub(super) struct Model {
     pub(super) description: proto::ModelDescription,
     bundle: Bundle,
     options: CompileOptions,
+    /// What its compilation laid out, which is at least what it holds [byte].
+    bytes: usize,
 }
 
 impl Model {
@@ -80,17 +83,19 @@ impl Models {
         if unknowns > limits.unknowns {
             return Err(status::limit("unknowns", limits.unknowns, unknowns));
         }
-        let model = Arc::new(Model { compiled, description, bundle, options });
-        self.keep(Arc::clone(&model), limits.models);
+        let bytes = budget::current().map_or(0, |budget| budget.used());
+        let model = Arc::new(Model { compiled, description, bundle, options, bytes });
+        self.keep(Arc::clone(&model), limits);
         Ok(model)
     }
 
-    fn keep(&self, model: Arc<Model>, most: usize) {
+    fn keep(&self, model: Arc<Model>, limits: &Limits) {
         let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         kept.requests += 1;
         let now = kept.requests;
         kept.models.insert(model.id().to_owned(), (model, now));
-        while kept.models.len() > most.max(1) {
+        let bytes = |kept: &Kept| kept.models.values().map(|(model, _)| model.bytes).sum::<usize>();
+        while kept.models.len() > 1 && (kept.models.len() > limits.models || bytes(&kept) > limits.model_memory) {
             let oldest = kept.models.iter().min_by_key(|(_, (_, used))| *used).map(|(id, _)| id.clone());
             if let Some(id) = oldest {
                 kept.models.remove(&id);

@@ -49,6 +49,16 @@ pub(super) struct Shared {
     pub(super) shutdown: Shutdown,
 }
 
+impl Shared {
+    /// A session with the states of a snapshot.
+    fn restored(&self, model: &Model, snapshot: &[u8]) -> Result<proto::OpenResponse, Status> {
+        let session = self.sessions.create(model, self.make, &self.limits)?;
+        session.restore(snapshot).inspect_err(|_| {
+            self.sessions.close(session.id());
+        })
+    }
+}
+
 /// The service.
 #[derive(Clone)]
 pub(super) struct Calls(pub(super) Arc<Shared>);
@@ -159,6 +169,48 @@ impl proto::bimorph_server::Bimorph for Calls {
         };
         let points = self.0.desk.run(job).await?;
         Ok(Response::new(proto::LinearizeResponse { points }))
+    }
+
+    async fn snapshot(&self, request: Request<proto::SnapshotRequest>) -> Reply<proto::SnapshotResponse> {
+        let request = request.into_inner();
+        let session = self.0.sessions.get(&request.session)?;
+        let turn = session.turn().await?;
+        let only = (request.token != 0).then_some(Token(request.token));
+        let job = move || {
+            let _turn = turn;
+            session.snapshot(only)
+        };
+        let snapshot = self.0.desk.run(job).await?;
+        Ok(Response::new(proto::SnapshotResponse { snapshot }))
+    }
+
+    async fn restore(&self, request: Request<proto::RestoreRequest>) -> Reply<proto::OpenResponse> {
+        let (shared, request) = (Arc::clone(&self.0), request.into_inner());
+        let model = shared.models.get(&request.model)?;
+        let job = move || shared.restored(&model, &request.snapshot);
+        self.0.desk.run(job).await.map(Response::new)
+    }
+
+    async fn fork(&self, request: Request<proto::ForkRequest>) -> Reply<proto::OpenResponse> {
+        let shared = Arc::clone(&self.0);
+        let session = shared.sessions.get(&request.get_ref().session)?;
+        let model = shared.models.get(session.model())?;
+        let turn = session.turn().await?;
+        let job = move || {
+            let _turn = turn;
+            shared.restored(&model, &session.snapshot(None)?)
+        };
+        self.0.desk.run(job).await.map(Response::new)
+    }
+
+    async fn keep_alive(&self, request: Request<proto::KeepAliveRequest>) -> Reply<proto::KeepAliveResponse> {
+        let proto::KeepAliveRequest { session, lease_s } = request.into_inner();
+        let session = self.0.sessions.get(&session)?;
+        let (limits, none) = (&self.0.limits, lease_s == 0.0);
+        let lease_s = if none { limits.idle.as_secs_f64() } else { lease_s.min(limits.stream_idle.as_secs_f64()) };
+        let lease_s = convert::number("lease_s", lease_s, true).map_err(status::violation)?;
+        session.keep((!none).then(|| Duration::from_secs_f64(lease_s)));
+        Ok(Response::new(proto::KeepAliveResponse { lease_s }))
     }
 
     async fn close(&self, request: Request<proto::CloseRequest>) -> Reply<proto::CloseResponse> {

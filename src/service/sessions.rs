@@ -5,6 +5,7 @@ use super::ids::Ids;
 use super::limits::Limits;
 use super::models::Model;
 use super::server::MakeDevice;
+use super::snapshots;
 use super::work::caught;
 use super::{proto, status};
 use crate::budget::{self, Allowance, Budget, Stopped};
@@ -32,6 +33,8 @@ pub(super) struct Session {
     turn: Arc<Semaphore>,
     started: Instant,
     used_ms: AtomicU64,
+    /// 0: none was asked for.
+    lease_ms: AtomicU64,
     closed: AtomicBool,
     /// Streams that hold this session.
     streams: AtomicUsize,
@@ -145,6 +148,44 @@ impl Session {
         Some(answer.unwrap_or_else(|error| ReplyKind::Fault(wire::fault_to_wire(&error))))
     }
 
+    /// Its states as a sealed snapshot.
+    pub(super) fn snapshot(&self, only: Option<Token>) -> Result<Vec<u8>, Status> {
+        self.touch();
+        let states = self.lock()?.save(only).map_err(|error| status::device(&error))?;
+        Ok(snapshots::seal(&self.model, &states))
+    }
+
+    /// Starts with the states of a sealed snapshot.
+    pub(super) fn restore(&self, sealed: &[u8]) -> Result<proto::OpenResponse, Status> {
+        let states = snapshots::open(&self.model, sealed)?;
+        let described = self.lock()?.load(states).map_err(|error| status::device(&error))?;
+        *self.description.lock().unwrap_or_else(PoisonError::into_inner) = wire::description_to_wire(&described);
+        Ok(self.opened())
+    }
+
+    fn lock(&self) -> Result<MutexGuard<'_, Box<dyn Device>>, Status> {
+        if self.is_closed() {
+            return Err(status::not_found("session", &self.id));
+        }
+        Ok(self.device.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    /// Keeps it for `lease` without use, or for as long as the server keeps any.
+    pub(super) fn keep(&self, lease: Option<Duration>) {
+        self.touch();
+        let millis = lease.map_or(0, |lease| u64::try_from(lease.as_millis()).unwrap_or(u64::MAX).max(1));
+        self.lease_ms.store(millis, Ordering::Relaxed);
+    }
+
+    /// For how long it is kept without use.
+    fn kept(&self, limits: &Limits) -> Duration {
+        match self.lease_ms.load(Ordering::Relaxed) {
+            _ if self.streams.load(Ordering::Relaxed) > 0 => limits.stream_idle,
+            0 => limits.idle,
+            lease => Duration::from_millis(lease),
+        }
+    }
+
     /// Waits for this session's turn, without a thread: who works on its device for long holds it.
     pub(super) async fn turn(&self) -> Result<OwnedSemaphorePermit, Status> {
         Arc::clone(&self.turn).acquire_owned().await.map_err(|_| status::fault())
@@ -250,6 +291,7 @@ impl Sessions {
             inline: model.unknowns() <= limits.inline_unknowns,
             started: Instant::now(),
             used_ms: AtomicU64::new(0),
+            lease_ms: AtomicU64::new(0),
             closed: AtomicBool::new(false),
             streams: AtomicUsize::new(0),
         });
@@ -281,8 +323,7 @@ impl Sessions {
         let mut open = self.open.lock().unwrap_or_else(PoisonError::into_inner);
         let before = open.len();
         open.retain(|_, session| {
-            let held = session.streams.load(Ordering::Relaxed) > 0;
-            let keep = session.idle() < if held { limits.stream_idle } else { limits.idle };
+            let keep = session.idle() < session.kept(limits);
             if !keep {
                 session.close();
             }

@@ -11,4 +11,6 @@ mod random;
 mod refusals;
 mod running;
 mod same_bits;
+mod snapshots;
+mod soak;
 mod victim;

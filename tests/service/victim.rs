@@ -171,9 +171,24 @@ impl Victim {
         assert!(worst < LONGEST_WAIT, "{name}: {worst:?}");
     }
 
+    /// A server with these options more, and nobody who attacks it.
+    pub(crate) fn started(options: &[&str]) -> Self {
+        Self::start_with(Reader::Reads, options)
+    }
+
+    /// A client of it.
+    pub(crate) async fn wire(&self) -> Wire {
+        Wire::connect(&self.address).await
+    }
+
     fn start(reader: Reader) -> Self {
+        Self::start_with(reader, &[])
+    }
+
+    fn start_with(reader: Reader, options: &[&str]) -> Self {
         let mut process = Command::new(env!("CARGO_BIN_EXE_bimorph"))
             .args(["serve", "--listen", "127.0.0.1:0"])
+            .args(options)
             .env("BIMORPH_LOG", if reader == Reader::Reads { "warn" } else { "trace" })
             .stderr(Stdio::piped())
             .spawn()
@@ -206,8 +221,18 @@ impl Victim {
         }
     }
 
+    /// What it holds now [kB].
+    pub(crate) fn memory_kb(&self) -> u64 {
+        self.status_kb("VmRSS:")
+    }
+
+    /// Open file descriptors.
+    pub(crate) fn descriptors(&self) -> usize {
+        std::fs::read_dir(format!("/proc/{}/fd", self.process.id())).expect("it is alive").count()
+    }
+
     /// Processor time so far [s].
-    fn cpu_s(&self) -> f64 {
+    pub(crate) fn cpu_s(&self) -> f64 {
         let stat = std::fs::read_to_string(format!("/proc/{}/stat", self.process.id())).expect("it is alive");
         let fields: Vec<&str> = stat.rsplit(')').next().expect("fields").split_whitespace().collect();
         // user and system time in hundredths of a second, fields 14 and 15 of proc(5)

@@ -29,7 +29,7 @@ from .results import (
     TrialReply,
 )
 from .server import Server, serve
-from .session import Session
+from .session import Session, Snapshot
 from .sweep import Modes, PullIn, Row, Static, Table
 
 __all__ = [
@@ -52,6 +52,7 @@ __all__ = [
     "Row",
     "Server",
     "Session",
+    "Snapshot",
     "Static",
     "StaticResult",
     "StepFailed",

@@ -14,8 +14,8 @@ from .errors import Diagnostic, InvalidRequest, NetlistError, NotFound, Unavaila
 from .netlist import Netlist
 from .options import WIRE, Options
 from .results import ModesResult, NodeMotion, PullInResult, StaticResult, TransientResult
-from .session import Session
-from .v1 import analysis_pb2, model_pb2, sweep_pb2
+from .session import Session, Snapshot
+from .v1 import analysis_pb2, device_pb2, model_pb2, sweep_pb2
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -243,6 +243,17 @@ class Model:
         """
         self._describe()
         return Session(self._channel, self.id, tuple(ports), tuple(signals), timeout)
+
+    def restore(self, snapshot: Snapshot, timeout: float = 60.0) -> Session:
+        """Opens a device that goes on from a :meth:`Session.snapshot` of this model, with the same bits.
+
+        Raises :class:`NoResult` for a snapshot of another model or another version of the server.
+        """
+        request = device_pb2.RestoreRequest(model=self.id, snapshot=snapshot.states)
+        opened = self._call("Restore", request)
+        session = Session(self._channel, self.id, (), (), timeout, opened.session)
+        session.accepted, session.t, session._voltages = snapshot.accepted, snapshot.t, dict(snapshot.voltages)
+        return session
 
     def _describe(self) -> None:
         """Makes sure that the server has this model."""

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import collections
+import contextlib
 import itertools
 import os
 import queue
 import threading
 import time
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from types import TracebackType
 from typing import Any, NamedTuple
 
@@ -27,6 +28,22 @@ _LOOK = 0.2
 """While a call waits, it looks this often whether the stream is over [s]."""
 
 
+@dataclass(frozen=True)
+class Snapshot:
+    """Where a session stands: from here :meth:`Model.restore` goes on with the same bits, also on another server."""
+
+    model: str
+    """Id of the model."""
+    states: bytes = field(repr=False)
+    """The server's bytes."""
+    accepted: TrialReply | None
+    """The accepted state."""
+    t: float
+    """Its time [s]."""
+    voltages: dict[str, float]
+    """Accepted port voltages [V]."""
+
+
 class Session:
     """A device with states of its own. Make one with :meth:`Model.session`, use it in a ``with`` block.
 
@@ -38,9 +55,19 @@ class Session:
     """
 
     def __init__(
-        self, channel: Channel, model: str, ports: tuple[str, ...], signals: tuple[str, ...], timeout: float
+        self,
+        channel: Channel,
+        model: str,
+        ports: tuple[str, ...],
+        signals: tuple[str, ...],
+        timeout: float,
+        session: str = "",
     ) -> None:
+        """With ``session`` it joins one that is open on the server, and closes it at its end."""
         self._channel = channel
+        self._model = model
+        self._session = session
+        self._joined = bool(session)
         self._timeout = timeout
         self._pid = os.getpid()
         # A step is taken as a whole. Each question has a place for its own reply: that of an interrupted call stays there,
@@ -56,12 +83,18 @@ class Session:
         self.accepted: TrialReply | None = None
         """The accepted state; None: the model at rest as drawn."""
         self._voltages: dict[str, float] = {}
-        request = device_pb2.OpenRequest(model=model, ports=ports, signals=signals)
+        if session:
+            first = device_pb2.DeviceRequest(attach=device_pb2.Attach(session=session))
+        else:
+            first = device_pb2.DeviceRequest(
+                open=device_pb2.OpenRequest(model=model, ports=ports, signals=signals)
+            )
         try:
-            opened = self._ask(device_pb2.DeviceRequest(open=request)).opened
+            opened = self._ask(first).opened
         except BaseException:
             self.close()
             raise
+        self._session = opened.session
         self.ports: tuple[str, ...] = tuple(opened.device.ports)
         """Ports, in order."""
         self.signals: dict[str, str] = {s.name: s.unit for s in opened.device.signals}
@@ -155,12 +188,32 @@ class Session:
         """Displacement of a node in the accepted state; ``NODE.x``, ``.y`` and ``.rz`` must be among the signals."""
         return NodeMotion(*(self.read(f"{node}.{axis}") for axis in ("x", "y", "rz")))
 
+    def snapshot(self) -> Snapshot:
+        """The accepted state, to go on from later, in another process, or on another server."""
+        with self._lock:
+            token = self.accepted.token if self.accepted else 0
+            request = device_pb2.SnapshotRequest(session=self._session, token=token)
+            states = self._channel.call("Snapshot", request).snapshot
+            return Snapshot(self._model, states, self.accepted, self.t, dict(self._voltages))
+
+    def fork(self) -> Session:
+        """Another session that goes on from here by itself; close it as well."""
+        with self._lock:
+            opened = self._channel.call("Fork", device_pb2.ForkRequest(session=self._session))
+            other = Session(self._channel, self._model, (), (), self._timeout, opened.session)
+            other.accepted, other.t, other._voltages = self.accepted, self.t, dict(self._voltages)
+            return other
+
     def close(self) -> None:
         """Ends the stream; the server forgets the states. Later calls raise."""
         if self._pid == os.getpid():
             self._over = self._over or BimorphError("the session is closed; open another one")
             self._requests.put(None)
             self._call.cancel()
+            if self._joined:
+                self._joined = False
+                with contextlib.suppress(BimorphError):
+                    self._channel.call("Close", device_pb2.CloseRequest(session=self._session))
 
     def __enter__(self) -> Session:
         return self

@@ -1,0 +1,223 @@
+//! The states of a session as bytes, and back: what was opened, and every state that is held, in order of last use.
+//!
+//! Little-endian words; numbers as the bits of their doubles, so that a device that goes on from them gives the same bits as
+//! the one that they came from. Reading trusts nothing: lengths are bounded by the bytes that are there, and sizes by the
+//! model's.
+
+use super::shown::Shown;
+use super::states::{Snapshot, States};
+use super::{DeviceError, OpenRequest, Token};
+use crate::multibody::planar::Pose;
+use crate::solve::time::method::Motion;
+
+/// What the bytes begin with: a name and the version of this format.
+const HEAD: [u8; 8] = *b"bimorph\x01";
+
+/// Writes what is open and its states.
+pub(super) fn write(opened: &OpenRequest, states: &States) -> Vec<u8> {
+    let mut out = Writer(HEAD.to_vec());
+    for names in [&opened.ports, &opened.signals] {
+        out.count(names.len());
+        for name in names {
+            out.count(name.len());
+            out.0.extend(name.as_bytes());
+        }
+    }
+    out.count(states.len());
+    for (token, parent, state) in states.in_order() {
+        out.word(token.0);
+        out.word(parent.map_or(0, |token| token.0));
+        out.poses(&state.q);
+        out.poses(&state.v);
+        out.numbers(&state.rise);
+        out.numbers(&state.sources);
+        out.word(state.next_step.to_bits());
+        for numbers in state.shown.numbers() {
+            out.numbers(numbers);
+        }
+        out.count(state.carried.len());
+        for motion in &state.carried {
+            out.poses(&motion.q);
+            out.poses(&motion.v);
+        }
+    }
+    out.0
+}
+
+/// Reads them back.
+///
+/// # Errors
+/// [`DeviceError::BadRequest`] for bytes that [`write`] has not made.
+pub(super) fn read(bytes: &[u8]) -> Result<(OpenRequest, States), DeviceError> {
+    let mut from = Reader(bytes);
+    let read = from.all();
+    match read {
+        Some(read) if from.0.is_empty() => Ok(read),
+        _ => Err(refused("the bytes of a snapshot", "something else, or a part of one")),
+    }
+}
+
+/// What is wrong with the bytes of a snapshot.
+pub(super) fn refused(expected: &str, got: &str) -> DeviceError {
+    DeviceError::BadRequest { what: "snapshot", expected: expected.into(), got: got.into() }
+}
+
+struct Writer(Vec<u8>);
+
+impl Writer {
+    fn word(&mut self, word: u64) {
+        self.0.extend(word.to_le_bytes());
+    }
+
+    fn count(&mut self, count: usize) {
+        self.word(count as u64);
+    }
+
+    fn numbers(&mut self, numbers: &[f64]) {
+        self.count(numbers.len());
+        numbers.iter().for_each(|x| self.word(x.to_bits()));
+    }
+
+    fn poses(&mut self, poses: &[Pose]) {
+        self.count(poses.len());
+        poses.iter().flat_map(|pose| pose.iter()).for_each(|x| self.word(x.to_bits()));
+    }
+}
+
+/// What is left to read; none at any place where the bytes are not what they should be.
+struct Reader<'a>(&'a [u8]);
+
+impl Reader<'_> {
+    fn all(&mut self) -> Option<(OpenRequest, States)> {
+        self.0 = self.0.strip_prefix(&HEAD)?;
+        let opened = OpenRequest { ports: self.names()?, signals: self.names()? };
+        let mut states = States::default();
+        for _ in 0..self.count(8)? {
+            let (token, parent) = (Token(self.word()?), self.word()?);
+            let state = Snapshot {
+                q: self.poses()?,
+                v: self.poses()?,
+                rise: self.numbers()?,
+                sources: self.numbers()?,
+                next_step: f64::from_bits(self.word()?),
+                shown: {
+                    let mut parts = [const { Vec::new() }; Shown::PARTS];
+                    for part in &mut parts {
+                        *part = self.numbers()?;
+                    }
+                    Shown::from_numbers(parts)?
+                },
+                carried: {
+                    let mut carried = Vec::new();
+                    for _ in 0..self.count(16)? {
+                        carried.push(Motion { q: self.poses()?, v: self.poses()? });
+                    }
+                    carried
+                },
+            };
+            states.put(token, (parent != 0).then_some(Token(parent)), state);
+        }
+        Some((opened, states))
+    }
+
+    fn bytes(&mut self, count: usize) -> Option<&[u8]> {
+        let (taken, left) = self.0.split_at_checked(count)?;
+        self.0 = left;
+        Some(taken)
+    }
+
+    fn word(&mut self) -> Option<u64> {
+        self.bytes(8)?.try_into().ok().map(u64::from_le_bytes)
+    }
+
+    /// A number of things of at least `each` bytes: there are no more than the bytes that are left hold.
+    fn count(&mut self, each: usize) -> Option<usize> {
+        let count = usize::try_from(self.word()?).ok()?;
+        (count <= self.0.len() / each).then_some(count)
+    }
+
+    fn names(&mut self) -> Option<Vec<String>> {
+        let mut names = Vec::new();
+        for _ in 0..self.count(8)? {
+            let length = self.count(1)?;
+            names.push(String::from_utf8(self.bytes(length)?.to_vec()).ok()?);
+        }
+        Some(names)
+    }
+
+    fn numbers(&mut self) -> Option<Vec<f64>> {
+        let count = self.count(8)?;
+        let bytes = self.bytes(8 * count)?;
+        Some(bytes.as_chunks::<8>().0.iter().map(|word| f64::from_le_bytes(*word)).collect())
+    }
+
+    fn poses(&mut self) -> Option<Vec<Pose>> {
+        let count = self.count(24)?;
+        let bytes = self.bytes(24 * count)?;
+        let number = |k: usize, pose: &[[u8; 8]]| f64::from_le_bytes(pose[k]);
+        Some(
+            (bytes.as_chunks::<8>().0.chunks_exact(3))
+                .map(|pose| Pose::new(number(0, pose), number(1, pose), number(2, pose)))
+                .collect(),
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! States come back with the same bits, and nothing else is taken for them.
+    use super::*;
+    use crate::device::{Mode, Trial};
+
+    fn some() -> (OpenRequest, States) {
+        let opened = OpenRequest { ports: vec!["drive".into()], signals: vec!["µ.x".into(), String::new()] };
+        let mut states = States::default();
+        let mut parent = None;
+        for k in 0..3 {
+            let pose = |x: f64| vec![Pose::new(x, f64::NAN, -0.0), Pose::new(f64::INFINITY, 1e-320, x)];
+            let carried = if k == 2 { vec![Motion { q: pose(7.0), v: pose(8.0) }] } else { vec![] };
+            let state = Snapshot {
+                q: pose(1.0 + f64::from(k)),
+                v: pose(0.1),
+                rise: vec![300.0; k as usize],
+                sources: vec![1.0, -2.0],
+                next_step: f64::INFINITY,
+                shown: Shown::start(vec![1.0, 2.0]).step(1e-6, vec![1.5, 2.5], 1e-3, |_| 1e-9).0,
+                carried,
+            };
+            let voltages = [f64::from(k)];
+            parent = Some(
+                states.insert(&Trial { mode: Mode::Transient, parent, t: 0.0, dt: 1e-6, voltages: &voltages }, state),
+            );
+        }
+        (opened, states)
+    }
+
+    #[test]
+    fn states_come_back() {
+        let (opened, states) = some();
+        let bytes = write(&opened, &states);
+        let (read_opened, read_states) = read(&bytes).expect("its own bytes");
+        assert_eq!(read_opened, opened);
+        assert_eq!(write(&read_opened, &read_states), bytes, "with the same bits, in the same order");
+    }
+
+    #[test]
+    fn other_bytes_are_refused() {
+        let (opened, states) = some();
+        let bytes = write(&opened, &states);
+        for length in 0..bytes.len() {
+            assert!(read(&bytes[..length]).is_err(), "{length}");
+        }
+        assert!(read(&[bytes.as_slice(), &[0]].concat()).is_err());
+        for at in 0..bytes.len() {
+            for bit in [0, 7] {
+                let mut wrong = bytes.clone();
+                wrong[at] ^= 1 << bit;
+                // it may be a state, but it neither panics nor lays out more than there is
+                let _ = read(&wrong);
+            }
+        }
+        assert!(read(&[&HEAD[..], &[255; 64]].concat()).is_err());
+    }
+}
