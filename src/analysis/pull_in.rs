@@ -23,6 +23,8 @@ use serde::Serialize;
 
 /// How far beyond a fold a part is let fall, as a share of its voltage.
 const PAST: f64 = 1e-3;
+/// Halvings of that where the branch itself does not lead to its fold.
+const BISECTIONS: usize = 12;
 /// Folds on the way up, or on the way down, after which the search gives up.
 const MOST_FOLDS: usize = 200;
 /// Points of one piece of a branch.
@@ -137,26 +139,41 @@ impl Sweep<'_> {
             let last = last(&traced);
             let fold = from + last.0 * unit;
             if traced.end == PathEnd::Arrived {
-                break;
+                return Err(self.nothing(max));
             }
-            q = last.1;
+            let before = last.1;
+            q.copy_from_slice(&before);
             let beyond = fold * (1.0 + PAST);
-            if self.fall(&mut q, beyond).is_err() {
-                return Ok(Closed::Falls { volts: fold });
+            match self.fall(&mut q, beyond) {
+                // nothing here could ever hold the part
+                Err(_) if open.iter().enumerate().all(|(g, _)| self.system.touching(g).is_none()) => {
+                    return Ok(Closed::Falls { volts: fold });
+                }
+                fallen => fallen?,
             }
             within_contact_range(self.compiled, &q)?;
-            if self.touching(&q).iter().zip(&open).any(|(now, before)| *now && !before) {
+            let system = self.system;
+            let apart = |q: &[Pose]| (0..open.len()).all(|g| open[g] || !system.touches(g, q));
+            if !apart(&q) {
+                let lost = traced.end != PathEnd::Unstable;
+                let fold = if lost { self.sharpen(&before, fold, beyond, apart) } else { fold };
                 return Ok(Closed::Rests { fold, volts: beyond, q });
             }
             if beyond >= max {
-                break;
+                return Err(self.nothing(max));
             }
             from = beyond;
         }
         let name = &self.system.electrics.names[self.source];
-        Err(AnalysisError::NoEquilibrium {
+        let detail = format!("no pull-in found after {MOST_FOLDS} folds of the open branch, at {name} = {from:.6} V");
+        Err(AnalysisError::NoEquilibrium { detail })
+    }
+
+    fn nothing(&self, max: f64) -> AnalysisError {
+        let name = &self.system.electrics.names[self.source];
+        AnalysisError::NoEquilibrium {
             detail: format!("{name} pulls nothing in up to {max} V; raise the largest voltage"),
-        })
+        }
     }
 
     /// From the closed state `q` at `volts` down to where none of the gaps `made` touches any more.
@@ -175,17 +192,32 @@ impl Sweep<'_> {
             }
             let last = last(&traced);
             let fold = at(last.0);
-            q = last.1;
+            let before = last.1;
+            q.copy_from_slice(&before);
             let beyond = fold * (1.0 - PAST);
             self.fall(&mut q, beyond)?;
             if free(&q) {
-                return Ok(Some(fold));
+                let lost = traced.end != PathEnd::Unstable;
+                return Ok(Some(if lost { self.sharpen(&before, fold, beyond, |q| !free(q)) } else { fold }));
             }
             volts = beyond;
         }
         Err(AnalysisError::NoEquilibrium {
             detail: format!("no release found after {MOST_FOLDS} folds of the closed branch"),
         })
+    }
+
+    /// The voltage at which a branch ends that was lost at `holds` in a fold too sharp for its steps: by bisection between there
+    /// and `falls`, on whether the part, let fall from its last equilibrium `q`, is `kept`.
+    fn sharpen(&mut self, q: &[Pose], mut holds: f64, mut falls: f64, kept: impl Fn(&[Pose]) -> bool) -> f64 {
+        for _ in 0..BISECTIONS {
+            let (middle, mut there) = (f64::midpoint(holds, falls), q.to_vec());
+            match self.fall(&mut there, middle) {
+                Ok(()) if kept(&there) => holds = middle,
+                _ => falls = middle,
+            }
+        }
+        holds
     }
 
     fn fall(&mut self, q: &mut [Pose], volts: f64) -> Result<(), SolveError> {
@@ -208,16 +240,7 @@ impl Sweep<'_> {
             stop_at_loss: true,
             ..ContinuationOptions::default()
         };
-        let traced = Continuation::new(system, options).trace(&mut family, q, &mut |_| true)?;
-        match traced.end {
-            PathEnd::Arrived | PathEnd::Unstable => Ok(traced),
-            _ => {
-                let at = from + last(&traced).0 * (to - from);
-                let name = &system.electrics.names[self.source];
-                let detail = format!("the branch of equilibria is lost at {name} = {at:.6} V");
-                Err(AnalysisError::NoEquilibrium { detail })
-            }
-        }
+        Ok(Continuation::new(system, options).trace(&mut family, q, &mut |_| true)?)
     }
 
     /// The voltage that moves the part by a tenth of the length scale, or takes a third of a stiffness away, whichever is

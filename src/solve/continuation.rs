@@ -333,7 +333,9 @@ impl Continuation {
                 return Err(None);
             }
             let reach = at.q.iter().map(|q| extent(system, q)).fold(system.length_scale, f64::max);
-            let stalled = correction <= 1e-6 * reach && correction > 0.1 * last;
+            // rounding: corrections that are small and no longer shrink. In stiff contacts they shrink by a quarter each time
+            let small = correction <= 1e-6 * reach && correction > 0.8 * last;
+            let stalled = small || (correction <= 1e-8 * reach && correction > 0.1 * last);
             last = correction;
             if correction <= self.options.tolerance * reach || stalled {
                 return Ok((at, count));

@@ -3,13 +3,14 @@
 //! Each step predicts along the tangent, then corrects by Newton. It is accepted only when the corrector converges, ends on
 //! a stable equilibrium (no negative pivot), and corrects at most half of what it predicted: a Newton iteration that
 //! wandered to another branch corrects more. Otherwise the step is halved. Where steps vanish the path has a fold: pull-in, release or
-//! snap-through. From there the system falls, as an overdamped motion, to the next stable equilibrium, and the path goes on
-//! from that; the fold's place is reported.
+//! snap-through. From there the system falls, as an overdamped motion each step of which leads down in its potential, to the
+//! next stable equilibrium, and the path goes on from that; the fold's place is reported.
 //!
 //! Reference: E. Riks, "An incremental approach to the solution of snapping and buckling problems", Int. J. Solids
 //! Structures 15 (1979), for folds; Kelley & Keyes, "Convergence analysis of pseudo-transient continuation", SIAM J. Numer.
 //! Anal. 35 (1998), for the fall.
 
+mod fall;
 pub mod path;
 
 use super::SolveError;
@@ -209,111 +210,6 @@ impl Equilibrium {
         Corrected::No
     }
 
-    /// Lets the system fall at the loads of `s` from `q`, as an overdamped motion, to a stable equilibrium; `q` becomes that.
-    ///
-    /// # Errors
-    /// [`SolveError::Lost`] where it falls without end.
-    pub fn settle(&mut self, system: &System, path: &dyn LoadPath, s: f64, q: &mut [Pose]) -> Result<Path, SolveError> {
-        let mut done = Path::default();
-        self.fall(system, path, s, q, &mut done)?;
-        Ok(done)
-    }
-
-    /// Lets the system fall at fixed loads, as an overdamped motion, to a stable equilibrium.
-    fn fall(
-        &mut self,
-        system: &System,
-        path: &dyn LoadPath,
-        s: f64,
-        q: &mut [Pose],
-        done: &mut Path,
-    ) -> Result<(), SolveError> {
-        path.at(s, &mut self.drive);
-        self.disturb(system, q);
-        // no step longer than a twentieth of the smallest gap
-        let longest = 0.05 * system.length_scale;
-        let mut damping = 0.0;
-        for _ in 0..self.options.fall_steps {
-            crate::budget::check();
-            done.iterations += 1;
-            system.tangent(q, &self.drive, &mut self.tangent, &mut self.residual);
-            let first_damping = 1e-6 * mean_ratio(system, &self.tangent);
-            loop {
-                self.add_damping(system, damping);
-                system.model.project_matrix(&mut self.tangent);
-                let stable = matches!(self.tangent.factor(&system.model.pattern), Ok(i) if i.negative == 0);
-                if stable {
-                    self.step.copy_from_slice(&self.residual);
-                    self.tangent.solve(&system.model.pattern, &mut self.step);
-                    if size(system, &self.step) <= longest {
-                        break;
-                    }
-                }
-                if damping > 1e12 * first_damping.max(1e-300) {
-                    return Err(self.lost(system, s, done.iterations));
-                }
-                damping = if damping == 0.0 { first_damping } else { 3.0 * damping };
-                system.tangent(q, &self.drive, &mut self.tangent, &mut self.residual);
-            }
-            for (q, step) in q.iter_mut().zip(&self.step) {
-                *q -= step;
-            }
-            let moved = size(system, &self.step);
-            if damping == 0.0 && moved <= self.options.tolerance * size(system, q).max(system.length_scale) {
-                return Ok(());
-            }
-            damping = if damping <= first_damping { 0.0 } else { damping / 4.0 };
-        }
-        Err(self.lost(system, s, done.iterations))
-    }
-
-    /// Moves `q` a little along its softest direction. A bifurcation (a straight beam that buckles) leaves the system
-    /// balanced on an unstable branch, from which nothing would fall; this is the imperfection that every real part has.
-    fn disturb(&mut self, system: &System, q: &mut [Pose]) {
-        let mut damping = 0.0;
-        for _ in 0..200 {
-            system.tangent(q, &self.drive, &mut self.tangent, &mut self.residual);
-            let first = 1e-6 * mean_ratio(system, &self.tangent);
-            self.add_damping(system, damping);
-            system.model.project_matrix(&mut self.tangent);
-            if matches!(self.tangent.factor(&system.model.pattern), Ok(i) if i.negative == 0) {
-                break;
-            }
-            damping = if damping == 0.0 { first } else { 3.0 * damping };
-        }
-        // inverse iteration from a fixed vector without symmetry
-        for (j, x) in self.step.iter_mut().enumerate() {
-            let m = fall_mass(system, j);
-            *x = Pose::new(m.x, m.y * (1.0 + 0.37 * ((j * 7) % 5) as f64), m.z / system.length_scale);
-        }
-        for _ in 0..3 {
-            system.model.project(&mut self.step);
-            self.tangent.solve(&system.model.pattern, &mut self.step);
-            let scale = 1e-3 * system.length_scale / size(system, &self.step);
-            for (j, x) in self.step.iter_mut().enumerate() {
-                self.trial[j] = *x * scale;
-                *x = fall_mass(system, j).component_mul(&self.trial[j]);
-            }
-        }
-        if self.trial.iter().all(|x| x.iter().all(|v| v.is_finite())) {
-            for (q, x) in q.iter_mut().zip(&self.trial) {
-                *q += x;
-            }
-        }
-    }
-
-    /// `tangent += damping · mass-like weights`.
-    fn add_damping(&mut self, system: &System, damping: f64) {
-        if damping > 0.0 {
-            for (j, block) in self.tangent.diagonal.iter_mut().enumerate() {
-                let m = fall_mass(system, j);
-                for i in 0..3 {
-                    block[(i, i)] += damping * m[i];
-                }
-            }
-        }
-    }
-
     fn lost(&self, system: &System, share: f64, iterations: usize) -> SolveError {
         let worst =
             (0..self.residual.len()).max_by(|&a, &b| self.residual[a].amax().total_cmp(&self.residual[b].amax()));
@@ -340,17 +236,4 @@ fn extent(system: &System, p: &Pose) -> f64 {
     // a comparison with NaN must not hide it
     let e = p.x.abs().max(p.y.abs()).max(p.z.abs() * system.length_scale);
     if p.iter().all(|v| v.is_finite()) { e } else { f64::INFINITY }
-}
-
-/// Mass-like weights of the overdamped motion; massless bodies get the lightest body's.
-fn fall_mass(system: &System, body: usize) -> Pose {
-    let m = system.model.mass(body);
-    let floor = 1e-18;
-    Pose::new(m.x.max(floor), m.y.max(floor), m.z.max(floor * system.length_scale * system.length_scale))
-}
-
-/// A typical stiffness over mass, to begin damping with.
-fn mean_ratio(system: &System, tangent: &BlockMatrix<f64, 3>) -> f64 {
-    let n = tangent.diagonal.len();
-    (0..n).map(|j| tangent.diagonal[j][(0, 0)].abs() / fall_mass(system, j).x).fold(f64::INFINITY, f64::min)
 }

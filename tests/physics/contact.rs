@@ -120,36 +120,42 @@ fn beyond_the_law_there_is_no_number() {
     assert!(error.contains("\"narrow\"") && error.contains("law of contact"), "{error}");
 }
 
-/// A hundred random plates and cantilevers pull in and let go at the same voltages whatever the largest voltage asked for, from
-/// just above pull-in to 1000 V; plates at Nathanson's voltage, and let go where kx = εAV²/2(g − x)² at the touching distance.
+/// One gap of random size, in one of four layouts: a lumped plate, a cantilever that is the electrode, a wide electrode on a thin
+/// cantilever (SUGAR's demo beamgap2e), a clamped-clamped beam over four pieces of an electrode.
+fn random_part(case: usize, random: &mut Numbers) -> Compiled {
+    let gap = random.between(1e-6, 4e-6);
+    if case % 4 == 0 {
+        return plate(random.between(0.1, 10.0), random.between(1e-9, 1e-7), gap);
+    }
+    let (l, w) = (random.between(60e-6, 200e-6), random.between(1e-6, 3e-6));
+    let field = format!("gap={gap:e}] \n R * [a b] [R=1]\n R * [c d] [R=1]\n anchor p1 [c] []\n anchor p1 [d] []\n");
+    let text = match case % 4 {
+        1 => format!(
+            "anchor p1 [a] []\nbeam2d p1 [a b] [l={l:e} w={w:e}]\ngap2dforce p1 [a b c d] [l={l:e} w1={w:e} w2=5u {field}"
+        ),
+        2 => format!(
+            "anchor p1 [s] []\nbeam2d p1 [s a] [l={l:e} w={w:e}]\nbeam2d p1 [a b] [l=100u w=10u]\n\
+             gap2dforce p1 [a b c d] [l=100u w1=10u w2=5u {field}"
+        ),
+        _ => format!(
+            "dl = {l:e}\nanchor p1 [e(0)] []\nanchor p1 [f(0)] []\nfor i=1:4 [\n beam2d p1 [e(i-1) e(i)] [l=dl w=1u]\n\
+             gap2dforce p1 [e(i-1) e(i) f(i-1) f(i)] [l=dl w1=1u w2=5u gap={gap:e}]\n\
+             R * [e(i-1) e(i)] [R=1]\n R * [f(i-1) f(i)] [R=1]\n anchor p1 [f(i)] []\n]\nanchor p1 [e(4)] []\n"
+        ),
+    };
+    let [moving, fixed] = if case % 4 == 3 { ["e(0)", "f(0)"] } else { ["a", "c"] };
+    let text = format!("{text}eground * [{moving}] []\ndrive port * [{fixed} {moving}] []\n");
+    model(&text, &CompileOptions::default())
+}
+
+/// Two hundred random parts pull in and let go at the same voltages whatever the largest voltage asked for, from just above
+/// pull-in to 1000 V, and let go below where they pull in.
 #[test]
 fn pull_in_does_not_depend_on_the_largest_voltage() {
     let mut random = Numbers(11);
-    for case in 0..100 {
-        let compiled = if case % 2 == 0 {
-            let (k, area, gap) = (random.between(0.1, 10.0), random.between(1e-9, 1e-7), random.between(0.5e-6, 4e-6));
-            let compiled = plate(k, area, gap);
-            let found = pull_in(&compiled, None, 1000.0).unwrap();
-            close(found.pull_in_v, nathanson(k, area, gap), 1e-6);
-            let release = (2.0 * k * (gap - TOUCH) * TOUCH * TOUCH / (EPS * area)).sqrt();
-            close(found.release_v.unwrap(), release, 5e-3);
-            compiled
-        } else {
-            let (l, w, gap) = (random.between(60e-6, 200e-6), random.between(1e-6, 3e-6), random.between(1e-6, 4e-6));
-            let text = format!(
-                "anchor p1 [a] []
-                beam2d p1 [a b] [l={l:e} w={w:e}]
-                gap2dforce p1 [a b c d] [l={l:e} w1={w:e} w2={w:e} gap={gap:e}]
-                anchor p1 [c] []
-                anchor p1 [d] []
-                R * [a b] [R=1]
-                R * [c d] [R=1]
-                eground * [a] []
-                drive port * [c a] []"
-            );
-            model(&text, &CompileOptions::default())
-        };
-        let first = pull_in(&compiled, None, 1000.0).unwrap();
+    for case in 0..200 {
+        let compiled = random_part(case, &mut random);
+        let first = pull_in(&compiled, None, 1000.0).unwrap_or_else(|e| panic!("{case}: {e}"));
         let release = first.release_v.unwrap_or(0.0);
         assert!(first.held && release < first.pull_in_v, "{case}: {first:?}");
         let share = random.between(0.01, 0.9);
@@ -162,6 +168,25 @@ fn pull_in_does_not_depend_on_the_largest_voltage() {
                 "{case}, --max {max}: {found:?}"
             );
         }
+        // a little beyond, the static equilibrium is the closed one
+        for beyond in [1.0001, 1.003, 1.1] {
+            let result = balance(&compiled, &[("drive", beyond * first.pull_in_v)]);
+            assert!(result.pulled_in, "{case}: {beyond}");
+        }
+        assert!(!balance(&compiled, &[("drive", 0.999 * first.pull_in_v)]).jumped, "{case}");
+    }
+}
+
+/// Plates pull in at Nathanson's voltage, and let go where kx = εAV²/2(g − x)² at the touching distance.
+#[test]
+fn plates_pull_in_and_let_go() {
+    let mut random = Numbers(5);
+    for _ in 0..100 {
+        let (k, area, gap) = (random.between(0.1, 10.0), random.between(1e-9, 1e-7), random.between(0.5e-6, 4e-6));
+        let found = pull_in(&plate(k, area, gap), None, 1000.0).unwrap();
+        close(found.pull_in_v, nathanson(k, area, gap), 1e-6);
+        let release = (2.0 * k * (gap - TOUCH) * TOUCH * TOUCH / (EPS * area)).sqrt();
+        close(found.release_v.unwrap(), release, 5e-3);
     }
 }
 
