@@ -5,6 +5,7 @@ use crate::equations::Joints;
 use crate::multibody::relative::Unfit;
 use crate::netlist::{Bundle, Diagnostics, Setting};
 use crate::options::Refused;
+use crate::refine::imperfection;
 use crate::refine::model_order::{self, ModelOrder};
 use crate::structure::Structure;
 use std::sync::Arc;
@@ -66,6 +67,8 @@ pub fn compile(bundle: &Bundle, options: &CompileOptions) -> Result<Compiled, Co
     let in_joints = CompileOptions { scheme: Scheme::Es, ..options.clone() };
     let joints = matches!(options.formulation, Formulation::Rcr | Formulation::RcrElastic);
     let options = if joints && options.scheme == Scheme::E4 { &in_joints } else { options };
+    let as_sugar = CompileOptions { linear: true, junctions: Junctions::Centreline, ..options.clone() };
+    let options = if options.as_sugar { &as_sugar } else { options };
     let loaded = crate::netlist::load(bundle, &options.set).map_err(CompileError::Netlist)?;
     let order = match (options.band, options.segments) {
         (Some(band), None) => model_order::choose(&loaded.structure, options, band)?,
@@ -74,7 +77,7 @@ pub fn compile(bundle: &Bundle, options: &CompileOptions) -> Result<Compiled, Co
             ModelOrder { segments, estimated_error: None, modes_in_band: 0, passes: 0 }
         }
     };
-    let parts = discretize_with(&loaded.structure, options, &order.segments)?;
+    let parts = laid_out(&loaded.structure, options, &order.segments)?;
     let joints = match options.formulation {
         Formulation::Rcr | Formulation::RcrElastic => Some(Joints::elastic(&parts.system).map(Arc::new)),
         _ => None,
@@ -88,6 +91,19 @@ pub fn compile(bundle: &Bundle, options: &CompileOptions) -> Result<Compiled, Co
         parts,
         order,
     })
+}
+
+/// Bodies and joints, with the imperfection asked for.
+fn laid_out(
+    structure: &Structure,
+    options: &CompileOptions,
+    segments: &[usize],
+) -> Result<Discretized, DiscretizeError> {
+    let mut parts = discretize_with(structure, options, segments)?;
+    if let Some(share) = options.imperfection {
+        imperfection::apply(&mut parts, share * structure.extent());
+    }
+    Ok(parts)
 }
 
 #[cfg(test)]

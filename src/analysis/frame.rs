@@ -187,7 +187,14 @@ pub fn frame_transient(
     let signals = (options.signals.iter().zip(&signals).zip(rows))
         .map(|((name, signal), row)| (name.clone(), signal.unit().to_owned(), row))
         .collect();
-    Ok(TransientResult { t, signals, counters, unknowns: frame.system.unknowns(), events: Vec::new() })
+    Ok(TransientResult {
+        t,
+        signals,
+        counters,
+        unknowns: frame.system.unknowns(),
+        events: Vec::new(),
+        warnings: Vec::new(),
+    })
 }
 
 /// Source voltages and steady rises; refuses voltages that would act across gaps.

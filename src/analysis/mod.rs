@@ -11,6 +11,7 @@ pub mod joint_transient;
 pub mod modes;
 pub mod pull_in;
 pub mod signal;
+mod stability;
 pub mod statics;
 pub mod transient;
 

@@ -63,10 +63,15 @@ pub fn modes_with_curves(
     let system = &compiled.parts.system;
     let mut drive = system.electrics.drive();
     // without loads the drawn geometry is the operating point, also for a structure that floats freely
-    let loaded = !voltages.is_empty()
-        || !system.electrics.fixed.is_empty()
-        || !system.loads.is_empty()
-        || system.model.joints.iter().any(|j| j.rest != 0.0);
+    let loaded = !compiled.options.as_sugar
+        && (!voltages.is_empty()
+            || !system.electrics.fixed.is_empty()
+            || !system.loads.is_empty()
+            || system.model.joints.iter().any(|j| j.rest != 0.0));
+    if compiled.options.as_sugar {
+        // neither loads nor built-in strain
+        drive.load = 0.0;
+    }
     let q = if loaded {
         let point = operating_point(compiled, voltages)?;
         let mut rise = point.rise.clone();

@@ -3,6 +3,7 @@ use super::contact_range::within_contact_range;
 use super::integrator::Integrator;
 use super::joint_transient::joint_transient;
 use super::signal::{Signal, View};
+use super::stability::Stability;
 use super::statics::{operating_point, source_vector};
 use super::{AnalysisError, Watch};
 use crate::compile::Compiled;
@@ -109,7 +110,12 @@ pub struct TransientResult {
     pub unknowns: usize,
     /// Crossings asked for and contacts of gaps, in order of time.
     pub events: Vec<Event>,
+    /// What the numbers do not say by themselves.
+    pub warnings: Vec<String>,
 }
+
+/// Times of a run at which its stability is looked at, the end included.
+const LOOKS: usize = 16;
 
 /// Share of the tolerance that one step may use: errors of many steps add up.
 pub(super) const STEP_SHARE: f64 = 1e-2;
@@ -228,7 +234,10 @@ pub(super) fn record(
         counters: Counters::default(),
         unknowns: compiled.unknowns(),
         events: Vec::new(),
+        warnings: Vec::new(),
     };
+    let mut stability = Stability::new(system);
+    let mut looks = 0;
     let mut watched = watched(compiled, options)?;
     let mut events = Vec::new();
     let spacing = options.stop / (options.points - 1) as f64;
@@ -296,6 +305,12 @@ pub(super) fn record(
             });
         }
         events[first..].sort_by(|a, b| a.t.total_cmp(&b.t));
+        let done = ((s + h) / options.stop * LOOKS as f64 * (1.0 + 1e-12)) as usize;
+        if done > looks {
+            looks = done;
+            ramp.at(s + h, &mut drive);
+            stability.look(system, &drive, s + h, (&after.q, &after.v));
+        }
         watch(((s + h) / options.stop).min(1.0))
     };
     let (end, work) = carrier.advance(&ramp, &mut motion, &mut observe)?;
@@ -311,6 +326,7 @@ pub(super) fn record(
         iterations: work.iterations,
     };
     result.events = events;
+    result.warnings.extend(stability.told());
     Ok(result)
 }
 

@@ -2,7 +2,8 @@
 
 use super::interrupt;
 use indicatif::{ProgressBar, ProgressStyle};
-use std::time::Duration;
+use std::io::IsTerminal;
+use std::time::{Duration, Instant};
 
 /// Steps of a bar that counts fractions.
 const FINE: u64 = 1000;
@@ -23,10 +24,36 @@ pub(crate) fn spinner(what: &str) -> ProgressBar {
     spinner
 }
 
-/// The watch of an analysis: moves the bar and says whether to go on.
+/// A run is priced once it has taken so long [s], if all of it is going to take more than [`DEAR`].
+const PRICED: f64 = 3.0;
+/// A run of more than this is told its price [s].
+const DEAR: f64 = 20.0;
+/// Where no person watches, a line is written this often [s].
+const LINES: f64 = 30.0;
+
+/// The watch of an analysis: moves the bar, tells the price of a long run, and says whether to go on.
 pub(crate) fn watch(bar: &ProgressBar) -> impl FnMut(f64) -> bool + '_ {
-    |fraction| {
+    let begun = Instant::now();
+    let (mut priced, mut line) = (false, LINES);
+    let watched = std::io::stderr().is_terminal();
+    move |fraction| {
         bar.set_position((fraction * FINE as f64) as u64);
+        let spent = begun.elapsed().as_secs_f64();
+        if !priced && spent > PRICED && fraction > 0.0 {
+            priced = true;
+            let all = spent / fraction;
+            if all > DEAR {
+                let price = format!(
+                    "this run is going to take some {all:.0} s; a shorter --stop, a larger --tol, or --method generalized-alpha with \
+                     --step, which damps what is faster than its steps, cost less"
+                );
+                bar.suspend(|| eprintln!("{price}"));
+            }
+        }
+        if !watched && spent > line {
+            line += LINES;
+            eprintln!("{:.1} % after {spent:.0} s", 100.0 * fraction);
+        }
         !interrupt::asked()
     }
 }

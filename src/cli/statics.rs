@@ -36,6 +36,10 @@ pub(crate) struct Static {
     #[arg(long = "port", short = 'p', value_name = "NAME=VOLTS", value_parser = value::volts)]
     ports: Vec<(String, f64)>,
 
+    /// Show these only: NODE.x, NODE.y, NODE.rz, BEAM.T, PORT.i, PORT.q; a,b or repeated
+    #[arg(long, value_name = "NAMES")]
+    signals: Vec<String>,
+
     /// First raise a port to a voltage [V] once, so far that hot arms yield and stay shorter. Repeatable
     #[arg(long, value_name = "NAME=VOLTS", value_parser = value::volts)]
     backbend: Vec<(String, f64)>,
@@ -104,11 +108,15 @@ impl Static {
             context: self.model.context(&compiled),
         };
         let title = self.model.title();
+        let shown = match self.signals.as_slice() {
+            [] => text(&compiled, &result, &permanent_strains),
+            names => chosen(&result, &value::names(names))? + &report::footing(&compiled, result.unknowns),
+        };
         self.output.finish(
             || table(&title, &result),
             || Ok(picture(&compiled, &title, &result, &curves)),
             &document,
-            &text(&compiled, &result, &permanent_strains),
+            &shown,
         )
     }
 }
@@ -158,12 +166,42 @@ pub(crate) fn beams(curves: &BeamMotions) -> Vec<Vec<Motion>> {
     curves.iter().map(|curve| curve.iter().map(|m| [m.x, m.y, m.rz]).collect()).collect()
 }
 
+/// The signals asked for, one a line.
+fn chosen(result: &StaticResult, names: &[String]) -> Result<String, Failure> {
+    let listed = |list: &[(String, f64)], name: &str| list.iter().find(|(n, _)| n == name).map(|(_, v)| *v);
+    let one = |signal: &String| {
+        let (name, part) = signal.rsplit_once('.')?;
+        let node = || result.nodes.iter().find(|(n, _)| n == name).map(|(_, m)| *m);
+        Some(match part {
+            "x" => quantity(node()?.x, "m"),
+            "y" => quantity(node()?.y, "m"),
+            "rz" => quantity(node()?.rz, "rad"),
+            "T" => quantity(listed(&result.temperatures_k, name)?, "K"),
+            "i" => quantity(listed(&result.currents_a, name)?, "A"),
+            "q" => quantity(listed(&result.charges_c, name)?, "C"),
+            _ => return None,
+        })
+    };
+    let row = |signal: &String| {
+        let shown = one(signal)
+            .ok_or_else(|| Failure::bad("--signals", "NODE.x, .y or .rz, BEAM.T, PORT.i or .q", signal.clone()))?;
+        Ok(vec![signal.clone(), shown])
+    };
+    let rows = names.iter().map(row).collect::<Result<Vec<_>, Failure>>()?;
+    Ok(report::columns(&["signal", "value"], &rows) + "\n")
+}
+
+/// A displacement below this share of the largest one is rounding.
+const NOISE: f64 = 1e-12;
+
 fn text(compiled: &Compiled, result: &StaticResult, strains: &[(String, f64)]) -> String {
-    let rows: Vec<Vec<String>> = result
-        .nodes
-        .iter()
-        .map(|(name, m)| vec![name.clone(), quantity(m.x, "m"), quantity(m.y, "m"), quantity(m.rz, "rad")])
-        .collect();
+    let largest = |of: fn(&NodeMotion) -> f64| result.nodes.iter().map(|(_, m)| of(m)).fold(0.0, f64::max);
+    let (far, turned) = (largest(|m| m.x.abs().max(m.y.abs())), largest(|m| m.rz.abs()));
+    let cell = |v: f64, most: f64, unit: &str| quantity(if v.abs() < NOISE * most { 0.0 } else { v }, unit);
+    let row = |(name, m): &(String, NodeMotion)| {
+        vec![name.clone(), cell(m.x, far, "m"), cell(m.y, far, "m"), cell(m.rz, turned, "rad")]
+    };
+    let rows: Vec<Vec<String>> = result.nodes.iter().map(row).collect();
     let mut text = report::columns(&["node", "x", "y", "rz"], &rows);
     for (list, unit, head) in [
         (&result.temperatures_k, "K", ["beam", "temperature"]),

@@ -1,7 +1,7 @@
 //! `bimorph tran`: motion in time.
 
 use super::failure::Failure;
-use super::model::{Context, ModelArgs, Named};
+use super::model::{Context, ModelArgs, Named, warn_of};
 use super::output::OutputArgs;
 use super::solver::SolverChoice;
 use super::{draw_motion, progress, report, value};
@@ -176,6 +176,7 @@ impl Tran {
         };
         bar.finish_and_clear();
         let (mut result, joints) = result?;
+        warn_of(&result.warnings);
         let drawn = result.signals.split_off(wanted);
         if let Some(path) = &self.draw {
             draw_motion::write(path, compiled, &self.model.title(), &result.t, &drawn)?;
@@ -198,7 +199,7 @@ impl Tran {
             solver: self.solver,
             release: self.release.as_deref(),
             port_voltages_v: Named(&self.ports),
-            context: self.model.context(&initial),
+            context: self.model.context(&initial).with(&result.warnings),
         };
         let title = self.model.title();
         self.output.finish(

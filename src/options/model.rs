@@ -90,6 +90,14 @@ options! {
     /// Rotary inertia of the sections of beams; SUGAR leaves it out.
     rotary_inertia: bool = false, "rotary_inertia" = 10, [""], Range::Flag, "";
 
+    /// Imperfection: the structure is made in the shape of its lowest mode, the largest displacement being this share of the
+    /// drawing's size; negative: to the other side. Lets what is compressed beyond buckling take a branch.
+    imperfection: Option<f64> = None, "imperfection" = 12, ["1"], Range::Within(-0.1, 0.1), "none: as drawn";
+
+    /// As SUGAR 2 computes, in one switch: linear, beams that meet in points (junctions=centreline), modes about the drawing
+    /// whatever stress, heat and voltages are.
+    as_sugar: bool = false, "as_sugar" = 13, [""], Range::Flag, "";
+
     /// How bodies become equations. compliant: every body's own coordinates; rcr: joint coordinates on a tree, loops closed
     /// inside the recursion; rcr-elastic: the same, and beams' joints stay elastic with every method; auto: what suits.
     formulation: Formulation = Formulation::Compliant, "formulation" = 11, [""], Range::Names(&Formulation::NAMES), "";

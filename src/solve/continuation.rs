@@ -244,7 +244,7 @@ impl Continuation {
             Err(None) => {
                 let residual = self.residual.iter().map(|r| r.amax()).fold(0.0, f64::max);
                 let body = family.system().model.bodies.first().map(|b| b.name.to_string()).unwrap_or_default();
-                Err(SolveError::Lost { share: 0.0, iterations: self.iterations, residual, body })
+                Err(SolveError::Lost { share: 0.0, iterations: self.iterations, residual, body, unheld: String::new() })
             }
         }
     }

@@ -20,6 +20,8 @@ use crate::multibody::factor::ZeroPivot;
 use crate::multibody::planar::Pose;
 use path::LoadPath;
 
+/// A body that gives way so many times as far as others hangs on next to nothing.
+const UNHELD: f64 = 1e8;
 /// Corrections below this share of the displacement that no longer shrink are rounding.
 const STALLED: f64 = 1e-5;
 
@@ -210,7 +212,8 @@ impl Equilibrium {
         Corrected::No
     }
 
-    fn lost(&self, system: &System, share: f64, iterations: usize) -> SolveError {
+    fn lost(&mut self, system: &System, share: f64, iterations: usize, q: &[Pose]) -> SolveError {
+        let unheld = self.unheld(system, q);
         let worst =
             (0..self.residual.len()).max_by(|&a, &b| self.residual[a].amax().total_cmp(&self.residual[b].amax()));
         let worst = worst.unwrap_or(0);
@@ -219,7 +222,37 @@ impl Equilibrium {
             iterations,
             residual: self.residual[worst].amax(),
             body: system.model.bodies[worst].name.to_string(),
+            unheld,
         }
+    }
+
+    /// Names the body that gives way most under a force on every body, if it does so far more than most.
+    fn unheld(&mut self, system: &System, q: &[Pose]) -> String {
+        let model = &system.model;
+        let mut residual = self.residual.clone();
+        system.tangent(q, &self.drive, &mut self.tangent, &mut residual);
+        model.project_matrix(&mut self.tangent);
+        if self.tangent.factor_holding(&model.pattern, &mut self.held).is_err() {
+            return String::new();
+        }
+        for (j, x) in self.step.iter_mut().enumerate() {
+            *x = Pose::new(1.0, 1.0 + 0.1 * (j % 7) as f64, 0.0);
+        }
+        model.project(&mut self.step);
+        self.tangent.solve(&model.pattern, &mut self.step);
+        let moved: Vec<f64> = self.step.iter().map(|p| p.x.hypot(p.y)).collect();
+        let mut sorted = moved.clone();
+        sorted.sort_by(f64::total_cmp);
+        let typical = sorted[sorted.len() / 2].max(f64::MIN_POSITIVE);
+        // the middle body may hang on the same threads: then all are soft, and the stiffest is what to compare with
+        let stiff = sorted[sorted.len() / 20].max(f64::MIN_POSITIVE);
+        let softest = (0..moved.len()).max_by(|&a, &b| moved[a].total_cmp(&moved[b])).unwrap_or(0);
+        let over = moved[softest] / typical.min(stiff);
+        if over < UNHELD {
+            return String::new();
+        }
+        let name = &model.bodies[softest].name;
+        format!("; the part with \"{name}\" is nearly unheld: it gives way {over:.0e} times as far as what is held")
     }
 }
 

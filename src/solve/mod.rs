@@ -43,7 +43,7 @@ pub enum SolveError {
     },
     /// Load steps became too small and no other equilibrium was found.
     #[error(
-        "equilibrium lost at {share:.6} of the load after {iterations} iterations (residual {residual:.3e} at \"{body}\")"
+        "equilibrium lost at {share:.6} of the load after {iterations} iterations (residual {residual:.3e} at \"{body}\"){unheld}"
     )]
     Lost {
         /// Share of the load path that was reached [1].
@@ -54,6 +54,8 @@ pub enum SolveError {
         residual: f64,
         /// Body where it stands.
         body: String,
+        /// Names a part that next to nothing holds; empty where there is none.
+        unheld: String,
     },
     /// The integrator's steps became too small.
     #[error(

@@ -40,6 +40,7 @@ mod tests {
             counters: Default::default(),
             unknowns: 1,
             events: vec![],
+            warnings: vec![],
         }
     }
 

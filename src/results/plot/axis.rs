@@ -44,6 +44,10 @@ pub fn quantity(value: f64, unit: &str) -> String {
     );
     let (factor, name) = if prefixed { prefix(value) } else { (1.0, "") };
     let scaled = value / factor;
+    if prefixed && scaled != 0.0 && scaled.abs() < 0.1 {
+        // far below the last prefix: rounding, as a rule, and legible as what it is
+        return format!("{value:.1e} {unit}");
+    }
     let digits = if scaled == 0.0 { 0 } else { (3 - scaled.abs().log10().floor() as i32).clamp(0, 9) as usize };
     format!("{scaled:.digits$} {name}{unit}").trim_end().to_owned()
 }

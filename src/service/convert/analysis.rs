@@ -148,5 +148,6 @@ pub fn transient_from_wire(
         counters: Counters { steps, rejected, factorizations, solves, forces, iterations },
         unknowns: size(unknowns),
         events: events.into_iter().map(event).collect(),
+        warnings: Vec::new(),
     }
 }

@@ -63,7 +63,7 @@ impl Equilibrium {
                     }
                 }
                 if damping > 1e6 / LEAST_DAMPING * least.max(1e-300) {
-                    return Err(self.lost(system, s, done.iterations));
+                    return Err(self.lost(system, s, done.iterations, q));
                 }
                 tried += 1;
                 damping = if damping == 0.0 { least.max(0.1 * needed) } else { 3.0 * damping };
@@ -82,7 +82,7 @@ impl Equilibrium {
             needed = damping;
             damping = if damping <= least { 0.0 } else { damping / 4.0 };
         }
-        Err(self.lost(system, s, done.iterations))
+        Err(self.lost(system, s, done.iterations, q))
     }
 
     /// True when `step` leads from `q`, at the potential `height`, down; that becomes the height there. What is too short to

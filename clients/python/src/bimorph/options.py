@@ -39,6 +39,15 @@ class Options(TypedDict, total=False):
     rotary_inertia: bool | None
     """Rotary inertia of the sections of beams; SUGAR leaves it out."""
 
+    imperfection: float | None
+    """Imperfection: the structure is made in the shape of its lowest mode, the largest displacement being this
+    share of the drawing's size; negative: to the other side. Lets what is compressed beyond buckling take a
+    branch. Range: -0.1 to 0.1; default: none: as drawn."""
+
+    as_sugar: bool | None
+    """As SUGAR 2 computes, in one switch: linear, beams that meet in points (junctions=centreline), modes about
+    the drawing whatever stress, heat and voltages are."""
+
     formulation: Literal["auto", "compliant", "rcr", "rcr-elastic"] | None
     """How bodies become equations. compliant: every body's own coordinates; rcr: joint coordinates on a tree,
     loops closed inside the recursion; rcr-elastic: the same, and beams' joints stay elastic with every method;
@@ -55,6 +64,8 @@ WIRE = {
     "segments": "segments",
     "shear": "shear",
     "rotary_inertia": "rotary_inertia",
+    "imperfection": "imperfection",
+    "as_sugar": "as_sugar",
     "formulation": "formulation",
 }
 """Field on the wire of each option."""
