@@ -5,6 +5,7 @@ use super::convert::sweep::row_to_wire;
 use super::rpc::Shared;
 use super::shutdown::Shutdown;
 use super::sweeps::Sweep;
+use super::turns::Place;
 use super::{proto, status};
 use crate::analysis::AnalysisError;
 use crate::analysis::transient::{TransientOptions, TransientResult, transient};
@@ -35,7 +36,7 @@ pub(super) struct Outlet<T> {
     shared: Arc<Shared>,
     runtime: Handle,
     /// Where the computation runs; given back while a reader is slow, so that others go on.
-    place: Option<OwnedSemaphorePermit>,
+    place: Option<Place>,
     pub(super) open: bool,
 }
 
@@ -47,7 +48,7 @@ impl<T> Outlet<T> {
     }
 
     /// The same for a computation that takes a place.
-    pub(super) fn with_place(self, place: OwnedSemaphorePermit) -> Self {
+    pub(super) fn with_place(self, place: Place) -> Self {
         Self { place: Some(place), ..self }
     }
 
@@ -62,7 +63,7 @@ impl<T> Outlet<T> {
                 return;
             }
         };
-        let computes = self.place.take().is_some();
+        let client = self.place.take().map(|place| place.client());
         self.open = self.open
             && self.runtime.block_on(async {
                 tokio::select! {
@@ -70,10 +71,10 @@ impl<T> Outlet<T> {
                     () = shared.shutdown.ending.cancelled() => false,
                 }
             });
-        if computes && self.open {
+        if let Some(client) = client.filter(|_| self.open) {
             self.place = self.runtime.block_on(async {
                 tokio::select! {
-                    place = shared.work.again() => place,
+                    place = shared.work.again(client) => place,
                     () = sender.closed() => None,
                 }
             });

@@ -29,9 +29,12 @@ enum Socket {
     Unix(UnixStream),
 }
 
+static NUMBERS: AtomicU64 = AtomicU64::new(1);
+
 /// What is known of a connection from outside.
 #[derive(Debug)]
 pub(super) struct Presence {
+    number: u64,
     opened: Instant,
     /// Calls under way.
     calls: AtomicUsize,
@@ -44,12 +47,18 @@ pub(super) struct Presence {
 impl Presence {
     fn new(cut: &CancellationToken) -> Arc<Self> {
         Arc::new(Self {
+            number: NUMBERS.fetch_add(1, Ordering::Relaxed),
             opened: Instant::now(),
             calls: AtomicUsize::new(0),
             used_ms: AtomicU64::new(0),
             greeted: AtomicBool::new(false),
             cut: cut.child_token(),
         })
+    }
+
+    /// Tells connections apart; never 0.
+    pub(super) fn number(&self) -> u64 {
+        self.number
     }
 
     /// A call begins.

@@ -8,6 +8,7 @@
 use super::connection::Presence;
 use super::limits::Limits;
 use super::status;
+use super::turns::CLIENT;
 use http_body::{Frame, SizeHint};
 use std::convert::Infallible;
 use std::future::Future;
@@ -130,10 +131,11 @@ where
             Err(status) => return Box::pin(std::future::ready(Ok(status.into_http()))),
         };
         let stream = STREAMS.iter().any(|name| request.uri().path().ends_with(name));
+        let client = call.presence.as_ref().map_or(0, |presence| presence.number());
         let received = Arc::clone(&call);
         let request = request
             .map(|body| Body::new(Received { body, call: received, framing: Framing::default(), stream, pause: None }));
-        let answer = self.service.call(request);
+        let answer = CLIENT.scope(client, self.service.call(request));
         Box::pin(async move { Ok(answer.await?.map(|body| Body::new(Answering { body, _call: call }))) })
     }
 }

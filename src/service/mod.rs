@@ -3,10 +3,10 @@
 //! # Layout
 //! [`proto`] is what travels and [`convert`] the only place that knows both it and the library's own types. [`client`]
 //! is built with the feature `remote` alone. The rest is the feature `server`: [`server`] listens and stops
-//! (`sockets`, `connection`, `shutdown`), `intake` counts what comes in, `rpc` answers calls, `stream` is the Newton loop, `models`, `sessions` and
-//! `sweeps` keep what clients can name, `snapshots` puts sessions into bytes, `work` computes, `chunks` sends what is long, `status` says what went wrong,
-//! [`log`] says it without waiting, `ids` makes names that nobody guesses,
-//! and [`limits`] is what clients may ask for.
+//! (`sockets`, `connection`, `shutdown`), `intake` counts what comes in, `rpc` answers calls, `stream` is the Newton loop,
+//! `models`, `sessions` and `sweeps` keep what clients can name, under `ids` that nobody guesses, `snapshots` puts sessions
+//! into bytes, `work` computes, in the `turns` of clients, `chunks` sends what is long, `status` says what went wrong, [`log`]
+//! says it without waiting, and [`limits`] is what clients may ask for.
 
 pub mod address;
 pub mod client;
@@ -45,5 +45,7 @@ mod status;
 mod stream;
 #[cfg(feature = "server")]
 mod sweeps;
+#[cfg(feature = "server")]
+mod turns;
 #[cfg(feature = "server")]
 mod work;

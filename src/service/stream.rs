@@ -7,6 +7,7 @@
 
 use super::rpc::Shared;
 use super::sessions::{Question, Session, refused};
+use super::turns::{CLIENT, client};
 use super::{proto, status};
 use crate::budget::Budget;
 use crate::device::Token;
@@ -33,12 +34,13 @@ pub(super) struct TrialStream {
     owned: bool,
     running: Option<Pin<Box<dyn Future<Output = Option<ReplyKind>> + Send>>>,
     finished: bool,
+    client: u64,
 }
 
 impl TrialStream {
     pub(super) fn new(shared: Arc<Shared>, requests: Streaming<proto::DeviceRequest>) -> Self {
         let ending = Box::pin(shared.shutdown.ending.clone().cancelled_owned());
-        Self { shared, requests, ending, session: None, owned: false, running: None, finished: false }
+        Self { shared, requests, ending, session: None, owned: false, running: None, finished: false, client: client() }
     }
 
     /// Starts on a request: a reply at once, none (an accept), or a thread in `running`.
@@ -65,7 +67,8 @@ impl TrialStream {
         if let Ok(reply) = session.answer_at_once(&question) {
             return reply;
         }
-        self.running = Some(Box::pin(later(Arc::clone(&self.shared), Arc::clone(session), question)));
+        let later = later(Arc::clone(&self.shared), Arc::clone(session), question);
+        self.running = Some(Box::pin(CLIENT.scope(self.client, later)));
         None
     }
 

@@ -3,19 +3,19 @@
 use super::limits::Limits;
 use super::shutdown::Shutdown;
 use super::status;
+use super::turns::{Place, Turns, client};
 use crate::budget::{self, Allowance, Budget, Stopped};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::pin::Pin;
 use std::sync::Arc;
 use std::task::{Context, Poll};
 use std::time::{Duration, Instant};
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio_stream::Stream;
 use tonic::Status;
 
 /// Places for computations.
 pub(super) struct Work {
-    places: Arc<Semaphore>,
+    places: Arc<Turns>,
     timeout: Duration,
     allowance: Allowance,
     shutdown: Shutdown,
@@ -24,23 +24,23 @@ pub(super) struct Work {
 impl Work {
     /// At most `places` at once, each answered within the limit of a unary call.
     pub(super) fn new(places: usize, limits: &Limits, shutdown: Shutdown) -> Self {
-        let places = Arc::new(Semaphore::new(places.max(1)));
+        let places = Turns::new(places);
         Self { places, timeout: limits.request_timeout, allowance: allowance(limits), shutdown }
     }
 
-    /// Waits for a place.
-    pub(super) async fn place(&self) -> Result<OwnedSemaphorePermit, Status> {
+    /// Waits for a place, in the turn of the client at hand.
+    pub(super) async fn place(&self) -> Result<Place, Status> {
         tokio::select! {
-            place = Arc::clone(&self.places).acquire_owned() => place.map_err(|_| status::stopping()),
+            place = self.places.place(client()) => Ok(place),
             () = tokio::time::sleep(self.timeout) => Err(self.late("waiting for its turn")),
             () = self.shutdown.ending.cancelled() => Err(status::stopping()),
         }
     }
 
     /// Waits for a place as long as it takes, for a computation that gave its own back; none when the server stops.
-    pub(super) async fn again(&self) -> Option<OwnedSemaphorePermit> {
+    pub(super) async fn again(&self, client: u64) -> Option<Place> {
         tokio::select! {
-            place = Arc::clone(&self.places).acquire_owned() => place.ok(),
+            place = self.places.place(client) => Some(place),
             () = self.shutdown.ending.cancelled() => None,
         }
     }

@@ -59,12 +59,15 @@ pub fn modes_to_wire(result: &ModesResult) -> proto::ModesResponse {
         shapes: result.shapes.iter().map(shape).collect(),
         unknowns: result.unknowns as u64,
         errors: result.errors.iter().map(|e| e.unwrap_or(f64::NAN)).collect(),
+        deflection_m: result.deflection_m,
+        warnings: result.warnings.clone(),
     }
 }
 
 /// Modes back.
 pub fn modes_from_wire(wire: proto::ModesResponse) -> ModesResult {
-    let proto::ModesResponse { frequencies_hz, residuals, nodes, shapes, unknowns, errors } = wire;
+    let proto::ModesResponse { frequencies_hz, residuals, nodes, shapes, unknowns, errors, deflection_m, warnings } =
+        wire;
     let shape = |s: proto::Shape| {
         let motions = s.x.iter().zip(&s.y).zip(&s.rz).map(|((&x, &y), &rz)| NodeMotion { x, y, rz });
         nodes.iter().cloned().zip(motions).collect()
@@ -73,8 +76,7 @@ pub fn modes_from_wire(wire: proto::ModesResponse) -> ModesResult {
     // a server that sends no estimates, or none for a mode
     let mut errors: Vec<_> = errors.into_iter().map(|e| e.is_finite().then_some(e)).collect();
     errors.resize(frequencies_hz.len(), None);
-    let (unknowns, warnings) = (size(unknowns), Vec::new());
-    ModesResult { frequencies_hz, shapes, residuals, errors, unknowns, deflection_m: 0.0, warnings }
+    ModesResult { frequencies_hz, shapes, residuals, errors, unknowns: size(unknowns), deflection_m, warnings }
 }
 
 /// Pull-in as it travels.

@@ -179,6 +179,7 @@ class Model:
             shapes,
             answer.unknowns,
             [None if math.isnan(e) else e for e in answer.errors],
+            tuple(answer.warnings),
         )
 
     def pull_in(self, max_v: float, port: str = "") -> PullInResult:

@@ -51,6 +51,8 @@ class ModesResult:
     """Mechanical unknowns."""
     errors: list[float | None]
     """Estimated relative error of each frequency by the number of segments [1], signed; None where there is none."""
+    warnings: tuple[str, ...] = ()
+    """What the numbers do not say by themselves."""
 
 
 @dataclass(frozen=True)
