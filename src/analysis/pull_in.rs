@@ -131,7 +131,6 @@ impl Sweep<'_> {
 
     /// From 0 V up to pull-in, and to what holds the part beyond.
     fn close(&mut self, mut q: Vec<Pose>, max: f64) -> Result<Closed, AnalysisError> {
-        let open = self.touching(&q);
         let unit = self.unit(&q, max)?;
         let mut from = 0.0;
         for _ in 0..MOST_FOLDS {
@@ -146,14 +145,14 @@ impl Sweep<'_> {
             let beyond = fold * (1.0 + PAST);
             match self.fall(&mut q, beyond) {
                 // nothing here could ever hold the part
-                Err(_) if open.iter().enumerate().all(|(g, _)| self.system.touching(g).is_none()) => {
+                Err(_) if (0..self.system.gaps.len()).all(|g| self.system.touching(g).is_none()) => {
                     return Ok(Closed::Falls { volts: fold });
                 }
                 fallen => fallen?,
             }
             within_contact_range(self.compiled, &q)?;
-            let system = self.system;
-            let apart = |q: &[Pose]| (0..open.len()).all(|g| open[g] || !system.touches(g, q));
+            let (system, touched) = (self.system, self.touching(&before));
+            let apart = |q: &[Pose]| (0..touched.len()).all(|g| touched[g] || !system.touches(g, q));
             if !apart(&q) {
                 let lost = traced.end != PathEnd::Unstable;
                 let fold = if lost { self.sharpen(&before, fold, beyond, apart) } else { fold };
@@ -184,8 +183,9 @@ impl Sweep<'_> {
             let traced = self.trace(&q, volts, 0.0, 1.0)?;
             let at = |s: f64| volts * (1.0 - s);
             if let Some(k) = traced.points.iter().position(|p| free(&p.q)) {
-                // contact was lost without a fold
-                return Ok(Some(at(traced.points[k.saturating_sub(1)].s)));
+                // contact is lost without a fold
+                let (before, after) = (&traced.points[k.saturating_sub(1)], &traced.points[k]);
+                return Ok(Some(self.sharpen(&before.q, at(before.s), at(after.s), |q| !free(q))));
             }
             if traced.end == PathEnd::Arrived {
                 return Ok(None);
@@ -207,8 +207,8 @@ impl Sweep<'_> {
         })
     }
 
-    /// The voltage at which a branch ends that was lost at `holds` in a fold too sharp for its steps: by bisection between there
-    /// and `falls`, on whether the part, let fall from its last equilibrium `q`, is `kept`.
+    /// The voltage at which contact begins or ends where no fold was found, between `holds` and `falls`: by bisection on whether
+    /// the part, let fall from its equilibrium `q` at `holds`, is `kept`.
     fn sharpen(&mut self, q: &[Pose], mut holds: f64, mut falls: f64, kept: impl Fn(&[Pose]) -> bool) -> f64 {
         for _ in 0..BISECTIONS {
             let (middle, mut there) = (f64::midpoint(holds, falls), q.to_vec());

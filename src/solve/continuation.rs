@@ -16,6 +16,7 @@
 
 mod branching;
 pub mod family;
+mod stepping;
 
 use super::SolveError;
 use crate::gaps::System;
@@ -249,54 +250,6 @@ impl Continuation {
         }
     }
 
-    /// One step of length `step` (shortened in place where needed), and the iterations it took.
-    fn advance(&mut self, family: &mut Blend, here: &Place, step: &mut f64) -> Option<(Place, usize)> {
-        loop {
-            if let Some((next, cost)) = self.probe(family, here, *step) {
-                let family_system = family.system();
-                let cosine = inner(family_system, &here.dq, &next.dq) + here.ds * next.ds;
-                let folded = here.ds * next.ds < 0.0;
-                let changed = here.negative.abs_diff(next.negative);
-                // one event a step, so that each is found
-                let simple = if folded { changed == 1 } else { changed <= 1 };
-                let near = self.keeps_branch(family, here, &next, *step);
-                if near && cosine >= self.options.straightness && (simple || *step < 1e-3) {
-                    return Some((next, cost));
-                }
-            }
-            *step *= 0.5;
-            if *step < self.options.smallest {
-                return None;
-            }
-        }
-    }
-
-    /// True when a step stayed on its branch: it closed or opened no gap by much, and ends near where the tangent led.
-    fn keeps_branch(&self, family: &Blend, here: &Place, next: &Place, step: f64) -> bool {
-        let system = family.system();
-        let leap = (0..system.gaps.len()).filter(|&g| system.touching(g).is_some()).any(|g| {
-            let (a, b) = (system.room(g, &here.q), system.room(g, &next.q));
-            (a - b).abs() > self.options.closing * a.min(b)
-        });
-        let off = next.q.iter().zip(&here.q).zip(&here.dq).map(|((a, b), dq)| a - b - dq * step);
-        let off: f64 = off.map(|x| dot(system, &x, &x)).sum::<f64>() / here.q.len() as f64;
-        let aside = (off + (next.s - here.s - here.ds * step).powi(2)).sqrt();
-        !leap && aside <= self.options.aside * step
-    }
-
-    /// The point at arc length `distance` from `here`, with its tangent.
-    fn probe(&mut self, family: &mut Blend, here: &Place, distance: f64) -> Option<(Place, usize)> {
-        let mut guess = here.clone();
-        for (q, dq) in guess.q.iter_mut().zip(&here.dq) {
-            *q += dq * distance;
-        }
-        guess.s += distance * here.ds;
-        let plane = Plane { from: here, dq: &here.dq, ds: here.ds, distance };
-        let (mut next, cost) = self.correct(family, &plane, guess).ok()?;
-        self.turn(family, &mut next, here);
-        Some((next, cost))
-    }
-
     /// Newton across a plane. Leaves the factored tangent of the last iterate. The error is a vanished pivot, or none where
     /// the iteration did not settle.
     fn correct(
@@ -307,6 +260,7 @@ impl Continuation {
     ) -> Result<(Place, usize), Option<ZeroPivot>> {
         let mut last = f64::INFINITY;
         for count in 1..=self.options.iterations {
+            crate::budget::check();
             self.iterations += 1;
             at.negative = self.linearize(family, &at)?;
             let system = family.system();
