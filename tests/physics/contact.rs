@@ -124,7 +124,7 @@ fn beyond_the_law_there_is_no_number() {
 /// cantilever (SUGAR's demo beamgap2e), a clamped-clamped beam over four pieces of an electrode.
 fn random_part(case: usize, random: &mut Numbers) -> Compiled {
     let gap = random.between(1e-6, 4e-6);
-    if case % 4 == 0 {
+    if case.is_multiple_of(4) {
         return plate(random.between(0.1, 10.0), random.between(1e-9, 1e-7), gap);
     }
     let (l, w) = (random.between(60e-6, 200e-6), random.between(1e-6, 3e-6));
