@@ -26,7 +26,7 @@ pub struct Compiled {
     pub options: CompileOptions,
     /// Bodies, joints, gaps and electrics, and where the drawing's parts went.
     pub parts: Discretized,
-    /// Segments of each beam, and the error estimated for them where a band was given.
+    /// Segments of each beam, and the error estimated for them where a band was given or an analysis chose them.
     pub order: ModelOrder,
     /// The system in joint coordinates where the formulation has them; or why they cannot be had.
     pub joints: Option<Result<Arc<Joints>, Unfit>>,
@@ -39,6 +39,23 @@ impl Compiled {
             Some(Ok(joints)) => joints.tree.coordinates,
             _ => self.parts.system.model.unknowns(),
         }
+    }
+
+    /// The same drawing on another mesh.
+    ///
+    /// # Errors
+    /// See [`DiscretizeError`].
+    pub fn with_order(&self, order: ModelOrder) -> Result<Self, DiscretizeError> {
+        let parts = laid_out(&self.structure, &self.options, &order.segments)?;
+        Ok(Self {
+            structure: self.structure.clone(),
+            parameters: self.parameters.clone(),
+            warnings: self.warnings.clone(),
+            options: self.options.clone(),
+            joints: in_joints_of(&parts, &self.options),
+            parts,
+            order,
+        })
     }
 }
 
@@ -78,12 +95,8 @@ pub fn compile(bundle: &Bundle, options: &CompileOptions) -> Result<Compiled, Co
         }
     };
     let parts = laid_out(&loaded.structure, options, &order.segments)?;
-    let joints = match options.formulation {
-        Formulation::Rcr | Formulation::RcrElastic => Some(Joints::elastic(&parts.system).map(Arc::new)),
-        _ => None,
-    };
     Ok(Compiled {
-        joints,
+        joints: in_joints_of(&parts, options),
         structure: loaded.structure,
         parameters: loaded.parameters,
         warnings: loaded.warnings,
@@ -104,6 +117,14 @@ fn laid_out(
         imperfection::apply(&mut parts, share * structure.extent());
     }
     Ok(parts)
+}
+
+/// The system in joint coordinates, where the formulation has them.
+fn in_joints_of(parts: &Discretized, options: &CompileOptions) -> Option<Result<Arc<Joints>, Unfit>> {
+    match options.formulation {
+        Formulation::Rcr | Formulation::RcrElastic => Some(Joints::elastic(&parts.system).map(Arc::new)),
+        _ => None,
+    }
 }
 
 #[cfg(test)]

@@ -66,6 +66,7 @@ pub fn frame_statics(
         jumped: false,
         free_motions: Vec::new(),
         unknowns: frame.system.unknowns(),
+        estimated_error: None,
         iterations: 1,
     };
     Ok((result, beam_motions(frame, &q)))
@@ -192,6 +193,7 @@ pub fn frame_transient(
         signals,
         counters,
         unknowns: frame.system.unknowns(),
+        estimated_error: None,
         events: Vec::new(),
         warnings: Vec::new(),
     })

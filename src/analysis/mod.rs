@@ -8,6 +8,7 @@ pub mod formulation;
 pub mod frame;
 pub mod integrator;
 pub mod joint_transient;
+pub mod mesh;
 pub mod modes;
 pub mod pull_in;
 pub mod signal;

@@ -42,6 +42,9 @@ pub struct PullInResult {
     pub release_v: Option<f64>,
     /// False when nothing holds the part after pull-in: no gap closes on contact.
     pub held: bool,
+    /// Largest estimated relative error by the mesh [1]; none without an estimate.
+    #[serde(skip)]
+    pub estimated_error: Option<f64>,
 }
 
 /// Follows the equilibrium up to `max` volts on `port` (none: the first port, else the first source of the netlist), then
@@ -63,14 +66,17 @@ pub fn pull_in(compiled: &Compiled, port: Option<&str>, max: f64) -> Result<Pull
     let mut sweep =
         Sweep { compiled, system, off, source, equilibrium: Equilibrium::new(system, EquilibriumOptions::default()) };
     let name = system.electrics.names[source].clone();
+    let estimated_error = compiled.order.estimated_error;
     let q = sweep.at_rest()?;
     let touching = sweep.touching(&q);
     match sweep.close(q, max)? {
-        Closed::Falls { volts } => Ok(PullInResult { port: name, pull_in_v: volts, release_v: None, held: false }),
+        Closed::Falls { volts } => {
+            Ok(PullInResult { port: name, pull_in_v: volts, release_v: None, held: false, estimated_error })
+        }
         Closed::Rests { fold, volts, q } => {
             let made: Vec<usize> = (0..touching.len()).filter(|&g| !touching[g] && system.touches(g, &q)).collect();
             let release_v = sweep.release(q, volts, &made)?;
-            Ok(PullInResult { port: name, pull_in_v: fold, release_v, held: true })
+            Ok(PullInResult { port: name, pull_in_v: fold, release_v, held: true, estimated_error })
         }
     }
 }

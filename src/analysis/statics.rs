@@ -39,6 +39,8 @@ pub struct StaticResult {
     pub free_motions: Vec<String>,
     /// Mechanical unknowns.
     pub unknowns: usize,
+    /// Largest estimated relative error by the mesh [1]; none without an estimate.
+    pub estimated_error: Option<f64>,
     /// Newton iterations over all load steps.
     pub iterations: usize,
 }
@@ -81,6 +83,7 @@ pub fn static_with_curves(
         jumped,
         free_motions: point.free_motions,
         unknowns: system.model.unknowns(),
+        estimated_error: compiled.order.estimated_error,
         iterations: point.path.iterations,
     };
     Ok((result, curves))
@@ -121,16 +124,54 @@ pub(crate) struct OperatingPoint {
     pub(crate) free_motions: Vec<String>,
 }
 
+impl OperatingPoint {
+    /// At rest as drawn and cold, with the voltages on: where a run begins.
+    pub(crate) fn rest(compiled: &Compiled, voltages: &PortVoltages) -> Result<Self, AnalysisError> {
+        let system = &compiled.parts.system;
+        let electrics = &system.electrics;
+        let sources = source_vector(compiled, voltages)?;
+        let rise = vec![0.0; electrics.heating.heaters.len()];
+        let mut drive = electrics.drive();
+        electrics.apply(&sources, &rise, &mut drive);
+        let q = vec![Pose::zeros(); system.bodies()];
+        Ok(Self { q, sources, rise, volts: drive.volts, path: Path::default(), free_motions: Vec::new() })
+    }
+}
+
 /// The equilibrium reached from rest.
 pub(crate) fn operating_point(compiled: &Compiled, voltages: &PortVoltages) -> Result<OperatingPoint, AnalysisError> {
-    let system = &compiled.parts.system;
-    let electrics = &system.electrics;
     let sources = source_vector(compiled, voltages)?;
     let rest = vec![0.0; sources.len()];
-    let mut q = vec![Pose::zeros(); system.bodies()];
+    let q = vec![Pose::zeros(); compiled.parts.system.bodies()];
+    settle(compiled, q, sources, &rest, [0.0, 1.0])
+}
+
+/// The equilibrium next to `q`; that reached from rest where there is none.
+pub(crate) fn operating_point_near(
+    compiled: &Compiled,
+    voltages: &PortVoltages,
+    q: Vec<Pose>,
+) -> Result<OperatingPoint, AnalysisError> {
+    let sources = source_vector(compiled, voltages)?;
+    match settle(compiled, q, sources.clone(), &sources, [1.0, 1.0]) {
+        Ok(point) if point.path.fold.is_none() => Ok(point),
+        _ => operating_point(compiled, voltages),
+    }
+}
+
+/// Follows the path of sources from `from` to `sources` and of the loads' share, beginning at `q`.
+fn settle(
+    compiled: &Compiled,
+    mut q: Vec<Pose>,
+    sources: Vec<f64>,
+    from: &[f64],
+    loads: [f64; 2],
+) -> Result<OperatingPoint, AnalysisError> {
+    let system = &compiled.parts.system;
+    let electrics = &system.electrics;
     let mut solver = Equilibrium::new(system, EquilibriumOptions::default());
-    let loads = SourcePath::new(electrics, &rest, &sources, [0.0, 1.0]);
-    let path = solver.follow(system, &loads, &mut q).map_err(AnalysisError::from)?;
+    let path = SourcePath::new(electrics, from, &sources, loads);
+    let path = solver.follow(system, &path, &mut q).map_err(AnalysisError::from)?;
     // a part that hangs on nothing is a slip of the pen, also where no load finds out; one that hangs on so little that
     // rounding hides it is not
     if let Some(&loose) = solver.held().iter().find(|p| !system.model.grounded(p.body)) {

@@ -108,6 +108,8 @@ pub struct TransientResult {
     pub counters: Counters,
     /// Mechanical unknowns.
     pub unknowns: usize,
+    /// Largest estimated relative error by the mesh [1]; none without an estimate.
+    pub estimated_error: Option<f64>,
     /// Crossings asked for and contacts of gaps, in order of time.
     pub events: Vec<Event>,
     /// What the numbers do not say by themselves.
@@ -233,6 +235,7 @@ pub(super) fn record(
             .collect(),
         counters: Counters::default(),
         unknowns: compiled.unknowns(),
+        estimated_error: compiled.order.estimated_error,
         events: Vec::new(),
         warnings: Vec::new(),
     };

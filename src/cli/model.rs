@@ -83,6 +83,15 @@ impl ModelArgs {
     }
 }
 
+/// Shows what the mesh has added to the warnings of a model on standard error.
+pub(crate) fn warn_of_mesh(before: &Compiled, fitted: &Compiled) {
+    let mut added = fitted.warnings.clone();
+    added.items.drain(..before.warnings.items.len().min(added.items.len()));
+    if !added.items.is_empty() {
+        eprint!("{}", added.render(io::stderr().is_terminal()));
+    }
+}
+
 /// Shows the warnings of a netlist on standard error.
 pub(crate) fn warn(compiled: &Compiled) {
     if !compiled.warnings.items.is_empty() {
@@ -100,7 +109,7 @@ pub(crate) struct Context<'a> {
     /// Every option, under its name on the wire.
     #[serde(flatten)]
     options: Keys<'a>,
-    /// Largest estimated relative error of a frequency within the band; null without one.
+    /// Largest estimated relative error by the mesh, of what was asked for; null without an estimate.
     estimated_error: Option<f64>,
     /// Warnings of the netlist.
     warnings: Vec<&'a str>,

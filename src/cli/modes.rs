@@ -1,12 +1,13 @@
 //! `bimorph modes`: how it rings.
 
 use super::failure::Failure;
-use super::model::{Context, ModelArgs, Named, warn_of};
+use super::model::{Context, ModelArgs, Named, warn_of, warn_of_mesh};
 use super::output::OutputArgs;
 use super::solver::ModelChoice;
 use super::{progress, report, statics, value};
 use bimorph::analysis::BeamMotions;
 use bimorph::analysis::frame::{frame, frame_modes};
+use bimorph::analysis::mesh::{Request, fitted};
 use bimorph::analysis::modes::{ModesResult, modes_with_curves};
 use bimorph::analysis::statics::NodeMotion;
 use bimorph::compile::Compiled;
@@ -77,14 +78,20 @@ impl Modes {
             ModelChoice::Frame => self.model.compile_frame()?,
         };
         let busy = progress::spinner("modes");
-        let result = match self.solver {
-            ModelChoice::Recursion => modes_with_curves(&compiled, self.count, &self.ports),
-            ModelChoice::Frame => {
-                frame(&compiled).and_then(|frame| frame_modes(&compiled, &frame, self.count, &self.ports))
-            }
+        let drawn = compiled;
+        let fitted = match self.solver {
+            ModelChoice::Recursion => fitted(&drawn, &Request::Modes { count: self.count, voltages: &self.ports }),
+            ModelChoice::Frame => Ok(drawn.clone()),
         };
+        let result = fitted.and_then(|compiled| match self.solver {
+            ModelChoice::Recursion => modes_with_curves(&compiled, self.count, &self.ports).map(|r| (compiled, r)),
+            ModelChoice::Frame => frame(&compiled)
+                .and_then(|frame| frame_modes(&compiled, &frame, self.count, &self.ports))
+                .map(|r| (compiled, r)),
+        });
         busy.finish_and_clear();
-        let (result, curves) = result?;
+        let (compiled, (result, curves)) = result?;
+        warn_of_mesh(&drawn, &compiled);
         warn_of(&result.warnings);
         let document = Document {
             frequencies_hz: &result.frequencies_hz,

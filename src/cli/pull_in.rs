@@ -1,9 +1,10 @@
 //! `bimorph pullin`: where the gap closes, and where it opens again.
 
 use super::failure::Failure;
-use super::model::{Context, ModelArgs};
+use super::model::{Context, ModelArgs, warn_of_mesh};
 use super::output::OutputArgs;
 use super::{progress, report, value};
+use bimorph::analysis::mesh::{Request, fitted};
 use bimorph::analysis::pull_in::{PullInResult, pull_in};
 use bimorph::options::Value;
 use bimorph::options::analysis::PULL_IN_MAX;
@@ -54,9 +55,13 @@ impl Pullin {
         PULL_IN_MAX.check(&Value::Number(self.max))?;
         let compiled = self.model.compile()?;
         let busy = progress::spinner("pull-in");
-        let result = pull_in(&compiled, self.source.as_deref(), self.max);
+        let drawn = compiled;
+        let request = Request::PullIn { port: self.source.as_deref(), max: self.max };
+        let result = fitted(&drawn, &request)
+            .and_then(|compiled| pull_in(&compiled, self.source.as_deref(), self.max).map(|r| (compiled, r)));
         busy.finish_and_clear();
-        let result = result?;
+        let (compiled, result) = result?;
+        warn_of_mesh(&drawn, &compiled);
         let none = if result.held { "none: it stays closed" } else { "none: nothing holds the part beyond pull-in" };
         let release = result.release_v.map_or(none.to_owned(), |v| quantity(v, "V"));
         let text = format!(

@@ -1,13 +1,14 @@
 //! `bimorph static`: where it rests.
 
 use super::failure::Failure;
-use super::model::{Context, ModelArgs, Named};
+use super::model::{Context, ModelArgs, Named, warn_of_mesh};
 use super::output::OutputArgs;
 use super::solver::ModelChoice;
 use super::{progress, report, value};
 use bimorph::analysis::BeamMotions;
 use bimorph::analysis::backbending::backbend;
 use bimorph::analysis::frame::{frame, frame_statics};
+use bimorph::analysis::mesh::{Request, fitted};
 use bimorph::analysis::statics::{NodeMotion, StaticResult, static_with_curves};
 use bimorph::compile::Compiled;
 use bimorph::results::plot::axis::quantity;
@@ -86,12 +87,20 @@ impl Static {
             (compiled, permanent_strains) = (bent.compiled, bent.strains);
         }
         let busy = progress::spinner("static equilibrium");
-        let result = match self.solver {
-            ModelChoice::Recursion => static_with_curves(&compiled, &self.ports),
-            ModelChoice::Frame => frame(&compiled).and_then(|frame| frame_statics(&compiled, &frame, &self.ports)),
+        let drawn = compiled;
+        let fitted = match self.solver {
+            ModelChoice::Recursion => fitted(&drawn, &Request::Static { voltages: &self.ports }),
+            ModelChoice::Frame => Ok(drawn.clone()),
         };
+        let result = fitted.and_then(|compiled| match self.solver {
+            ModelChoice::Recursion => static_with_curves(&compiled, &self.ports).map(|r| (compiled, r)),
+            ModelChoice::Frame => {
+                frame(&compiled).and_then(|frame| frame_statics(&compiled, &frame, &self.ports)).map(|r| (compiled, r))
+            }
+        });
         busy.finish_and_clear();
-        let (result, curves) = result?;
+        let (compiled, (result, curves)) = result?;
+        warn_of_mesh(&drawn, &compiled);
         let document = Document {
             nodes: Named(&result.nodes),
             temperatures_k: Named(&result.temperatures_k),

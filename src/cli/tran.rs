@@ -1,7 +1,7 @@
 //! `bimorph tran`: motion in time.
 
 use super::failure::Failure;
-use super::model::{Context, ModelArgs, Named, warn_of};
+use super::model::{Context, ModelArgs, Named, warn_of, warn_of_mesh};
 use super::output::OutputArgs;
 use super::solver::SolverChoice;
 use super::{draw_motion, progress, report, value};
@@ -9,6 +9,7 @@ use bimorph::analysis::chart::released;
 use bimorph::analysis::frame::{frame, frame_transient};
 use bimorph::analysis::integrator::Integrator;
 use bimorph::analysis::joint_transient::{JointReport, joint_transient};
+use bimorph::analysis::mesh::fitted_in_time;
 use bimorph::analysis::transient::{Counters, Event, TransientOptions, TransientResult, transient};
 use bimorph::compile::Compiled;
 use bimorph::multibody::relative::Unfit;
@@ -145,8 +146,24 @@ impl Tran {
             Some(name) => Some(released(&self.model.bundle()?, &initial, name)?),
             None => None,
         };
-        let compiled = released.as_ref().unwrap_or(&initial);
-        let method = self.integrator(compiled)?;
+        let drawn = released.as_ref().unwrap_or(&initial);
+        let method = self.integrator(drawn)?;
+        let run = TransientOptions {
+            stop: self.stop,
+            voltages: self.ports.clone(),
+            release: released.as_ref().map(|_| &initial),
+            method,
+            ..TransientOptions::default()
+        };
+        let busy = progress::spinner("mesh");
+        let fitted = match self.solver {
+            SolverChoice::Frame => Ok((drawn.clone(), run.release.cloned())),
+            _ => fitted_in_time(drawn, &run),
+        };
+        busy.finish_and_clear();
+        let (fitted, start) = fitted?;
+        warn_of_mesh(drawn, &fitted);
+        let (compiled, start) = (&fitted, start.as_ref());
         let mut signals = if self.signals.is_empty() { free_nodes(compiled) } else { value::names(&self.signals) };
         let wanted = signals.len();
         if self.draw.is_some() {
@@ -158,7 +175,7 @@ impl Tran {
             points: self.points,
             tol: compiled.options.tol,
             voltages: self.ports.clone(),
-            release: released.as_ref().map(|_| &initial),
+            release: start,
             method,
             step: self.step,
             events: self.events.clone(),
@@ -199,7 +216,7 @@ impl Tran {
             solver: self.solver,
             release: self.release.as_deref(),
             port_voltages_v: Named(&self.ports),
-            context: self.model.context(&initial).with(&result.warnings),
+            context: self.model.context(start.unwrap_or(compiled)).with(&result.warnings),
         };
         let title = self.model.title();
         self.output.finish(

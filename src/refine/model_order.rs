@@ -21,27 +21,26 @@
 //! Reference: J. O. Dow, "A Unified Approach to the Finite Element Method and Error Analysis Procedures" (1999), for
 //! refinement led by an estimate.
 
+use super::carry::carried;
+use super::groups::{Groups, MARGIN};
 use super::order_error::{OrderError, of_modes, relative, strain_shares};
 use crate::discretize::{DiscretizeError, Discretized, discretize_with, order};
 use crate::gaps::Point;
 use crate::multibody::planar::Pose;
-use crate::multibody::{BlockMatrix, BodyId, Model};
+use crate::multibody::{BlockMatrix, BodyId};
 use crate::options::CompileOptions;
 use crate::solve::subspace;
-use crate::structure::{Beam, NodeId, Structure};
+use crate::structure::{NodeId, Structure};
 use serde::Serialize;
-use std::collections::HashMap;
 
 /// Largest kh of a segment at the edge of the band.
 const LONGEST: f64 = 3.0;
-/// Share of the tolerance that predictions may use.
-const MARGIN: f64 = 0.9;
 /// Modes within the band beyond which the rule of [`order`] stands as it is.
 const MOST_MODES: usize = 64;
 /// Segments beyond which it does.
-const MOST_SEGMENTS: usize = 10_000;
+pub(super) const MOST_SEGMENTS: usize = 10_000;
 /// Models tried.
-const MOST_PASSES: usize = 12;
+const MOST_PASSES: usize = 24;
 
 /// The chosen order.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -57,12 +56,44 @@ pub struct ModelOrder {
     pub passes: usize,
 }
 
+/// What a mesh is for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Aim {
+    /// Highest frequency whose mode matters [Hz].
+    pub band: f64,
+    /// Relative error that the frequency of each mode may have [1], from the lowest; beyond the list: the option `tol`.
+    pub tolerances: Vec<f64>,
+    /// Beams whose strain does not matter become rigid.
+    pub rigid: bool,
+}
+
+impl Aim {
+    fn tolerance(&self, options: &CompileOptions, mode: usize) -> f64 {
+        self.tolerances.get(mode).copied().unwrap_or(options.tol)
+    }
+
+    /// Largest error over what is allowed for it, times the option `tol`.
+    fn worst(&self, options: &CompileOptions, relative: &[f64]) -> f64 {
+        let over = |(m, e): (usize, &f64)| e.abs() / self.tolerance(options, m);
+        options.tol * relative.iter().enumerate().map(over).fold(0.0, f64::max)
+    }
+}
+
 /// Chooses the numbers of segments for a band.
 ///
 /// # Errors
 /// See [`DiscretizeError`].
 pub fn choose(structure: &Structure, options: &CompileOptions, band: f64) -> Result<ModelOrder, DiscretizeError> {
-    let bare = mechanics(structure);
+    choose_for(structure, options, &Aim { band, tolerances: Vec::new(), rigid: true })
+}
+
+/// Chooses the numbers of segments for an aim.
+///
+/// # Errors
+/// See [`DiscretizeError`].
+pub fn choose_for(structure: &Structure, options: &CompileOptions, aim: &Aim) -> Result<ModelOrder, DiscretizeError> {
+    let (bare, band) = (mechanics(structure), aim.band);
+    let options = &CompileOptions { band: Some(band), ..options.clone() };
     let groups = Groups::new(&bare.beams);
     let floor: Vec<usize> = (bare.beams.iter())
         .map(|b| options.scheme.segments((order::waves(b, band) / LONGEST).ceil().max(1.0) as usize))
@@ -78,17 +109,17 @@ pub fn choose(structure: &Structure, options: &CompileOptions, band: f64) -> Res
     let mut seen: Option<Seen> = None;
     for passes in 1..=MOST_PASSES {
         let before = seen.as_ref().or(holds.as_ref().map(|(_, seen)| seen));
-        let now = look(&bare, options, band, &segments, before)?;
+        let now = look(&bare, options, aim, &segments, before)?;
         let Some(error) = &now.error else {
             if holds.is_some() {
                 break;
             }
             return Ok(ModelOrder { segments, estimated_error: None, modes_in_band: now.modes, passes });
         };
-        let worst = error.relative.iter().take(now.modes).fold(0.0, |m: f64, e| m.max(e.abs()));
+        let worst = aim.worst(options, &error.relative[..now.modes]);
         let order =
             ModelOrder { segments: segments.clone(), estimated_error: Some(worst), modes_in_band: now.modes, passes };
-        let mut next = groups.fewest(options, error, now.modes, &segments, &floor);
+        let mut next = predicted(options, aim, &groups, error, now.modes, (&segments, &floor));
         let total = |n: &[usize]| n.iter().sum::<usize>();
         if worst <= options.tol {
             let done = total(&next) >= total(&segments);
@@ -104,7 +135,7 @@ pub fn choose(structure: &Structure, options: &CompileOptions, band: f64) -> Res
             if holds.as_ref().is_some_and(|(h, _)| total(&next) >= total(&h.segments)) {
                 break;
             }
-            if next == segments || passes == MOST_PASSES {
+            if next == segments || passes == MOST_PASSES || total(&next) > MOST_SEGMENTS {
                 if holds.is_some() {
                     break;
                 }
@@ -115,8 +146,25 @@ pub fn choose(structure: &Structure, options: &CompileOptions, band: f64) -> Res
         segments = next;
     }
     let (mut order, elastic) = holds.ok_or(DiscretizeError::NothingMoves)?;
-    stiffen(structure, &bare, options, band, &groups, &elastic, &mut order)?;
+    if aim.rigid {
+        stiffen(structure, &bare, options, aim, &groups, &elastic, &mut order)?;
+    }
     Ok(order)
+}
+
+/// The fewest segments for which every mode is predicted to hold.
+fn predicted(
+    options: &CompileOptions,
+    aim: &Aim,
+    groups: &Groups,
+    error: &OrderError,
+    modes: usize,
+    (segments, floor): (&[usize], &[usize]),
+) -> Vec<usize> {
+    let share = |mode: usize, g: &Vec<usize>| g.iter().map(|&b| error.shares[mode][b].abs()).sum::<f64>();
+    let shares: Vec<Vec<f64>> = (0..modes).map(|m| groups.0.iter().map(|g| share(m, g)).collect()).collect();
+    let goals: Vec<f64> = (0..modes).map(|m| MARGIN * aim.tolerance(options, m)).collect();
+    groups.fewest(options, &shares, &goals, segments, floor)
 }
 
 /// Makes beams rigid where the tolerance allows.
@@ -124,7 +172,7 @@ fn stiffen(
     structure: &Structure,
     bare: &Structure,
     options: &CompileOptions,
-    band: f64,
+    aim: &Aim,
     groups: &Groups,
     elastic: &Seen,
     order: &mut ModelOrder,
@@ -172,7 +220,7 @@ fn stiffen(
         let firm = still.len() == yields.len()
             && still.iter().zip(&yields).all(|(rigid, elastic)| (rigid - elastic).abs() <= options.tol * elastic);
         if firm {
-            let now = look(bare, options, band, &segments, Some(elastic))?;
+            let now = look(bare, options, aim, &segments, Some(elastic))?;
             order.passes += 1;
             let apart = relative(&now.lambda, &error.reference);
             let worst = apart.iter().take(modes).fold(0.0, |m: f64, e| m.max(e.abs()));
@@ -257,7 +305,7 @@ struct Seen {
 }
 
 /// The drawing without what has no share in the modes of the drawn geometry.
-fn mechanics(structure: &Structure) -> Structure {
+pub(super) fn mechanics(structure: &Structure) -> Structure {
     let mut bare = Structure {
         nodes: structure.nodes.clone(),
         beams: structure.beams.clone(),
@@ -279,12 +327,12 @@ fn mechanics(structure: &Structure) -> Structure {
 fn look(
     structure: &Structure,
     options: &CompileOptions,
-    band: f64,
+    aim: &Aim,
     segments: &[usize],
     before: Option<&Seen>,
 ) -> Result<Seen, DiscretizeError> {
     let parts = discretize_with(structure, options, segments)?;
-    let (modes, lambda, shapes, error) = modes_in_band(structure, options, band, &parts, before).unwrap_or_default();
+    let (modes, lambda, shapes, error) = modes_in_band(structure, options, aim, &parts, before).unwrap_or_default();
     Ok(Seen { parts, lambda, shapes, modes, error })
 }
 
@@ -293,7 +341,7 @@ type Found = (usize, Vec<f64>, Vec<Vec<Pose>>, Option<OrderError>);
 fn modes_in_band(
     structure: &Structure,
     options: &CompileOptions,
-    band: f64,
+    aim: &Aim,
     parts: &Discretized,
     before: Option<&Seen>,
 ) -> Option<Found> {
@@ -312,7 +360,7 @@ fn modes_in_band(
         model.project_matrix(&mut a);
         a
     };
-    let edge = (std::f64::consts::TAU * band).powi(2);
+    let edge = (std::f64::consts::TAU * aim.band).powi(2);
     let modes = shifted(edge).factor(&model.pattern).ok()?.negative;
     if modes == 0 || modes > MOST_MODES {
         return None;
@@ -330,14 +378,15 @@ fn modes_in_band(
     let start = match before {
         Some(before) if before.shapes.len() >= modes => {
             let mut start: Vec<Vec<Pose>> =
-                before.shapes.iter().take(block).map(|x| carried(&before.parts, parts, x)).collect();
+                (before.shapes.iter().take(block)).map(|x| carried(structure, &before.parts, parts, x, true)).collect();
             start.extend(fresh.into_iter().skip(start.len()));
             start
         }
         _ => fresh,
     };
     // far below the errors that are to be told, which are twice as large in λ
-    let settled = (0.05 * options.tol).clamp(1e-9, 1e-3);
+    let tightest = (0..modes).map(|m| aim.tolerance(options, m)).fold(options.tol, f64::min);
+    let settled = (0.05 * tightest).clamp(1e-9, 1e-3);
     let found = subspace::iterate(model, (&factor, shift), start, modes, settled)?;
     // two more than wanted: the highest wanted one is told from its neighbours
     let some = (modes + 2).min(found.lambda.len());
@@ -348,104 +397,4 @@ fn modes_in_band(
         of_modes(structure, options, parts, (&factor, shift), &found.lambda[..some], &found.shapes[..some])
     };
     Some((modes, found.lambda, found.shapes, error))
-}
-
-/// A shape of one model over the bodies of another, linear between the points of each beam.
-fn carried(from: &Discretized, to: &Discretized, x: &[Pose]) -> Vec<Pose> {
-    let mut y = vec![Pose::zeros(); to.system.bodies()];
-    let at = |p: &Point| {
-        let pose = Model::pose(x, p.body);
-        Pose::new(pose.x - pose.z * p.arm.y, pose.y + pose.z * p.arm.x, pose.z)
-    };
-    let mut put = |p: &Point, moved: Pose| {
-        if let BodyId::Free(k) = p.body {
-            y[k] = Pose::new(moved.x + moved.z * p.arm.y, moved.y - moved.z * p.arm.x, moved.z);
-        }
-    };
-    for (from, to) in from.beams.iter().zip(&to.beams) {
-        let (last, new) = (from.len() - 1, to.len() - 1);
-        for (k, point) in to.iter().enumerate() {
-            let s = (k * last) as f64 / new as f64;
-            let first = (s as usize).min(last - 1);
-            let t = s - first as f64;
-            put(point, at(&from[first]) * (1.0 - t) + at(&from[first + 1]) * t);
-        }
-    }
-    for (from, to) in from.nodes.iter().zip(&to.nodes) {
-        if let (Some(from), Some(to)) = (from, to) {
-            put(to, at(from));
-        }
-    }
-    y
-}
-
-/// Beams that are alike.
-struct Groups(Vec<Vec<usize>>);
-
-impl Groups {
-    fn new(beams: &[Beam]) -> Self {
-        let mut known: HashMap<[i64; 5], usize> = HashMap::new();
-        let mut groups: Vec<Vec<usize>> = Vec::new();
-        for (index, beam) in beams.iter().enumerate() {
-            let m = &beam.material;
-            // alike to nine digits
-            let key = [beam.length, beam.width, beam.thickness, m.youngs_modulus, m.density]
-                .map(|x| (x.ln() * 1e9).round() as i64);
-            let group = *known.entry(key).or_insert_with(|| {
-                groups.push(Vec::new());
-                groups.len() - 1
-            });
-            groups[group].push(index);
-        }
-        Self(groups)
-    }
-
-    /// The fewest segments for which every mode is predicted to hold.
-    fn fewest(
-        &self,
-        options: &CompileOptions,
-        error: &OrderError,
-        modes: usize,
-        segments: &[usize],
-        floor: &[usize],
-    ) -> Vec<usize> {
-        let most = |beams: &[usize], of: &[usize]| beams.iter().map(|&b| of[b]).max().unwrap_or(1);
-        let now: Vec<usize> = self.0.iter().map(|g| most(g, segments)).collect();
-        let mut next: Vec<usize> = self.0.iter().map(|g| most(g, floor)).collect();
-        let share = |mode: usize, g: &[usize]| g.iter().map(|&b| error.shares[mode][b].abs()).sum::<f64>();
-        let shares: Vec<Vec<f64>> = (0..modes).map(|m| self.0.iter().map(|g| share(m, g)).collect()).collect();
-        let power = options.scheme.order();
-        let scaled = |g: usize, n: usize| (now[g] as f64 / n as f64).powi(power);
-        let goal = MARGIN * options.tol;
-        let mut sums: Vec<f64> =
-            shares.iter().map(|s| s.iter().enumerate().map(|(g, s)| s * scaled(g, next[g])).sum()).collect();
-        // a step in N of at least a fiftieth keeps long searches short
-        let step = |n: usize| options.scheme.segments(n + 1 + n / 50);
-        for _ in 0..100_000 {
-            let gain = |g: usize| {
-                let less = scaled(g, next[g]) - scaled(g, step(next[g]));
-                let bodies = (step(next[g]) - next[g]) * self.0[g].len();
-                let useful = (sums.iter().zip(&shares)).filter(|(sum, _)| **sum > goal);
-                useful.map(|(sum, s)| (s[g] * less).min(sum - goal) / sum).sum::<f64>() / bodies as f64
-            };
-            let Some((best, gained)) = (0..now.len()).map(|g| (g, gain(g))).max_by(|a, b| a.1.total_cmp(&b.1)) else {
-                break;
-            };
-            if gained <= 0.0 {
-                break;
-            }
-            let less = scaled(best, next[best]) - scaled(best, step(next[best]));
-            for (sum, s) in sums.iter_mut().zip(&shares) {
-                *sum -= s[best] * less;
-            }
-            next[best] = step(next[best]);
-        }
-        let mut counts = vec![1; segments.len()];
-        for (group, n) in self.0.iter().zip(next) {
-            for &beam in group {
-                counts[beam] = n;
-            }
-        }
-        counts
-    }
 }

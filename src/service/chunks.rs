@@ -8,6 +8,7 @@ use super::sweeps::Sweep;
 use super::turns::Place;
 use super::{proto, status};
 use crate::analysis::AnalysisError;
+use crate::analysis::mesh::fitted_in_time;
 use crate::analysis::transient::{TransientOptions, TransientResult, transient};
 use crate::compile::Compiled;
 use prost::Message;
@@ -128,7 +129,10 @@ pub(super) fn send_transient(
         }
         outlet.borrow().wanted()
     };
-    let result = transient(compiled, options, &mut sample, &mut watch);
+    let result = fitted_in_time(compiled, options).and_then(|(moving, start)| {
+        let options = TransientOptions { release: start.as_ref(), ..options.clone() };
+        transient(&moving, &options, &mut sample, &mut watch)
+    });
     let mut outlet = outlet.into_inner();
     if !pending.t.is_empty() {
         outlet.send(Ok(pending.take(progress.get())));

@@ -15,7 +15,7 @@ use super::work::{Results, Work, guarded};
 use super::{proto, status};
 use crate::analysis::integrator::Integrator;
 use crate::analysis::transient::TransientOptions;
-use crate::analysis::{modes, pull_in, statics};
+use crate::analysis::{mesh, modes, pull_in, statics};
 use crate::budget::Budget;
 use crate::compile::{CompileError, CompileOptions, compile};
 use crate::device::Token;
@@ -222,7 +222,10 @@ impl proto::bimorph_server::Bimorph for Calls {
         let request = request.into_inner();
         let voltages = voltages(request.voltages)?;
         let job = move |model: &Model| {
-            let result = statics::static_equilibrium(&model.compiled, &voltages).map_err(status::analysis)?;
+            let fitted = mesh::fitted(&model.compiled, &mesh::Request::Static { voltages: &voltages });
+            let result = fitted
+                .and_then(|compiled| statics::static_equilibrium(&compiled, &voltages))
+                .map_err(status::analysis)?;
             Ok(results::static_to_wire(&result))
         };
         self.analyse(&request.model, job).await
@@ -241,7 +244,9 @@ impl proto::bimorph_server::Bimorph for Calls {
             if work > most {
                 return Err(status::limit("mode_work", most, work));
             }
-            let result = modes::modes(&model.compiled, count, &voltages).map_err(status::analysis)?;
+            let fitted = mesh::fitted(&model.compiled, &mesh::Request::Modes { count, voltages: &voltages });
+            let result =
+                fitted.and_then(|compiled| modes::modes(&compiled, count, &voltages)).map_err(status::analysis)?;
             Ok(results::modes_to_wire(&result))
         };
         self.analyse(&request.model, job).await
@@ -253,7 +258,10 @@ impl proto::bimorph_server::Bimorph for Calls {
         convert::options::analysis(&PULL_IN_MAX, Value::Number(max)).map_err(status::violation)?;
         let port = (!request.port.is_empty()).then_some(request.port);
         let job = move |model: &Model| {
-            let result = pull_in::pull_in(&model.compiled, port.as_deref(), max).map_err(status::analysis)?;
+            let fitted = mesh::fitted(&model.compiled, &mesh::Request::PullIn { port: port.as_deref(), max });
+            let result = fitted
+                .and_then(|compiled| pull_in::pull_in(&compiled, port.as_deref(), max))
+                .map_err(status::analysis)?;
             Ok(results::pull_in_to_wire(&result))
         };
         self.analyse(&request.model, job).await

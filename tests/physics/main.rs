@@ -12,6 +12,7 @@ mod gaps;
 mod integrators;
 mod joint_integrators;
 mod junctions;
+mod mesh;
 mod motion;
 mod paths;
 mod relative;

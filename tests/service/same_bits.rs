@@ -2,6 +2,7 @@
 
 use super::running::{DEADLINE, PLATE, Running, bundle, start_with};
 use bimorph::analysis::integrator::Integrator;
+use bimorph::analysis::mesh::{Request, fitted, fitted_in_time};
 use bimorph::analysis::transient::{TransientOptions, transient};
 use bimorph::analysis::{modes::modes, pull_in::pull_in, statics::static_equilibrium};
 use bimorph::compile::{CompileOptions, Compiled, compile};
@@ -108,9 +109,13 @@ fn analyses_have_the_same_bits() {
     let model = client.compile(&bundle(), &CompileOptions::default()).expect("compiles");
     let here = compiled(&bundle());
     let volts = [("drive".to_owned(), 2.0)];
-    assert_eq!(client.statics(&model, &volts).expect("an answer"), static_equilibrium(&here, &volts).expect("one"));
-    assert_eq!(client.modes(&model, 1, &volts).expect("an answer"), modes(&here, 1, &volts).expect("one"));
-    assert_eq!(client.pull_in(&model, None, 10.0).expect("an answer"), pull_in(&here, None, 10.0).expect("one"));
+    let on = |request: Request<'_>| fitted(&here, &request).expect("a mesh");
+    let still = static_equilibrium(&on(Request::Static { voltages: &volts }), &volts).expect("one");
+    assert_eq!(client.statics(&model, &volts).expect("an answer"), still);
+    let ringing = modes(&on(Request::Modes { count: 1, voltages: &volts }), 1, &volts).expect("one");
+    assert_eq!(client.modes(&model, 1, &volts).expect("an answer"), ringing);
+    let closed = pull_in(&on(Request::PullIn { port: None, max: 10.0 }), None, 10.0).expect("one");
+    assert_eq!(client.pull_in(&model, None, 10.0).expect("an answer"), closed);
 
     let options = TransientOptions {
         stop: 2e-5,
@@ -122,7 +127,8 @@ fn analyses_have_the_same_bits() {
         events: vec![("m.x".into(), 1e-8)],
         ..TransientOptions::default()
     };
-    let local = transient(&here, &options, &mut |_, _| {}, &mut |_| true).expect("runs");
+    let (moving, _) = fitted_in_time(&here, &options).expect("a mesh");
+    let local = transient(&moving, &options, &mut |_, _| {}, &mut |_| true).expect("runs");
     let remote = RemoteTransient {
         stop: options.stop,
         signals: options.signals.clone(),

@@ -39,6 +39,7 @@ mod tests {
             signals: signals.iter().map(|(unit, v)| (String::new(), (*unit).to_owned(), v.to_vec())).collect(),
             counters: Default::default(),
             unknowns: 1,
+            estimated_error: None,
             events: vec![],
             warnings: vec![],
         }

@@ -1,6 +1,7 @@
 //! One point of a grid: compile with its parameter values, run the analysis, keep named numbers.
 
 use super::{SweepAnalysis, SweepError, SweepSpec};
+use crate::analysis::mesh::{Request, fitted};
 use crate::analysis::{modes, pull_in, statics};
 use crate::budget::{self, Budget};
 use crate::compile::{CompileError, CompileOptions, Compiled, compile};
@@ -127,6 +128,12 @@ fn brief(error: &CompileError) -> String {
 }
 
 fn analyse(compiled: &Compiled, analysis: &SweepAnalysis) -> Result<Vec<Value>, String> {
+    let request = match analysis {
+        SweepAnalysis::Static { voltages, .. } => Request::Static { voltages },
+        SweepAnalysis::Modes { count, voltages } => Request::Modes { count: *count, voltages },
+        SweepAnalysis::PullIn { port, max } => Request::PullIn { port: port.as_deref(), max: *max },
+    };
+    let compiled = &fitted(compiled, &request).map_err(|error| error.to_string())?;
     match analysis {
         SweepAnalysis::Static { outputs, voltages } => {
             let result = statics::static_equilibrium(compiled, voltages).map_err(|error| error.to_string())?;

@@ -25,6 +25,7 @@ pub fn static_to_wire(result: &StaticResult) -> proto::StaticResponse {
         free_motions: result.free_motions.clone(),
         unknowns: result.unknowns as u64,
         iterations: result.iterations as u64,
+        estimated_error: result.estimated_error,
     }
 }
 
@@ -41,6 +42,7 @@ pub fn static_from_wire(wire: proto::StaticResponse) -> StaticResult {
         free_motions: wire.free_motions,
         unknowns: size(wire.unknowns),
         iterations: size(wire.iterations),
+        estimated_error: wire.estimated_error,
     }
 }
 
@@ -86,12 +88,19 @@ pub fn pull_in_to_wire(result: &PullInResult) -> proto::PullInResponse {
         pull_in_v: result.pull_in_v,
         release_v: result.release_v,
         unheld: !result.held,
+        estimated_error: result.estimated_error,
     }
 }
 
 /// Pull-in back.
 pub fn pull_in_from_wire(wire: proto::PullInResponse) -> PullInResult {
-    PullInResult { port: wire.port, pull_in_v: wire.pull_in_v, release_v: wire.release_v, held: !wire.unheld }
+    PullInResult {
+        port: wire.port,
+        pull_in_v: wire.pull_in_v,
+        release_v: wire.release_v,
+        held: !wire.unheld,
+        estimated_error: wire.estimated_error,
+    }
 }
 
 /// The end of a transient as it travels.
@@ -115,6 +124,7 @@ pub fn summary_to_wire(result: &TransientResult) -> proto::TransientSummary {
         forces,
         iterations,
         events: events.collect(),
+        estimated_error: result.estimated_error,
     }
 }
 
@@ -135,6 +145,7 @@ pub fn transient_from_wire(
         forces,
         iterations,
         events,
+        estimated_error,
     } = summary;
     let event = |e: proto::Crossing| Event {
         signal: e.signal,
@@ -149,6 +160,7 @@ pub fn transient_from_wire(
         signals: signals.collect(),
         counters: Counters { steps, rejected, factorizations, solves, forces, iterations },
         unknowns: size(unknowns),
+        estimated_error,
         events: events.into_iter().map(event).collect(),
         warnings: Vec::new(),
     }

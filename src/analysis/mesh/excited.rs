@@ -1,0 +1,222 @@
+//! The mesh for a transient: the modes that it excites, each as exactly as the length of the run asks for.
+//!
+//! A run starts away from the equilibrium that it goes to by d = K⁻¹·r, r the forces out of balance at its start: those of the load that
+//! was let go, or of a step of the voltages.
+//! The part of d along mode i swings with the amplitude A_i (of the largest displacement), and the error δ_i of its frequency
+//! turns its phase by ω_i·δ_i·T by the end of the run, or within the time 2/γ in which it dies out with the damping γ = xᵀCx:
+//! ```text
+//! rms error of the run over its amplitude ≈ A_i·δ_i·ω_i·min(T, 2/γ)/√3
+//! ```
+//! Each mode is asked to keep that below the tolerance. Modes are looked at until what is left of d is negligible. What heat
+//! drives comes with its time constant τ: of it a mode swings with 1/√(1 + (ωτ)²), the rest follows slowly.
+
+use super::super::modes::modes;
+use super::super::statics::{OperatingPoint, operating_point};
+use super::super::transient::TransientOptions;
+use super::super::{AnalysisError, PortVoltages};
+use super::{chosen, equilibrium, meshed};
+use crate::compile::Compiled;
+use crate::discretize::DiscretizeError;
+use crate::gaps::Drive;
+use crate::multibody::forces::add_damping;
+use crate::multibody::planar::Pose;
+use crate::multibody::{BlockMatrix, Model};
+use crate::refine::counted;
+use crate::refine::doubling::{self, Output};
+use crate::refine::model_order::{self, Aim, ModelOrder};
+use crate::solve::eigen::lowest_modes;
+use std::f64::consts::TAU;
+
+/// Modes looked at first, and at most.
+const FIRST: usize = 6;
+const MOST: usize = 48;
+/// Share of the tolerance below which an amplitude is negligible.
+const NEGLIGIBLE: f64 = 0.3;
+/// Smallest error that is asked of a frequency.
+const SHARPEST: f64 = 1e-8;
+
+/// A mode that a run excites.
+struct Excited {
+    frequency: f64,
+    amplitude: f64,
+    decay: f64,
+}
+
+/// The mesh for a run.
+pub(super) fn order(moving: &Compiled, options: &TransientOptions<'_>) -> Result<ModelOrder, AnalysisError> {
+    if moving.structure.beams.is_empty() {
+        return Ok(ModelOrder { estimated_error: Some(0.0), ..moving.order.clone() });
+    }
+    let given = chosen(moving) || moving.options.band.is_some();
+    let voltages = &options.voltages;
+    let start = options.release.unwrap_or(moving);
+    if start.order.segments.len() != moving.order.segments.len() {
+        return Ok(moving.order.clone()); // another drawing: the run itself says so
+    }
+    let at = |model: &Compiled, segments: Vec<usize>| match given {
+        true => equilibrium::estimated(model, voltages, segments),
+        false => equilibrium::order(model, voltages, segments),
+    };
+    let mut still = at(start, moving.order.segments.clone())?;
+    if options.release.is_some() {
+        // where the run goes to may have no equilibrium at all
+        if let Ok(end) = at(moving, still.segments.clone()) {
+            still = merged(&still, &end);
+        }
+    }
+    let tol = moving.options.tol;
+    let mut count = FIRST;
+    loop {
+        let mesh = match given {
+            true => still.clone(),
+            false => {
+                let counted = counted::choose(&moving.structure, &moving.options, count).map_err(refused)?;
+                merged(&still, &counted)
+            }
+        };
+        let (modes, left) = excited(moving, options, &mesh.segments, count)?;
+        if left > NEGLIGIBLE * tol && modes.len() >= count && count < MOST {
+            count = (2 * count).min(MOST);
+            continue;
+        }
+        let Some(highest) = modes.iter().rposition(|m| m.amplitude > NEGLIGIBLE * tol) else { return Ok(still) };
+        let tolerances: Vec<f64> = modes[..=highest].iter().map(|m| tolerance(m, options.stop, tol)).collect();
+        let mut analyse = |segments: &[usize]| frequencies(moving, voltages, segments, &tolerances);
+        if given {
+            let told = doubling::estimate(&moving.options, still.segments.clone(), &mut analyse).ok();
+            return Ok(merged(&still, &told.unwrap_or(ModelOrder { estimated_error: None, ..still.clone() })));
+        }
+        let aim = Aim { band: 1.01 * modes[highest].frequency, tolerances: tolerances.clone(), rigid: false };
+        let order = model_order::choose_for(&moving.structure, &moving.options, &aim).map_err(refused)?;
+        let mesh = merged(&still, &order);
+        if order.estimated_error.is_some() {
+            return Ok(mesh);
+        }
+        let fitted = doubling::fit(&moving.structure, &moving.options, mesh.segments.clone(), &mut analyse);
+        return Ok(fitted.map_or(mesh, |fitted| merged(&still, &fitted)));
+    }
+}
+
+/// Frequencies about where the run goes to, with errors relative to what each may have.
+fn frequencies(
+    moving: &Compiled,
+    voltages: &PortVoltages,
+    segments: &[usize],
+    tolerances: &[f64],
+) -> Result<Vec<Output>, AnalysisError> {
+    let found = modes(&meshed(moving, segments)?, tolerances.len(), voltages)?.frequencies_hz;
+    let scale = |f: f64, tolerance: f64| (f * tolerance / moving.options.tol).max(f64::MIN_POSITIVE);
+    let mut outputs: Vec<Output> =
+        found.iter().zip(tolerances).map(|(&f, &tolerance)| Output { value: f, scale: scale(f, tolerance) }).collect();
+    outputs.resize(tolerances.len(), Output { value: f64::NAN, scale: 1.0 });
+    Ok(outputs)
+}
+
+fn refused(error: DiscretizeError) -> AnalysisError {
+    AnalysisError::NotConverged { detail: error.to_string() }
+}
+
+/// Error that the frequency of a mode may have.
+fn tolerance(mode: &Excited, stop: f64, tol: f64) -> f64 {
+    let lasts = stop.min(2.0 / mode.decay.max(f64::MIN_POSITIVE));
+    let weight = mode.amplitude * (TAU * mode.frequency * lasts / 3f64.sqrt()).max(1.0) / counted::SAFETY;
+    (tol / weight.max(f64::MIN_POSITIVE)).clamp(SHARPEST, 0.3)
+}
+
+/// The finer of two meshes for every beam, and the larger of their errors.
+fn merged(a: &ModelOrder, b: &ModelOrder) -> ModelOrder {
+    ModelOrder {
+        segments: a.segments.iter().zip(&b.segments).map(|(a, b)| *a.max(b)).collect(),
+        estimated_error: a.estimated_error.zip(b.estimated_error).map(|(a, b)| a.max(b)),
+        modes_in_band: b.modes_in_band,
+        passes: a.passes + b.passes,
+    }
+}
+
+/// The lowest modes about where the run goes to, with their amplitudes; and the share of the way there that is in none of them.
+fn excited(
+    moving: &Compiled,
+    options: &TransientOptions<'_>,
+    segments: &[usize],
+    count: usize,
+) -> Result<(Vec<Excited>, f64), AnalysisError> {
+    let model = meshed(moving, segments)?;
+    let system = &model.parts.system;
+    let rest = OperatingPoint::rest(&model, &options.voltages)?;
+    let from = match options.release {
+        Some(start) => operating_point(&meshed(start, segments)?, &options.voltages)?,
+        None => rest.clone(),
+    };
+    // without an equilibrium to go to the way is that from rest
+    let to = operating_point(&model, &options.voltages).unwrap_or(rest);
+    let mut drive = system.electrics.drive();
+    system.electrics.apply(&to.sources, &to.rise, &mut drive);
+    let mut stiffness = BlockMatrix::new(&system.model.pattern);
+    let mut residual = to.q.clone();
+    system.tangent(&to.q, &drive, &mut stiffness, &mut residual);
+    let found = lowest_modes(system, (&to.q, &drive), &stiffness, count)?;
+
+    let mut way = pushed(&model, &from, &drive, &stiffness)
+        .unwrap_or_else(|| from.q.iter().zip(&to.q).map(|(a, b)| a - b).collect());
+    let size = reach(&model, &way);
+    if size == 0.0 {
+        return Ok((Vec::new(), 0.0));
+    }
+    let slow = shortest_heat(&model, &from, &to);
+    // the way that slow heat takes it within the run
+    let size = if slow > 0.0 { size * -(-options.stop / slow).exp_m1() } else { size };
+    let modes = (found.shapes.iter().zip(&found.lambda))
+        .map(|(x, lambda)| {
+            let omega = lambda.max(0.0).sqrt();
+            let share = crate::solve::eigen::mass_product(&system.model, x, &way);
+            for (way, x) in way.iter_mut().zip(x) {
+                *way -= x * share;
+            }
+            let swung = (share.abs() * reach(&model, x) / size / (1.0 + (omega * slow).powi(2)).sqrt()).min(1.0);
+            Excited { frequency: omega / TAU, amplitude: swung, decay: damping(&system.model, x) }
+        })
+        .collect();
+    let last = found.lambda.last().map_or(0.0, |l| l.max(0.0).sqrt());
+    Ok((modes, reach(&model, &way) / size / (1.0 + (last * slow).powi(2)).sqrt()))
+}
+
+/// K⁻¹·r with the forces r that are out of balance where the run starts, under the drive that it goes on with; none for a part that
+/// floats. For small motions this is the way to where the run goes to; for large ones the shortening of what bends is no stretch in it.
+fn pushed(
+    model: &Compiled,
+    from: &OperatingPoint,
+    drive: &Drive,
+    stiffness: &BlockMatrix<f64, 3>,
+) -> Option<Vec<Pose>> {
+    let system = &model.parts.system;
+    let mut x = vec![Pose::zeros(); system.bodies()];
+    system.residual(&from.q, drive, &mut x);
+    let mut factor = stiffness.clone();
+    system.model.project_matrix(&mut factor);
+    factor.factor(&system.model.pattern).ok()?;
+    factor.solve(&system.model.pattern, &mut x);
+    system.model.project(&mut x);
+    x.iter().all(|x| x.iter().all(|v| v.is_finite())).then_some(x)
+}
+
+/// Largest displacement of a node [m], of a small motion `x`.
+fn reach(model: &Compiled, x: &[Pose]) -> f64 {
+    model.parts.nodes.iter().flatten().map(|p| p.displacement(x, true).norm()).fold(0.0, f64::max)
+}
+
+/// xᵀCx of a mode with xᵀMx = 1 [1/s].
+fn damping(model: &Model, x: &[Pose]) -> f64 {
+    let mut force = vec![Pose::zeros(); x.len()];
+    add_damping(model, x, &mut force);
+    force.iter().zip(x).map(|(f, x)| f.dot(x)).sum()
+}
+
+/// The shortest time constant of the heat that the run begins with [s]; 0 where heat moves nothing.
+fn shortest_heat(model: &Compiled, from: &OperatingPoint, to: &OperatingPoint) -> f64 {
+    let heaters = &model.parts.system.electrics.heating.heaters;
+    let moves = |k: &usize| from.rise[*k] != to.rise[*k];
+    let loads = !model.parts.system.loads.is_empty() || to.volts.iter().any(|v| *v != 0.0);
+    let shortest = (0..heaters.len()).filter(moves).map(|k| heaters[k].time_constant).fold(f64::INFINITY, f64::min);
+    // what pushes or pulls beside it begins at once
+    if loads || shortest.is_infinite() { 0.0 } else { shortest }
+}

@@ -1,0 +1,199 @@
+//! The mesh for whatever an analysis gives: its results are compared with those of twice the segments.
+//!
+//! The difference of the two is the error of the coarser one but for a share 2^−p, p the order of convergence; Richardson's rule
+//! takes that into account, with p = 2, the order of what stretches. What bends converges faster, and is estimated a quarter too high. Where it is beyond the tolerance, each group of beams that are alike is doubled alone: what changes is what
+//! that group contributes, and the groups that gain most per body are refined until the sum is predicted to hold. Then the
+//! prediction is computed.
+//!
+//! Reference: L. F. Richardson, "The deferred approach to the limit", Phil. Trans. R. Soc. A 226 (1927).
+
+use super::groups::{Groups, MARGIN};
+use super::model_order::ModelOrder;
+use crate::options::CompileOptions;
+use crate::structure::Structure;
+
+/// Meshes that are compared with their double at most.
+const MOST_PASSES: usize = 10;
+/// Segments of all beams together, doubled, beyond which nothing is compared.
+const MOST_SEGMENTS: usize = 60_000;
+/// Groups that are doubled alone at most.
+const MOST_GROUPS: usize = 8;
+/// Share of the tolerance that the estimate may use: it has been found up to a quarter smaller than the error (docs/accuracy.md).
+const SAFETY: f64 = 0.75;
+/// Results that decide, at most: the worst.
+const MOST_RESULTS: usize = 24;
+
+/// A number that an analysis gives, and the size to which its error is relative, in one unit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Output {
+    /// The number; NaN where there is none.
+    pub value: f64,
+    /// What an error of 1 is.
+    pub scale: f64,
+}
+
+/// Refines from `segments` until the results hold `options.tol`. `analyse` gives the results of a mesh, always as many.
+///
+/// [`ModelOrder::estimated_error`] is that of the worst result: none where the finer mesh has no results or would be too fine,
+/// and beyond the tolerance where refinement does not help.
+///
+/// # Errors
+/// What the analysis has against the first mesh.
+pub fn fit<E>(
+    structure: &Structure,
+    options: &CompileOptions,
+    mut segments: Vec<usize>,
+    analyse: &mut dyn FnMut(&[usize]) -> Result<Vec<Output>, E>,
+) -> Result<ModelOrder, E> {
+    let groups = Groups::new(&structure.beams).merged(&structure.beams, MOST_GROUPS);
+    let order = |segments: &[usize], estimated_error, passes| ModelOrder {
+        segments: segments.to_vec(),
+        estimated_error,
+        modes_in_band: 0,
+        passes,
+    };
+    let mut coarse = analyse(&segments)?;
+    let (mut before, mut slow) = (f64::INFINITY, 0);
+    for passes in 1..=MOST_PASSES {
+        let twice = doubled(options, &segments, |_| true);
+        if twice == segments || twice.iter().sum::<usize>() > MOST_SEGMENTS {
+            // without beams there is no mesh to be wrong
+            return Ok(order(&segments, (twice == segments).then_some(0.0), passes));
+        }
+        let Ok(fine) = analyse(&twice) else { return Ok(order(&segments, None, passes)) };
+        let errors = differences(&coarse, &fine);
+        let worst = errors.iter().fold(0.0, |m: f64, e| m.max(e.abs()));
+        // a kink of the results (contact, a snap) is not a matter of segments
+        slow = if worst > 0.5 * before { slow + 1 } else { 0 };
+        if worst <= SAFETY * options.tol || passes == MOST_PASSES || slow > 1 {
+            return Ok(order(&segments, Some(worst), passes));
+        }
+        before = worst;
+        let mut decide: Vec<usize> = (0..errors.len()).filter(|&j| errors[j].abs() > 0.1 * options.tol).collect();
+        decide.sort_by(|&i, &j| errors[j].abs().total_cmp(&errors[i].abs()).then(i.cmp(&j)));
+        decide.truncate(MOST_RESULTS);
+        let shares = shares(options, &groups, &segments, &coarse, (&errors, &decide), analyse);
+        let next = match shares {
+            Some(shares) => {
+                let goals = vec![MARGIN * SAFETY * options.tol; decide.len()];
+                groups.fewest(options, &shares, &goals, &segments, &segments)
+            }
+            None => twice.clone(),
+        };
+        let enough = next.iter().sum::<usize>() < twice.iter().sum::<usize>();
+        (segments, coarse) = match next {
+            next if next == segments || next == twice => (twice, fine),
+            // far from the goal the prediction is a guess: no further than twice as fine at once, then four times
+            next if enough || passes > 1 => {
+                let results = analyse(&next);
+                let Ok(results) = results else { return Ok(order(&twice, None, passes)) };
+                (next, results)
+            }
+            _ => (twice, fine),
+        };
+    }
+    Ok(order(&segments, None, MOST_PASSES))
+}
+
+/// The estimate of a mesh as it is: what twice the segments change.
+///
+/// # Errors
+/// What the analysis has against the mesh.
+pub fn estimate<E>(
+    options: &CompileOptions,
+    segments: Vec<usize>,
+    analyse: &mut dyn FnMut(&[usize]) -> Result<Vec<Output>, E>,
+) -> Result<ModelOrder, E> {
+    let coarse = analyse(&segments)?;
+    let twice = doubled(options, &segments, |_| true);
+    let comparable = twice.iter().sum::<usize>() <= MOST_SEGMENTS;
+    let fine = if comparable { analyse(&twice).ok() } else { None };
+    let worst = |fine: Vec<Output>| differences(&coarse, &fine).iter().fold(0.0, |m: f64, e| m.max(e.abs()));
+    Ok(ModelOrder { segments, estimated_error: fine.map(worst), modes_in_band: 0, passes: 1 })
+}
+
+/// For each result that decides, what each group contributes to its error; none where a mesh has no results.
+fn shares<E>(
+    options: &CompileOptions,
+    groups: &Groups,
+    segments: &[usize],
+    coarse: &[Output],
+    (errors, decide): (&[f64], &[usize]),
+    analyse: &mut dyn FnMut(&[usize]) -> Result<Vec<Output>, E>,
+) -> Option<Vec<Vec<f64>>> {
+    if groups.0.len() == 1 {
+        return Some(decide.iter().map(|&j| vec![errors[j]]).collect());
+    }
+    let mut shares = vec![Vec::with_capacity(groups.0.len()); decide.len()];
+    for group in &groups.0 {
+        let alone = doubled(options, segments, |beam| group.contains(&beam));
+        let errors = differences(coarse, &analyse(&alone).ok()?);
+        for (row, &j) in shares.iter_mut().zip(decide) {
+            row.push(errors[j]);
+        }
+    }
+    shares.iter().flatten().all(|e| e.is_finite()).then_some(shares)
+}
+
+/// Twice the segments of some beams; rigid ones stay rigid.
+fn doubled(options: &CompileOptions, segments: &[usize], some: impl Fn(usize) -> bool) -> Vec<usize> {
+    let twice = |n: usize| if n == 0 { 0 } else { options.scheme.segments(2 * n) };
+    segments.iter().enumerate().map(|(beam, &n)| if some(beam) { twice(n) } else { n }).collect()
+}
+
+/// Relative errors of the coarse results.
+fn differences(coarse: &[Output], fine: &[Output]) -> Vec<f64> {
+    // what stretches converges by the second order with every scheme
+    let rest = 1.0 - 0.5f64.powi(2);
+    let one = |(a, b): (&Output, &Output)| match (a.value.is_nan(), b.value.is_nan()) {
+        (true, true) => 0.0,
+        (false, false) if a.value == b.value => 0.0,
+        (false, false) => (a.value - b.value) / (b.scale * rest),
+        _ => f64::INFINITY,
+    };
+    coarse.iter().zip(fine).map(one).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    //! The mesh holds the tolerance, the estimate is the error, and what contributes nothing stays as it is.
+    use super::*;
+    use crate::netlist::{Bundle, load};
+
+    /// Two beams whose errors fall with the fourth power: one a thousand times the other's.
+    #[test]
+    fn refines_where_it_matters() {
+        let text = "process p = [Youngsmodulus=165e9 density=2300 h=2u]\nanchor p [a] []\nbeam2d p [a b] [l=100u w=2u]\n\
+                    beam2d p [b c] [l=50u w=2u]\n";
+        let structure = load(&Bundle::from_text("two.net", text), &[]).unwrap().structure;
+        let error = |n: &[usize]| 1.0 * (n[0] as f64).powi(-4) + 1e-3 * (n[1] as f64).powi(-4);
+        for tol in [1e-2, 1e-4, 1e-6] {
+            let options = CompileOptions { tol, ..CompileOptions::default() };
+            let mut meshes = 0;
+            let mut analyse = |n: &[usize]| {
+                meshes += 1;
+                Ok::<_, ()>(vec![Output { value: 3.0 + error(n), scale: 1.0 }, Output { value: f64::NAN, scale: 1.0 }])
+            };
+            let order = fit(&structure, &options, vec![2, 2], &mut analyse).unwrap();
+            let (found, told) = (error(&order.segments), order.estimated_error.unwrap());
+            assert!(found <= tol && (1.1..1.4).contains(&(told / found)), "{tol}: {found} {told}");
+            assert!(order.segments[0] >= 2 * order.segments[1], "{:?}", order.segments);
+            assert!(meshes <= 20, "{meshes}");
+        }
+    }
+
+    /// Results that do not settle are told, not refined for ever.
+    #[test]
+    fn gives_up_where_segments_do_not_help() {
+        let text =
+            "process p = [Youngsmodulus=165e9 density=2300 h=2u]\nanchor p [a] []\nbeam2d p [a b] [l=100u w=2u]\n";
+        let structure = load(&Bundle::from_text("one.net", text), &[]).unwrap().structure;
+        let mut sign = 1.0;
+        let mut analyse = |_: &[usize]| {
+            sign = -sign;
+            Ok::<_, ()>(vec![Output { value: sign, scale: 1.0 }])
+        };
+        let order = fit(&structure, &CompileOptions::default(), vec![2], &mut analyse).unwrap();
+        assert!(order.estimated_error.unwrap() > 1.0 && order.segments[0] <= 64, "{order:?}");
+    }
+}

@@ -1,0 +1,155 @@
+//! The mesh that a request gets holds the tolerance that stands beside it, and says how far off it may be: contracts of
+//! `analysis::mesh`, on default options.
+
+use super::{close, node};
+use bimorph::analysis::mesh::{Request, fitted, fitted_in_time};
+use bimorph::analysis::modes::modes;
+use bimorph::analysis::statics::static_equilibrium;
+use bimorph::analysis::transient::{TransientOptions, TransientResult, transient};
+use bimorph::compile::{CompileOptions, Compiled, Formulation, Junctions, compile};
+use bimorph::netlist::{Bundle, Setting};
+use std::path::Path;
+
+const SILICON: &str = "process p = [Youngsmodulus=165e9 density=2300 h=2u]\nparam F=0\nanchor p [a] []\n";
+
+/// Beams that meet in points and at ideal clamps: what closed forms describe.
+fn drawn(text: &str, options: CompileOptions) -> Compiled {
+    let options = CompileOptions { junctions: Junctions::Centreline, ..options };
+    compile(&Bundle::from_text("mesh.net", &format!("{SILICON}{text}")), &options).unwrap()
+}
+
+/// Elastica, a clamped beam under a dead load at its tip, F·l²/EI = 1, 2, 4, 8: deflection and approach of the tip within the tolerance
+/// from 1e-2 to 1e-6, and the estimate no smaller than a third of the error. Source: the exact solution (Bisshopp and Drucker,
+/// Q. Appl. Math. 3 (1945)), computed to 12 digits.
+#[test]
+fn elastica_within_the_tolerance() {
+    const EXACT: [(f64, f64, f64); 4] = [
+        (1.0, 0.301720773800, -0.056433236283),
+        (2.0, 0.493457480397, -0.160641720825),
+        (4.0, 0.669964181278, -0.328941242247),
+        (8.0, 0.784982374953, -0.504827732134),
+    ];
+    for (load, across, along) in EXACT {
+        let force = load * 165e9 * 2e-6 * 0.5e-6_f64.powi(3) / 12.0 / 1e-6;
+        let text = "beam2d p [a t] [l=1000u w=0.5u]\nf2d * [t] [F=F oz=pi/2]";
+        for tol in [1e-2, 1e-3, 1e-4, 1e-5, 1e-6] {
+            let set = vec![("F".to_owned(), Setting::Number(force))];
+            let model = drawn(text, CompileOptions { tol, set, ..CompileOptions::default() });
+            let model = fitted(&model, &Request::Static { voltages: &[] }).unwrap();
+            let tip = node(&static_equilibrium(&model, &[]).unwrap(), "t");
+            let size = across.hypot(along) * 1e-3;
+            let error = (tip.y - across * 1e-3).abs().max((tip.x - along * 1e-3).abs()) / size;
+            let told = model.order.estimated_error.unwrap();
+            println!("{load} {tol:e}: {error:.1e}, estimated {told:.1e}, {} unknowns", model.unknowns());
+            assert!(error <= tol && told <= tol, "{load} {tol:e}: {error:e} {told:e}");
+            // below 1e-7 the equilibrium's own tolerance shows
+            assert!(error < 3.0 * told + 1e-7, "{load} {tol:e}: {error:e} {told:e}");
+            assert!(model.warnings.items.is_empty(), "{:?}", model.warnings.items);
+        }
+    }
+}
+
+/// A beam clamped at both ends, by its number of modes alone: each within 1e-3 of (βl)² = 22.3733, 61.6728, 120.903 (Blevins 1979,
+/// table 8-1), as many as were asked for, each with an estimate within a factor of three.
+#[test]
+fn modes_by_their_number() {
+    let model = drawn("beam2d p [a b] [l=200u w=2u]\nanchor p [b] []", CompileOptions::default());
+    let model = fitted(&model, &Request::Modes { count: 3, voltages: &[] }).unwrap();
+    let found = modes(&model, 3, &[]).unwrap();
+    // √(EI/ρA)/2πl²
+    let unit = (165e9 * 4e-12 / 12.0 / 2300.0_f64).sqrt() / (std::f64::consts::TAU * 4e-8);
+    for ((frequency, estimate), exact) in
+        found.frequencies_hz.iter().zip(&found.errors).zip([22.3733, 61.6728, 120.9034])
+    {
+        let error = frequency / (unit * exact) - 1.0;
+        println!("{error:.2e}, estimated {:.2e}", estimate.unwrap());
+        assert!(error.abs() < 1e-3, "{error:e}");
+    }
+    assert!(model.order.estimated_error.unwrap() <= 1e-3);
+    // a finer tolerance, and what is left is the difference to it
+    let fine = drawn(
+        "beam2d p [a b] [l=200u w=2u]\nanchor p [b] []",
+        CompileOptions { tol: 1e-6, ..CompileOptions::default() },
+    );
+    let fine = modes(&fitted(&fine, &Request::Modes { count: 3, voltages: &[] }).unwrap(), 3, &[]).unwrap();
+    for k in 0..3 {
+        let error = found.frequencies_hz[k] / fine.frequencies_hz[k] - 1.0;
+        let told = found.errors[k].unwrap();
+        assert!(error.abs() <= 1e-3 && (1.0 / 3.0..3.0).contains(&(told / error)), "{k}: {error:e} {told:e}");
+    }
+}
+
+/// A number of segments that was asked for is kept, its estimate is that of its error within a factor of three, and a warning says
+/// that it does not hold the tolerance.
+#[test]
+fn segments_of_the_user_are_told() {
+    let text = "beam2d p [a t] [l=1000u w=0.5u]\nf2d * [t] [F=1.375e-8 oz=pi/2]";
+    let model = drawn(text, CompileOptions { segments: Some(1), ..CompileOptions::default() });
+    let model = fitted(&model, &Request::Static { voltages: &[] }).unwrap();
+    assert_eq!(model.order.segments, [1]);
+    let tip = node(&static_equilibrium(&model, &[]).unwrap(), "t");
+    let error = (tip.y / 0.669964181278e-3 - 1.0).abs().max((tip.x / 0.328941242247e-3 + 1.0).abs());
+    let told = model.order.estimated_error.unwrap();
+    assert!((1.0 / 3.0..3.0).contains(&(told / error)), "{told:e} {error:e}");
+    let warned: Vec<&str> = model.warnings.items.iter().map(|d| d.code.as_str()).collect();
+    assert_eq!(warned, ["W040"], "{told}");
+}
+
+/// Modes about a heated and about a stressed state hold the tolerance there: those of 1e-3 within it of those of 1e-5.
+#[test]
+fn modes_about_a_loaded_state() {
+    for text in [
+        "beam2d p [a b] [l=200u w=2u]\nanchor p [b] []\nbeam2d p [b c] [l=100u w=2u]\nf2d * [c] [F=20u oz=pi/2]",
+        "beam2d p [a b] [l=200u w=2u stress=100e6]\nanchor p [b] []",
+    ] {
+        let at = |tol: f64| {
+            let model = drawn(text, CompileOptions { tol, ..CompileOptions::default() });
+            let model = fitted(&model, &Request::Modes { count: 4, voltages: &[] }).unwrap();
+            (modes(&model, 4, &[]).unwrap().frequencies_hz, model.order.estimated_error.unwrap())
+        };
+        let ((found, told), (fine, _)) = (at(1e-3), at(1e-5));
+        for (found, fine) in found.iter().zip(&fine) {
+            close(*found, *fine, 1e-3);
+        }
+        assert!(told <= 1.05e-3, "{told:e}");
+    }
+}
+
+/// What two runs of one signal are apart: root mean square over half the range.
+fn apart(a: &TransientResult, b: &TransientResult) -> f64 {
+    let (x, y) = (&a.signals[0].2, &b.signals[0].2);
+    let range = y.iter().copied().fold(f64::MIN, f64::max) - y.iter().copied().fold(f64::MAX, f64::min);
+    let sum: f64 = x.iter().zip(y).map(|(x, y)| (x - y).powi(2)).sum();
+    (sum / x.len() as f64).sqrt() / (0.5 * range)
+}
+
+/// Runs hold the tolerance over their whole length, by default options: the comb resonator of examples/ under a step of 20 V for
+/// 300 µs, within 1e-2 and 1e-3 of a run of 1e-5, in both formulations (the version before: 3e-3 at every tolerance).
+#[test]
+fn transients_hold_over_their_length() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/comb_resonator/comb_resonator.net");
+    let run = |tol: f64, formulation: Formulation| {
+        let model = compile(
+            &Bundle::read(&path, &[]).unwrap(),
+            &CompileOptions { tol, formulation, ..CompileOptions::default() },
+        );
+        let options = TransientOptions {
+            stop: 300e-6,
+            signals: vec!["shuttle.x".into()],
+            tol,
+            voltages: vec![("drive".into(), 20.0)],
+            ..TransientOptions::default()
+        };
+        let (model, _) = fitted_in_time(&model.unwrap(), &options).unwrap();
+        transient(&model, &options, &mut |_, _| {}, &mut |_| true).unwrap()
+    };
+    let reference = run(1e-5, Formulation::Compliant);
+    for formulation in [Formulation::Compliant, Formulation::Rcr] {
+        for tol in [1e-2, 1e-3] {
+            let found = run(tol, formulation);
+            let (error, told) = (apart(&found, &reference), found.estimated_error.unwrap());
+            println!("{formulation:?} {tol:e}: {error:.1e}, estimated {told:.1e}, {} unknowns", found.unknowns);
+            assert!(error <= tol && told <= 1.05 * tol, "{formulation:?} {tol:e}: {error:e} {told:e}");
+        }
+    }
+}
