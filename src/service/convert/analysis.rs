@@ -60,6 +60,8 @@ pub fn modes_to_wire(result: &ModesResult) -> proto::ModesResponse {
         nodes,
         shapes: result.shapes.iter().map(shape).collect(),
         unknowns: result.unknowns as u64,
+        deflection_m: result.deflection_m,
+        warnings: result.warnings.clone(),
         errors: result.errors.iter().map(|e| e.unwrap_or(f64::NAN)).collect(),
         deflection_m: result.deflection_m,
         warnings: result.warnings.clone(),
@@ -125,6 +127,7 @@ pub fn summary_to_wire(result: &TransientResult) -> proto::TransientSummary {
         iterations,
         events: events.collect(),
         estimated_error: result.estimated_error,
+        warnings: result.warnings.clone(),
     }
 }
 
@@ -146,6 +149,7 @@ pub fn transient_from_wire(
         iterations,
         events,
         estimated_error,
+        warnings,
     } = summary;
     let event = |e: proto::Crossing| Event {
         signal: e.signal,
@@ -162,6 +166,6 @@ pub fn transient_from_wire(
         unknowns: size(unknowns),
         estimated_error,
         events: events.into_iter().map(event).collect(),
-        warnings: Vec::new(),
+        warnings,
     }
 }

@@ -163,6 +163,7 @@ class Model:
             pulled_in=answer.pulled_in,
             unknowns=answer.unknowns,
             iterations=answer.iterations,
+            estimated_error=_estimate(answer),
         )
 
     def modes(self, count: int = 6, voltages: Voltages | None = None) -> ModesResult:
@@ -179,6 +180,7 @@ class Model:
             shapes,
             answer.unknowns,
             [None if math.isnan(e) else e for e in answer.errors],
+            answer.deflection_m,
             tuple(answer.warnings),
         )
 
@@ -187,7 +189,7 @@ class Model:
         request = analysis_pb2.PullInRequest(model=self.id, port=port, max_v=max_v)
         answer = self._call("PullIn", request)
         release = answer.release_v if answer.HasField("release_v") else None
-        return PullInResult(answer.port, answer.pull_in_v, release)
+        return PullInResult(answer.port, answer.pull_in_v, release, _estimate(answer))
 
     def transient(
         self,
@@ -231,7 +233,8 @@ class Model:
                 end = event.finished
                 named = dict(zip(signals, columns))
                 units = dict(zip(signals, end.units))
-                return TransientResult(t, named, units, end.steps, end.rejected, end.unknowns)
+                work = (end.steps, end.rejected, end.unknowns)
+                return TransientResult(t, named, units, *work, _estimate(end), tuple(end.warnings))
         raise Unavailable(f"server {self._channel.address}: the stream ended before the run did")
 
     def session(
@@ -259,6 +262,10 @@ class Model:
     def _describe(self) -> None:
         """Makes sure that the server has this model."""
         self._call("Describe", model_pb2.DescribeRequest(model=self.id))
+
+
+def _estimate(answer: Any) -> float | None:
+    return answer.estimated_error if answer.HasField("estimated_error") else None
 
 
 def _bundle(netlist: str | os.PathLike[str] | Netlist, include: Iterable[str | os.PathLike[str]]) -> Any:

@@ -35,6 +35,8 @@ class StaticResult:
     """Mechanical unknowns."""
     iterations: int
     """Newton iterations over all load steps."""
+    estimated_error: float | None = None
+    """Largest estimated relative error by the mesh [1]; None without an estimate."""
 
 
 @dataclass(frozen=True)
@@ -51,8 +53,10 @@ class ModesResult:
     """Mechanical unknowns."""
     errors: list[float | None]
     """Estimated relative error of each frequency by the number of segments [1], signed; None where there is none."""
+    deflection_m: float = 0.0
+    """Largest displacement of the equilibrium that the modes are about [m]."""
     warnings: tuple[str, ...] = ()
-    """What the numbers do not say by themselves."""
+    """What may surprise about these modes."""
 
 
 @dataclass(frozen=True)
@@ -65,6 +69,8 @@ class PullInResult:
     """Fold on the way up [V]."""
     release_v: float | None
     """Where the closed gap lets go [V]; None when it stays stuck."""
+    estimated_error: float | None = None
+    """Largest estimated relative error by the mesh [1]; None without an estimate."""
 
 
 @dataclass(frozen=True)
@@ -83,6 +89,10 @@ class TransientResult:
     """Rejected steps."""
     unknowns: int
     """Mechanical unknowns."""
+    estimated_error: float | None = None
+    """Largest estimated relative error by the mesh [1]; None without an estimate."""
+    warnings: tuple[str, ...] = ()
+    """What may surprise about the run."""
 
 
 @dataclass(frozen=True)
