@@ -51,12 +51,13 @@ pub(crate) fn newton(share: f64) -> Found {
     Found { sideways: largest(&|p| p.y.abs(), &q), residual: largest(&|p| p.x.hypot(p.y), &r), negative }
 }
 
-/// True where the search with signs comes to an equilibrium at a share of Euler's load.
-pub(crate) fn followed(share: f64) -> bool {
+/// How far aside the equilibrium lies that the search with signs comes to at a share of Euler's load [m]; none where it finds none.
+pub(crate) fn followed(share: f64) -> Option<f64> {
     let (system, _) = column(share);
     let mut q = vec![Pose::zeros(); system.bodies()];
     let path = SourcePath::new(&system.electrics, &[], &[], [0.0, 1.0]);
-    Equilibrium::new(&system, EquilibriumOptions::default()).follow(&system, &path, &mut q).is_ok()
+    let found = Equilibrium::new(&system, EquilibriumOptions::default()).follow(&system, &path, &mut q);
+    found.ok().map(|_| q.iter().map(|p| p.y.abs()).fold(0.0, f64::max))
 }
 
 /// The path up to 1.1 of Euler's load, along `branch` where it forks: share, sideways displacement of the tip [m], negative
@@ -71,7 +72,7 @@ pub(crate) fn path(branch: Branch) -> Vec<(f64, f64, usize)> {
 }
 
 /// One percent below Euler's load and one above it Newton's iteration ends on the straight column with forces balanced to
-/// rounding; only a negative pivot tells the second, unstable one. The search with signs never calls it an equilibrium.
+/// rounding; only a negative pivot tells the second, unstable one. The search with signs never calls it an equilibrium: it falls to the bent one.
 #[test]
 fn signs() {
     let (below, above) = (newton(0.99), newton(1.01));
@@ -79,7 +80,9 @@ fn signs() {
         assert!(found.sideways == 0.0 && found.residual < 1e-14 * euler(), "{found:?}");
     }
     assert_eq!((below.negative, above.negative), (0, 1));
-    assert!(followed(0.99) && !followed(1.01));
+    assert!(followed(0.99).is_some_and(|aside| aside < 1e-12));
+    // it falls to the bent column, 0.178 of the length aside
+    assert!(followed(1.01).is_none_or(|aside| (aside / 200e-6 / 0.178 - 1.0).abs() < 0.01), "{:?}", followed(1.01));
 }
 
 /// The fork lies at Euler's load within 0.01 %. Past it the straight path has one negative pivot, and both bent branches have

@@ -60,8 +60,6 @@ pub fn modes_to_wire(result: &ModesResult) -> proto::ModesResponse {
         nodes,
         shapes: result.shapes.iter().map(shape).collect(),
         unknowns: result.unknowns as u64,
-        deflection_m: result.deflection_m,
-        warnings: result.warnings.clone(),
         errors: result.errors.iter().map(|e| e.unwrap_or(f64::NAN)).collect(),
         deflection_m: result.deflection_m,
         warnings: result.warnings.clone(),
