@@ -8,6 +8,9 @@ use crate::multibody::planar::Pose;
 use crate::structure::Structure;
 use std::collections::HashMap;
 
+/// Axis of a joint, x and y, and the axial force in it [N].
+type Along = (f64, f64, f64);
+
 /// Cosine of the largest angle between a joint's axis and its beam.
 const ALONG: f64 = 0.99;
 
@@ -15,14 +18,14 @@ const ALONG: f64 = 0.99;
 pub fn axial_forces(structure: &Structure, parts: &Discretized, q: &[Pose], drive: &Drive) -> Vec<f64> {
     let model = &parts.system.model;
     let key = |a: BodyId, b: BodyId| (a.min(b), a.max(b));
-    let mut between: HashMap<(BodyId, BodyId), Vec<(f64, f64, f64)>> = HashMap::new();
+    let mut between: HashMap<(BodyId, BodyId), Vec<Along>> = HashMap::new();
     for joint in &model.joints {
         let (a, b) = joint.bodies();
         let axis = model.section(joint).axis;
         between.entry(key(a, b)).or_default().push((axis.x, axis.y, axial_force(model, joint, q, &drive.rest())));
     }
     let of = |(beam, points): (&crate::structure::Beam, &Vec<Point>)| {
-        let along = |&&(x, y, _): &&(f64, f64, f64)| (x * beam.angle.cos() + y * beam.angle.sin()).abs() > ALONG;
+        let along = |&&(x, y, _): &&Along| (x * beam.angle.cos() + y * beam.angle.sin()).abs() > ALONG;
         let one = |pair: &[Point]| {
             let joints = between.get(&key(pair[0].body, pair[1].body))?;
             Some(joints.iter().find(along)?.2)

@@ -32,7 +32,10 @@ pub struct Output {
     pub scale: f64,
 }
 
-/// Refines from `segments` until the results hold `options.tol`. `analyse` gives the results of a mesh, always as many.
+/// Gives the results of a mesh, always as many.
+pub type Analyse<'a, E> = &'a mut dyn FnMut(&[usize]) -> Result<Vec<Output>, E>;
+
+/// Refines from `segments` until the results hold `options.tol`.
 ///
 /// [`ModelOrder::estimated_error`] is that of the worst result: none where the finer mesh has no results or would be too fine,
 /// and beyond the tolerance where refinement does not help.
@@ -43,7 +46,7 @@ pub fn fit<E>(
     structure: &Structure,
     options: &CompileOptions,
     mut segments: Vec<usize>,
-    analyse: &mut dyn FnMut(&[usize]) -> Result<Vec<Output>, E>,
+    analyse: Analyse<'_, E>,
 ) -> Result<ModelOrder, E> {
     let groups = Groups::new(&structure.beams).merged(&structure.beams, MOST_GROUPS);
     let order = |segments: &[usize], estimated_error, passes| ModelOrder {
@@ -99,17 +102,22 @@ pub fn fit<E>(
 ///
 /// # Errors
 /// What the analysis has against the mesh.
-pub fn estimate<E>(
-    options: &CompileOptions,
-    segments: Vec<usize>,
-    analyse: &mut dyn FnMut(&[usize]) -> Result<Vec<Output>, E>,
-) -> Result<ModelOrder, E> {
-    let coarse = analyse(&segments)?;
-    let twice = doubled(options, &segments, |_| true);
+pub fn estimate<E>(options: &CompileOptions, segments: Vec<usize>, analyse: Analyse<'_, E>) -> Result<ModelOrder, E> {
+    let worst = |errors: Vec<f64>| errors.iter().fold(0.0, |m: f64, e| m.max(e.abs()));
+    let estimated_error = errors(options, &segments, analyse)?.map(worst);
+    Ok(ModelOrder { segments, estimated_error, modes_in_band: 0, passes: 1 })
+}
+
+/// The relative error of each result of a mesh; none where the finer mesh has no results or would be too fine.
+///
+/// # Errors
+/// What the analysis has against the mesh.
+pub fn errors<E>(options: &CompileOptions, segments: &[usize], analyse: Analyse<'_, E>) -> Result<Option<Vec<f64>>, E> {
+    let coarse = analyse(segments)?;
+    let twice = doubled(options, segments, |_| true);
     let comparable = twice.iter().sum::<usize>() <= MOST_SEGMENTS;
     let fine = if comparable { analyse(&twice).ok() } else { None };
-    let worst = |fine: Vec<Output>| differences(&coarse, &fine).iter().fold(0.0, |m: f64, e| m.max(e.abs()));
-    Ok(ModelOrder { segments, estimated_error: fine.map(worst), modes_in_band: 0, passes: 1 })
+    Ok(fine.map(|fine| differences(&coarse, &fine)))
 }
 
 /// For each result that decides, what each group contributes to its error; none where a mesh has no results.
@@ -119,7 +127,7 @@ fn shares<E>(
     segments: &[usize],
     coarse: &[Output],
     (errors, decide): (&[f64], &[usize]),
-    analyse: &mut dyn FnMut(&[usize]) -> Result<Vec<Output>, E>,
+    analyse: Analyse<'_, E>,
 ) -> Option<Vec<Vec<f64>>> {
     if groups.0.len() == 1 {
         return Some(decide.iter().map(|&j| vec![errors[j]]).collect());

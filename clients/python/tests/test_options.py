@@ -27,6 +27,8 @@ def test_every_option_reaches_the_server(client: bimorph.Client) -> None:
         {"shear": True},
         {"rotary_inertia": True},
         {"formulation": "rcr"},
+        {"imperfection": 1e-3},
+        {"as_sugar": True},
     ]
     assert {name for other in others for name in other} == set(bimorph.Options.__annotations__)
     ids = {client.compile(NETLIST, **other).id for other in others}

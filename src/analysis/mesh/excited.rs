@@ -21,6 +21,7 @@ use crate::gaps::Drive;
 use crate::multibody::forces::add_damping;
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, Model};
+use crate::options::CompileOptions;
 use crate::refine::counted;
 use crate::refine::doubling::{self, Output};
 use crate::refine::model_order::{self, Aim, ModelOrder};
@@ -83,8 +84,9 @@ pub(super) fn order(moving: &Compiled, options: &TransientOptions<'_>) -> Result
         let tolerances: Vec<f64> = modes[..=highest].iter().map(|m| tolerance(m, options.stop, tol)).collect();
         let mut analyse = |segments: &[usize]| frequencies(moving, voltages, segments, &tolerances);
         if given {
-            let told = doubling::estimate(&moving.options, still.segments.clone(), &mut analyse).ok();
-            return Ok(merged(&still, &told.unwrap_or(ModelOrder { estimated_error: None, ..still.clone() })));
+            let swings: Vec<f64> = modes[..=highest].iter().map(|m| 2f64.sqrt() * m.amplitude).collect();
+            let estimated_error = told(&moving.options, &still.segments, &swings, &mut analyse);
+            return Ok(merged(&still, &ModelOrder { estimated_error, ..still.clone() }));
         }
         let aim = Aim { band: 1.01 * modes[highest].frequency, tolerances: tolerances.clone(), rigid: false };
         let order = model_order::choose_for(&moving.structure, &moving.options, &aim).map_err(refused)?;
@@ -95,6 +97,17 @@ pub(super) fn order(moving: &Compiled, options: &TransientOptions<'_>) -> Result
         let fitted = doubling::fit(&moving.structure, &moving.options, mesh.segments.clone(), &mut analyse);
         return Ok(fitted.map_or(mesh, |fitted| merged(&still, &fitted)));
     }
+}
+
+/// The estimate of a mesh as it is: a mode that has lost its phase is wrong by what it swings, and by no more.
+fn told(
+    options: &CompileOptions,
+    segments: &[usize],
+    swings: &[f64],
+    analyse: doubling::Analyse<'_, AnalysisError>,
+) -> Option<f64> {
+    let errors = doubling::errors(options, segments, analyse).ok()??;
+    Some(errors.iter().zip(swings).map(|(e, swing)| e.abs().min(*swing)).fold(0.0, f64::max))
 }
 
 /// Frequencies about where the run goes to, with errors relative to what each may have.
