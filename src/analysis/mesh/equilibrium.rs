@@ -11,6 +11,7 @@ use crate::compile::Compiled;
 use crate::refine::carry::carried;
 use crate::refine::doubling::{self, Output};
 use crate::refine::model_order::ModelOrder;
+use std::borrow::Cow;
 
 /// Share of the largest displacement below which errors are relative to that.
 const SMALL: f64 = 1.0 / 30.0;
@@ -40,14 +41,14 @@ pub(super) fn estimated(
 }
 
 /// A mesh with its equilibrium.
-type Known = Option<(Compiled, OperatingPoint)>;
+type Known<'a> = Option<(Cow<'a, Compiled>, OperatingPoint)>;
 
 /// The equilibrium on a mesh, next to that of the mesh before.
-fn follow(
-    compiled: &Compiled,
+fn follow<'a>(
+    compiled: &'a Compiled,
     voltages: &PortVoltages,
     segments: &[usize],
-    known: &mut Known,
+    known: &mut Known<'a>,
 ) -> Result<Vec<Output>, AnalysisError> {
     let model = meshed(compiled, segments)?;
     let linear = model.parts.system.model.linear;

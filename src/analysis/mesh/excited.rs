@@ -117,7 +117,8 @@ fn frequencies(
     segments: &[usize],
     tolerances: &[f64],
 ) -> Result<Vec<Output>, AnalysisError> {
-    let found = modes(&meshed(moving, segments)?, tolerances.len(), voltages)?.frequencies_hz;
+    let model = meshed(moving, segments)?;
+    let found = modes(&model, tolerances.len(), voltages)?.frequencies_hz;
     let scale = |f: f64, tolerance: f64| (f * tolerance / moving.options.tol).max(f64::MIN_POSITIVE);
     let mut outputs: Vec<Output> =
         found.iter().zip(tolerances).map(|(&f, &tolerance)| Output { value: f, scale: scale(f, tolerance) }).collect();
@@ -157,7 +158,10 @@ fn excited(
     let system = &model.parts.system;
     let rest = OperatingPoint::rest(&model, &options.voltages)?;
     let from = match options.release {
-        Some(start) => operating_point(&meshed(start, segments)?, &options.voltages)?,
+        Some(start) => {
+            let held = meshed(start, segments)?;
+            operating_point(&held, &options.voltages)?
+        }
         None => rest.clone(),
     };
     // without an equilibrium to go to the way is that from rest

@@ -19,10 +19,12 @@ use super::pull_in::pull_in;
 use super::transient::TransientOptions;
 use super::{AnalysisError, PortVoltages};
 use crate::compile::Compiled;
+use crate::discretize::DiscretizeError;
 use crate::netlist::{Diagnostic, Severity};
 use crate::refine::counted;
 use crate::refine::doubling::{self, Output};
 use crate::refine::model_order::ModelOrder;
+use std::borrow::Cow;
 
 /// What a mesh is for.
 #[derive(Debug, Clone, Copy)]
@@ -48,6 +50,8 @@ pub enum Request<'a> {
     },
 }
 
+/// Modes beyond which none are compared with those of a finer mesh: their own estimates stand.
+const MOST_COMPARED: usize = 64;
 /// Code of the warning that a mesh does not hold the tolerance.
 const WARNING: &str = "W040";
 
@@ -87,8 +91,7 @@ fn on(compiled: &Compiled, order: ModelOrder) -> Result<Compiled, AnalysisError>
     let mut fitted = if order.segments == compiled.order.segments {
         Compiled { order, ..compiled.clone() }
     } else {
-        let detail =
-            |error: crate::discretize::DiscretizeError| AnalysisError::NotConverged { detail: error.to_string() };
+        let detail = |error: DiscretizeError| AnalysisError::NotConverged { detail: error.to_string() };
         compiled.with_order(order).map_err(detail)?
     };
     let tol = fitted.options.tol;
@@ -122,8 +125,7 @@ fn for_modes(compiled: &Compiled, count: usize, voltages: &PortVoltages) -> Resu
     let order = if given {
         compiled.order.clone()
     } else {
-        let detail =
-            |error: crate::discretize::DiscretizeError| AnalysisError::NotConverged { detail: error.to_string() };
+        let detail = |error: DiscretizeError| AnalysisError::NotConverged { detail: error.to_string() };
         counted::choose(&compiled.structure, &compiled.options, count).map_err(detail)?
     };
     let mut analyse = |segments: &[usize]| {
@@ -138,8 +140,8 @@ fn for_modes(compiled: &Compiled, count: usize, voltages: &PortVoltages) -> Resu
     };
     if !loaded {
         // modes about the drawing know their errors, where the scheme lets them
-        let order = own_estimate(compiled, order, count)?;
-        if order.estimated_error.is_some() {
+        let order = own_estimate(compiled, order, count, &[])?;
+        if order.estimated_error.is_some() || count > MOST_COMPARED {
             return Ok(order);
         }
         return match given {
@@ -151,15 +153,25 @@ fn for_modes(compiled: &Compiled, count: usize, voltages: &PortVoltages) -> Resu
         return doubling::estimate(&compiled.options, order.segments, &mut analyse);
     }
     let still = equilibrium::order(compiled, voltages, order.segments)?;
-    let moving = doubling::fit(&compiled.structure, &compiled.options, still.segments, &mut analyse)?;
+    let own = own_estimate(compiled, still.clone(), count, voltages)?;
     let worst = |a: Option<f64>, b: Option<f64>| Some(a?.max(b?));
+    let enough = own.estimated_error.is_some_and(|error| error <= counted::SAFETY * compiled.options.tol);
+    if enough || count > MOST_COMPARED {
+        return Ok(ModelOrder { estimated_error: worst(still.estimated_error, own.estimated_error), ..own });
+    }
+    let moving = doubling::fit(&compiled.structure, &compiled.options, still.segments, &mut analyse)?;
     Ok(ModelOrder { estimated_error: worst(still.estimated_error, moving.estimated_error), ..moving })
 }
 
-/// The estimate that the modes themselves make of a mesh, about the drawn geometry.
-fn own_estimate(compiled: &Compiled, order: ModelOrder, count: usize) -> Result<ModelOrder, AnalysisError> {
+/// The estimate that the modes themselves make of a mesh.
+fn own_estimate(
+    compiled: &Compiled,
+    order: ModelOrder,
+    count: usize,
+    voltages: &PortVoltages,
+) -> Result<ModelOrder, AnalysisError> {
     let model = meshed(compiled, &order.segments)?;
-    let errors = modes(&model, count, &[])?.errors;
+    let errors = modes(&model, count, voltages)?.errors;
     let told: Option<Vec<f64>> = errors.into_iter().collect();
     let worst = told.map(|errors| errors.iter().fold(0.0, |m: f64, e| m.max(e.abs())));
     Ok(ModelOrder { estimated_error: worst, ..order })
@@ -167,7 +179,8 @@ fn own_estimate(compiled: &Compiled, order: ModelOrder, count: usize) -> Result<
 
 fn for_pull_in(compiled: &Compiled, port: Option<&str>, max: f64) -> Result<ModelOrder, AnalysisError> {
     let mut analyse = |segments: &[usize]| {
-        let found = pull_in(&meshed(compiled, segments)?, port, max)?;
+        let model = meshed(compiled, segments)?;
+        let found = pull_in(&model, port, max)?;
         let output = |volts: f64| Output { value: volts, scale: volts.abs().max(f64::MIN_POSITIVE) };
         Ok(vec![output(found.pull_in_v), found.release_v.map_or(Output { value: f64::NAN, scale: 1.0 }, output)])
     };
@@ -178,7 +191,11 @@ fn for_pull_in(compiled: &Compiled, port: Option<&str>, max: f64) -> Result<Mode
 }
 
 /// The model with so many segments.
-fn meshed(compiled: &Compiled, segments: &[usize]) -> Result<Compiled, AnalysisError> {
+fn meshed<'a>(compiled: &'a Compiled, segments: &[usize]) -> Result<Cow<'a, Compiled>, AnalysisError> {
+    if segments == compiled.order.segments {
+        return Ok(Cow::Borrowed(compiled));
+    }
     let order = ModelOrder { segments: segments.to_vec(), ..compiled.order.clone() };
-    compiled.with_order(order).map_err(|error| AnalysisError::NotConverged { detail: error.to_string() })
+    let refused = |error: DiscretizeError| AnalysisError::NotConverged { detail: error.to_string() };
+    compiled.with_order(order).map(Cow::Owned).map_err(refused)
 }

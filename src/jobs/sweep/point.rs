@@ -133,7 +133,11 @@ fn analyse(compiled: &Compiled, analysis: &SweepAnalysis) -> Result<Vec<Value>, 
         SweepAnalysis::Modes { count, voltages } => Request::Modes { count: *count, voltages },
         SweepAnalysis::PullIn { port, max } => Request::PullIn { port: port.as_deref(), max: *max },
     };
-    let compiled = &fitted(compiled, &request).map_err(|error| error.to_string())?;
+    // a mesh of the user's own stays as it is, and a table has no column for its estimate
+    let compiled = match compiled.options.segments {
+        Some(_) => compiled,
+        None => &fitted(compiled, &request).map_err(|error| error.to_string())?,
+    };
     match analysis {
         SweepAnalysis::Static { outputs, voltages } => {
             let result = statics::static_equilibrium(compiled, voltages).map_err(|error| error.to_string())?;
