@@ -66,7 +66,7 @@ options! {
 
     /// Highest frequency the model must resolve: as many segments as the estimated error of every mode below it needs to stay
     /// within tol.
-    band: Option<f64> = None, "band_hz" = 2, ["Hz"], Range::Above(0.0, 1e12), "by the slenderness of the beams";
+    band: Option<f64> = None, "band_hz" = 2, ["Hz"], Range::Above(0.0, 1e12), "by what the analysis asks for";
 
     /// How beams meet. centreline: in points, as in SUGAR; offset: at the edges of rigid junctions; calibrated: with springs
     /// there, from two-dimensional elasticity (docs/junctions.md).

@@ -13,7 +13,7 @@ class Options(TypedDict, total=False):
 
     band: float | None
     """Highest frequency the model must resolve: as many segments as the estimated error of every mode below it
-    needs to stay within tol [Hz]. Range: above 0, at most 1e12; default: by the slenderness of the beams."""
+    needs to stay within tol [Hz]. Range: above 0, at most 1e12; default: by what the analysis asks for."""
 
     junctions: Literal["centreline", "offset", "calibrated"] | None
     """How beams meet. centreline: in points, as in SUGAR; offset: at the edges of rigid junctions; calibrated:
