@@ -3,7 +3,7 @@
 use crate::discretize::{DiscretizeError, Discretized, discretize_with, order};
 use crate::equations::Joints;
 use crate::multibody::relative::Unfit;
-use crate::netlist::{Bundle, Diagnostics, Setting};
+use crate::netlist::{Bundle, Diagnostics, Setting, Source};
 use crate::options::Refused;
 use crate::refine::imperfection;
 use crate::refine::model_order::{self, ModelOrder};
@@ -79,31 +79,69 @@ pub enum CompileError {
 /// # Errors
 /// See [`CompileError`].
 pub fn compile(bundle: &Bundle, options: &CompileOptions) -> Result<Compiled, CompileError> {
+    draw(&Source::new(bundle), options)?.compile()
+}
+
+/// A netlist as drawn with its options settled, before any mesh.
+#[derive(Debug, Clone)]
+pub struct Drawn {
+    /// What was drawn.
+    pub structure: Structure,
+    /// Netlist parameters with the values they took.
+    pub parameters: Vec<(String, Setting)>,
+    /// Warnings of the netlist.
+    pub warnings: Diagnostics,
+    /// The options, with what one of them says of another.
+    pub options: CompileOptions,
+}
+
+/// Draws a netlist that has been read: the part of [`compile`] that depends on the values of parameters alone.
+///
+/// # Errors
+/// See [`CompileError`].
+pub fn draw(source: &Source, options: &CompileOptions) -> Result<Drawn, CompileError> {
     options.check()?;
-    // joint coordinates need rotary inertia in every body, and of the schemes of high order Es has it
-    let in_joints = CompileOptions { scheme: Scheme::Es, ..options.clone() };
-    let joints = matches!(options.formulation, Formulation::Rcr | Formulation::RcrElastic);
-    let options = if joints && options.scheme == Scheme::E4 { &in_joints } else { options };
-    let as_sugar = CompileOptions { linear: true, junctions: Junctions::Centreline, ..options.clone() };
-    let options = if options.as_sugar { &as_sugar } else { options };
-    let loaded = crate::netlist::load(bundle, &options.set).map_err(CompileError::Netlist)?;
-    let order = match (options.band, options.segments) {
-        (Some(band), None) => model_order::choose(&loaded.structure, options, band)?,
-        _ => {
-            let segments = order::a_priori(&loaded.structure, options)?;
-            ModelOrder { segments, estimated_error: None, modes_in_band: 0, passes: 0 }
-        }
-    };
-    let parts = laid_out(&loaded.structure, options, &order.segments)?;
-    Ok(Compiled {
-        joints: in_joints_of(&parts, options),
-        structure: loaded.structure,
-        parameters: loaded.parameters,
-        warnings: loaded.warnings,
-        options: options.clone(),
-        parts,
-        order,
-    })
+    let scheme = options.scheme.in_formulation(options.formulation);
+    let mut options = CompileOptions { scheme, ..options.clone() };
+    if options.as_sugar {
+        (options.linear, options.junctions) = (true, Junctions::Centreline);
+    }
+    let loaded = source.load(&options.set).map_err(CompileError::Netlist)?;
+    Ok(Drawn { structure: loaded.structure, parameters: loaded.parameters, warnings: loaded.warnings, options })
+}
+
+impl Drawn {
+    /// The model on the mesh that the options ask for.
+    ///
+    /// # Errors
+    /// See [`CompileError`].
+    pub fn compile(self) -> Result<Compiled, CompileError> {
+        let order = match (self.options.band, self.options.segments) {
+            (Some(band), None) => model_order::choose(&self.structure, &self.options, band)?,
+            _ => {
+                let segments = order::a_priori(&self.structure, &self.options)?;
+                ModelOrder { segments, estimated_error: None, modes_in_band: 0, passes: 0 }
+            }
+        };
+        Ok(self.on(order)?)
+    }
+
+    /// The model on a given mesh.
+    ///
+    /// # Errors
+    /// See [`DiscretizeError`].
+    pub fn on(self, order: ModelOrder) -> Result<Compiled, DiscretizeError> {
+        let parts = laid_out(&self.structure, &self.options, &order.segments)?;
+        Ok(Compiled {
+            joints: in_joints_of(&parts, &self.options),
+            structure: self.structure,
+            parameters: self.parameters,
+            warnings: self.warnings,
+            options: self.options,
+            parts,
+            order,
+        })
+    }
 }
 
 /// Bodies and joints, with the imperfection asked for.

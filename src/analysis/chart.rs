@@ -5,6 +5,7 @@
 //! | precision | integration method, tolerance, formulation | the same model, integrated far more tightly |
 //! | order | the band that the model resolves, formulation | the finest model of the list |
 //! | solvers | the solver of the linear systems, the band | nothing: the time of a step |
+//! | defaults | the tolerance alone, of `static`, `modes` and `tran` as commands make them | the same at a tenth of the tightest |
 //!
 //! Errors are root mean squares over output times and signals, relative to the amplitude of the reference ([`error`]).
 //! They and the counters are the same on every run. Times are wall-clock times, medians over repeats, and are not. A run
@@ -14,6 +15,7 @@
 //! gives the same motion but for a difference that is part of the result. In joint coordinates both are Rodas4's. Errors below
 //! it mean nothing.
 
+mod defaults;
 pub mod error;
 mod runs;
 pub mod steps;
@@ -24,13 +26,13 @@ pub use variant::released;
 use super::integrator::Integrator;
 use super::modes::modes;
 use super::{AnalysisError, PortVoltages, Watch};
-use crate::compile::{CompileError, CompileOptions};
+use crate::compile::{CompileError, CompileOptions, Formulation as Compiled};
 use crate::netlist::Bundle;
 use crate::solve::baseline::SolverKind;
 use runs::{Progress, Request, order, precision};
 use serde::Serialize;
 use thiserror::Error;
-use variant::Variant;
+use variant::{Models, Variant};
 
 /// Periods of the lowest mode that a run lasts when no end is given.
 const PERIODS: f64 = 5.0;
@@ -54,8 +56,8 @@ pub enum Formulation {
 impl Formulation {
     /// All of them, the product's own first.
     pub const ALL: [Self; 4] = [Self::Compliant, Self::Frame, Self::Rcr, Self::RcrElastic];
-    /// What is charted unless said otherwise; joint coordinates want a scheme with rotary inertia.
-    pub const DEFAULT: [Self; 2] = [Self::Compliant, Self::Frame];
+    /// What is charted unless said otherwise.
+    pub const DEFAULT: [Self; 3] = [Self::Compliant, Self::Frame, Self::Rcr];
 
     /// Its name on the command line and in results.
     pub fn name(self) -> &'static str {
@@ -64,6 +66,15 @@ impl Formulation {
             Self::Frame => "frame",
             Self::Rcr => "rcr",
             Self::RcrElastic => "rcr-elastic",
+        }
+    }
+
+    /// What a model in it is compiled as; none: as the compliant one.
+    fn compiled_as(self) -> Option<Compiled> {
+        match self {
+            Self::Compliant | Self::Frame => None,
+            Self::Rcr => Some(Compiled::Rcr),
+            Self::RcrElastic => Some(Compiled::RcrElastic),
         }
     }
 
@@ -92,11 +103,15 @@ pub enum Part {
     Order,
     /// Solvers on models of growing order.
     Solvers,
+    /// Default analyses by tolerance: what is asked for and what comes out.
+    Defaults,
 }
 
 impl Part {
     /// All of them.
-    pub const ALL: [Self; 3] = [Self::Precision, Self::Order, Self::Solvers];
+    pub const ALL: [Self; 4] = [Self::Precision, Self::Order, Self::Solvers, Self::Defaults];
+    /// What is charted unless said otherwise.
+    pub const DEFAULT: [Self; 3] = [Self::Precision, Self::Order, Self::Solvers];
 
     /// Its name on the command line and in results.
     pub fn name(self) -> &'static str {
@@ -104,6 +119,7 @@ impl Part {
             Self::Precision => "precision",
             Self::Order => "order",
             Self::Solvers => "solvers",
+            Self::Defaults => "defaults",
         }
     }
 }
@@ -138,10 +154,12 @@ pub struct ChartSpec {
 }
 
 /// Numbers of a run that succeeded.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Measured {
     /// Relative error [1]; none where nothing is compared.
     pub error: Option<f64>,
+    /// Default part: the error that the analysis itself tells [1].
+    pub told: Option<f64>,
     /// Wall-clock time: of the whole run, or of one step in the solver part [s].
     pub seconds: f64,
     /// Accepted steps.
@@ -226,9 +244,13 @@ pub fn chart(
 ) -> Result<Chart, ChartError> {
     check(spec)?;
     let release = spec.release.as_deref();
-    let base = Variant::new(bundle, options, options.band, release)?;
-    let lowest =
-        if spec.stop.is_none() || spec.bands.is_empty() { Some(lowest_mode(&base, &spec.voltages)?) } else { None };
+    let models = |band| Models::new(bundle, options, band, release, &spec.formulations);
+    let base = models(options.band)?;
+    let lowest = if spec.stop.is_none() || spec.bands.is_empty() {
+        Some(lowest_mode(&base.bodies, &spec.voltages)?)
+    } else {
+        None
+    };
     let stop = spec.stop.or(lowest.map(|f| PERIODS / f)).unwrap_or_default();
     let mut bands = match (spec.bands.is_empty(), lowest) {
         (true, Some(f)) => BANDS.iter().map(|k| k * f).collect(),
@@ -242,7 +264,8 @@ pub fn chart(
     let count = |part: Part, runs: usize| if spec.parts.contains(&part) { runs } else { 0 };
     let runs = count(Part::Precision, spec.formulations.iter().map(precise).sum())
         + count(Part::Order, spec.formulations.len() * bands.len() * spec.repeat)
-        + count(Part::Solvers, spec.solvers.len() * bands.len());
+        + count(Part::Solvers, spec.solvers.len() * bands.len())
+        + count(Part::Defaults, defaults::ANALYSES.len() * (spec.tols.len() + 1));
     let mut progress = Progress { watch, done: 0.0, total: runs.max(1) as f64 };
     let mut chart = Chart { stop, signals: spec.signals.clone(), reference_error: None, points: Vec::new() };
     let request = Request { spec, stop };
@@ -250,15 +273,14 @@ pub fn chart(
         precision(&base, &request, &mut chart, &mut progress)?;
     }
     if spec.parts.contains(&Part::Order) || spec.parts.contains(&Part::Solvers) {
-        let models: Vec<Variant> =
-            bands.iter().map(|&b| Variant::new(bundle, options, Some(b), release)).collect::<Result<_, _>>()?;
+        let models: Vec<Models> = bands.iter().map(|&b| models(Some(b))).collect::<Result<_, _>>()?;
         if spec.parts.contains(&Part::Order) {
             order(&models, &request, &mut chart, &mut progress)?;
         }
         if spec.parts.contains(&Part::Solvers) {
             for model in &models {
                 for &solver in &spec.solvers {
-                    chart.points.push(steps::measure(model, &request, solver)?);
+                    chart.points.push(steps::measure(&model.bodies, &request, solver)?);
                     progress.done += 1.0;
                     if !progress.run(0.0) {
                         return Err(AnalysisError::Cancelled.into());
@@ -266,6 +288,9 @@ pub fn chart(
                 }
             }
         }
+    }
+    if spec.parts.contains(&Part::Defaults) {
+        defaults::defaults((bundle, options), (spec, stop), &mut chart, &mut progress)?;
     }
     Ok(chart)
 }

@@ -1,14 +1,95 @@
-//! What a formulation makes of bodies and joints: which directions it locks, and tree and loops.
+//! What a formulation makes of bodies and joints: which directions it locks, and tree and loops; and which one suits.
+//!
+//! **What `auto` takes.** Where joints are elastic in every direction, a step in joint coordinates takes as long as one of the
+//! bodies or longer, and both take the same steps (docs/rcr.md has the measurements): compliant. Where the drawing's joints only turn and close
+//! no loops, as rigid plates on flexure pivots under a scheme of the paper, the bodies' own coordinates need stiff springs in
+//! the directions that do not move, and steps that follow them; the recursion needs neither, and its explicit steps cost a
+//! few evaluations without any factorization: rcr with rk45, as long as they are few. In circuits and services, whose steps
+//! the caller sets, compliant.
 
 use super::AnalysisError;
+use super::integrator::Integrator;
+use super::transient::TransientOptions;
+use crate::compile::Compiled;
 use crate::gaps::System;
 use crate::multibody::rcr::{Linkage, Parent};
 use crate::multibody::{BodyId, Model};
+use crate::solve::baseline::SolverKind;
+use crate::solve::fastest::fastest;
 use std::borrow::Cow;
 
 pub use crate::options::Formulation;
 
+/// Radians that the fastest motion of joints may turn in a run for explicit steps to be few: a step is stable up to about
+/// three, so a thousand steps, what the bodies take for such a motion at a tolerance of 1e-3.
+const FEW: f64 = 3e3;
+
+/// What `auto` takes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Suited {
+    /// Compliant or rcr.
+    pub formulation: Formulation,
+    /// Why, in words.
+    pub why: String,
+}
+
 impl Formulation {
+    /// What `auto` takes for a run of `stop` [s], or where steps are the caller's (none).
+    pub fn suited(compiled: &Compiled, stop: Option<f64>) -> Suited {
+        let system = &compiled.parts.system;
+        let model = &system.model;
+        let compliant = |why: &str| Suited { formulation: Self::Compliant, why: why.to_owned() };
+        let mut beams = model.sections.iter().filter(|s| s.is_segment());
+        if model.linear {
+            return compliant("small displacements");
+        }
+        if beams.clone().next().is_none() || beams.any(|s| s.locked != [true, true, false]) {
+            return compliant("joints are elastic in every direction, where a step in joint coordinates costs more");
+        }
+        let Ok(linkage) = Self::Rcr.linkage(system) else { return compliant("joint coordinates do not suit it") };
+        if linkage.constraints > 0 {
+            return compliant("joints that only turn close loops, which may be singular as drawn");
+        }
+        let Some(stop) = stop else {
+            return compliant("joints only turn, but steps are the caller's: explicit ones might be too long");
+        };
+        let scale = coordinate_scales(&linkage, system.length_scale);
+        let omega = fastest(&linkage, &scale, system.electrics.heating.heaters.len()).map_or(0.0, |top| top.omega);
+        if omega * stop > FEW {
+            return compliant("joints only turn, but the fastest is too fast for explicit steps");
+        }
+        let (n, unknowns) = (linkage.coordinates, model.unknowns());
+        Suited {
+            formulation: Self::Rcr,
+            why: format!(
+                "joints only turn and close no loop: {n} coordinates for {unknowns}, explicit steps with rk45, stable from some {:.0} on",
+                (omega * stop / 3.0).ceil().max(1.0)
+            ),
+        }
+    }
+
+    /// The formulation and the method of a run: `auto` decided, with the reason, everything else as it was asked for. A method
+    /// other than the default, equal steps and a baseline's solver are those of the bodies; so is the equilibrium that a
+    /// release starts from.
+    pub fn of_run(compiled: &Compiled, options: &TransientOptions<'_>) -> (Suited, Integrator) {
+        let method = options.method;
+        let asked = compiled.options.formulation;
+        if asked != Self::Auto {
+            return (Suited { formulation: asked, why: "as asked".into() }, method);
+        }
+        let plain = method == Integrator::Rodas4
+            && options.step.is_none()
+            && options.solver == SolverKind::Recursion
+            && options.release.is_none();
+        if !plain {
+            let why = "a release, a method, equal steps or a solver was asked for".into();
+            return (Suited { formulation: Self::Compliant, why }, method);
+        }
+        let suited = Self::suited(compiled, Some(options.stop));
+        let method = if suited.formulation == Self::Rcr { Integrator::Rk45 } else { method };
+        (suited, method)
+    }
+
     /// The model with the directions locked that this formulation locks.
     pub fn lock(self, model: &Model) -> Cow<'_, Model> {
         match self {

@@ -67,6 +67,7 @@ pub fn frame_statics(
         free_motions: Vec::new(),
         unknowns: frame.system.unknowns(),
         estimated_error: None,
+        warnings: Vec::new(),
         iterations: 1,
     };
     Ok((result, beam_motions(frame, &q)))
@@ -194,6 +195,7 @@ pub fn frame_transient(
         counters,
         unknowns: frame.system.unknowns(),
         estimated_error: None,
+        step_error: None,
         events: Vec::new(),
         warnings: Vec::new(),
     })

@@ -12,8 +12,8 @@ use crate::solve::midpoint::Midpoint;
 use crate::solve::radau5::Radau5;
 use crate::solve::rk45::Rk45;
 use crate::solve::rodas4::Rodas4;
-use crate::solve::sdirk4::Sdirk4;
-use crate::solve::tr_bdf2::TrBdf2;
+use crate::solve::time::dirk::Dirk;
+use crate::solve::time::tableau::{SDIRK4, TR_BDF2};
 
 /// What integrates a motion in time.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -110,10 +110,10 @@ impl Integrator {
             Self::Rodas4 => run.with(Rodas4::with_solver(solver, system, &[])),
             Self::AverageField => run.doubled(AverageField::with_solver(solver, system)),
             Self::Midpoint => run.doubled(Midpoint::with_solver(solver, system)),
-            Self::TrBdf2 => run.with(TrBdf2::with_solver(solver, system)),
+            Self::TrBdf2 => run.with(Dirk::with_solver(solver, system, &TR_BDF2)),
             Self::GeneralizedAlpha { rho } => run.doubled(GeneralizedAlpha::with_solver(solver, system, rho)),
             Self::Newmark => run.doubled(GeneralizedAlpha::newmark_with_solver(solver, system)),
-            Self::Sdirk4 => run.with(Sdirk4::with_solver(solver, system)),
+            Self::Sdirk4 => run.with(Dirk::with_solver(solver, system, &SDIRK4)),
             Self::Radau5 => run.with(Radau5::new(system)),
             Self::Rk45 => match Rk45::new(system) {
                 Ok(method) => run.with(method),

@@ -6,14 +6,18 @@ pub(crate) mod contact_range;
 pub mod continuation;
 pub mod formulation;
 pub mod frame;
+mod gap_pieces;
 pub mod integrator;
 pub mod joint_transient;
+mod linear_stress;
 pub mod mesh;
 pub mod modes;
 pub mod pull_in;
+pub mod side_by_side;
 pub mod signal;
 mod stability;
 pub mod statics;
+pub mod step_error;
 pub mod transient;
 
 use thiserror::Error;

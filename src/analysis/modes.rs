@@ -5,7 +5,7 @@ use super::{AnalysisError, BeamMotions, NodeMotions, PortVoltages};
 use crate::compile::Compiled;
 use crate::gaps::Point;
 use crate::multibody::BlockMatrix;
-use crate::multibody::forces::{add_inertia, add_stress_stiffness};
+use crate::multibody::forces::add_inertia;
 use crate::multibody::planar::Pose;
 use crate::refine::axial::axial_forces;
 use crate::refine::order_error::{of_loaded_modes, own_stiffness};
@@ -40,6 +40,8 @@ const GUARDS: usize = 2;
 const FAR: f64 = 0.02;
 /// Below this share of a mode in its reference nothing is said about its error.
 const ALIKE: f64 = 0.5;
+/// Estimates of this size and more say only that the mesh is far too coarse for one.
+const BELIEVED: f64 = 1.0;
 /// An estimate is not told where rounding in the stiffness may be more.
 const ROUNDED: f64 = 1e-4;
 
@@ -49,6 +51,19 @@ const ROUNDED: f64 = 1e-4;
 /// See [`AnalysisError`]; `NotConverged` rather than a frequency that cannot be trusted.
 pub fn modes(compiled: &Compiled, count: usize, voltages: &PortVoltages) -> Result<ModesResult, AnalysisError> {
     Ok(modes_with_curves(compiled, count, voltages)?.0)
+}
+
+/// The same on the mesh that holds the tolerance, which comes with it, and the displacement of points along every beam.
+///
+/// # Errors
+/// See [`modes`].
+pub fn modes_fitted(
+    compiled: &Compiled,
+    count: usize,
+    voltages: &PortVoltages,
+) -> Result<(Compiled, ModesResult, Vec<BeamMotions>), AnalysisError> {
+    let (fitted, (result, curves)) = super::mesh::modes_fitted(compiled, count, voltages)?;
+    Ok((fitted, result, curves))
 }
 
 /// The same, with the displacement of points along every beam for pictures, mode by mode.
@@ -84,7 +99,7 @@ pub fn modes_with_curves(
     let mut residual = q.clone();
     system.tangent(&q, &drive, &mut tangent, &mut residual);
     // what stress and heat do to the stiffness belongs to the vibration, in a linear model too
-    add_stress_stiffness(&system.model, &q, &drive.rest(), &mut tangent);
+    system.add_stress_stiffness(&q, &drive, &mut tangent);
     let mut found = lowest_modes(system, (&q, &drive), &tangent, count + GUARDS)?;
     if found.lambda.is_empty() {
         let detail = "no mode came out: nothing that moves has mass, or the stiffness is not finite".into();
@@ -148,7 +163,7 @@ fn estimated(compiled: &Compiled, tangent: &BlockMatrix<f64, 3>, forces: &[f64],
     }
     let modes = (lambda.as_slice(), found.shapes.as_slice());
     let compared = of_loaded_modes(&compiled.structure, options, &compiled.parts, (&factor, shift), forces, modes);
-    let sure = |(error, like): (f64, f64)| (error.is_finite() && like >= ALIKE).then_some(error);
+    let sure = |(error, like): (f64, f64)| (error.abs() < BELIEVED && like >= ALIKE).then_some(error);
     compared.map_or(none, |e| e.relative.into_iter().zip(e.likeness).map(sure).collect())
 }
 

@@ -45,6 +45,21 @@ pub struct PullInResult {
     /// Largest estimated relative error by the mesh [1]; none without an estimate.
     #[serde(skip)]
     pub estimated_error: Option<f64>,
+    /// What the numbers do not say by themselves, as sentences.
+    #[serde(skip)]
+    pub warnings: Vec<String>,
+}
+
+/// [`pull_in`] on the mesh that holds the tolerance, which comes with it.
+///
+/// # Errors
+/// See [`pull_in`].
+pub fn pull_in_fitted(
+    compiled: &Compiled,
+    port: Option<&str>,
+    max: f64,
+) -> Result<(Compiled, PullInResult), AnalysisError> {
+    super::mesh::pull_in_fitted(compiled, port, max)
 }
 
 /// Follows the equilibrium up to `max` volts on `port` (none: the first port, else the first source of the netlist), then
@@ -70,13 +85,25 @@ pub fn pull_in(compiled: &Compiled, port: Option<&str>, max: f64) -> Result<Pull
     let q = sweep.at_rest()?;
     let touching = sweep.touching(&q);
     match sweep.close(q, max)? {
-        Closed::Falls { volts } => {
-            Ok(PullInResult { port: name, pull_in_v: volts, release_v: None, held: false, estimated_error })
-        }
+        Closed::Falls { volts } => Ok(PullInResult {
+            port: name,
+            pull_in_v: volts,
+            release_v: None,
+            held: false,
+            estimated_error,
+            warnings: Vec::new(),
+        }),
         Closed::Rests { fold, volts, q } => {
             let made: Vec<usize> = (0..touching.len()).filter(|&g| !touching[g] && system.touches(g, &q)).collect();
             let release_v = sweep.release(q, volts, &made)?;
-            Ok(PullInResult { port: name, pull_in_v: fold, release_v, held: true, estimated_error })
+            Ok(PullInResult {
+                port: name,
+                pull_in_v: fold,
+                release_v,
+                held: true,
+                estimated_error,
+                warnings: Vec::new(),
+            })
         }
     }
 }

@@ -103,8 +103,7 @@ impl Signal {
         }
     }
 
-    /// Its change with a change of the state. The share of rotation in the rate of a point's velocity is left out: it is
-    /// of second order in rates.
+    /// Its change with a change of the state.
     pub fn slope(&self, compiled: &Compiled, state: &View<'_>, change: &View<'_>) -> f64 {
         let system = &compiled.parts.system;
         let linear = system.model.linear;
@@ -112,7 +111,12 @@ impl Signal {
             Self::Displacement(p, 2) => p.rotation(change.q),
             Self::Displacement(p, d) => point_rate(p, state.q, change.q, linear)[d],
             Self::Rate(p, 2) => Model::pose(change.v, p.body).z,
-            Self::Rate(p, d) => point_rate(p, state.q, change.v, linear)[d],
+            Self::Rate(p, d) => {
+                let (q, v, turned) =
+                    (Model::pose(state.q, p.body), Model::pose(state.v, p.body), Model::pose(change.q, p.body));
+                let (_, bend) = planar::point_turn(&q, p.arm, linear);
+                point_rate(p, state.q, change.v, linear)[d] + bend[d] * turned.z * v.z
+            }
             Self::Temperature(k) => change.rise[k],
             Self::Prescribed(_) => 0.0,
             Self::Charge(g) => {

@@ -6,7 +6,7 @@
 //! in it.
 
 use crate::gaps::{Drive, System};
-use crate::multibody::forces::add_stress_stiffness;
+use crate::multibody::forces::add_inertia;
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, Model};
 use crate::solve::frequency::eigen::mass_product;
@@ -84,9 +84,9 @@ impl Stability {
 
     fn stiffness(&mut self, system: &System, drive: &Drive, q: &[Pose], mass: f64) {
         system.tangent(q, drive, &mut self.tangent, &mut self.rest);
-        add_stress_stiffness(&system.model, q, &drive.rest(), &mut self.tangent);
+        system.add_stress_stiffness(q, drive, &mut self.tangent);
         if mass > 0.0 {
-            crate::multibody::forces::add_inertia(&system.model, mass, 0.0, &mut self.tangent);
+            add_inertia(&system.model, mass, 0.0, &mut self.tangent);
         }
         system.model.project_matrix(&mut self.tangent);
     }

@@ -43,6 +43,8 @@ pub struct StaticResult {
     pub estimated_error: Option<f64>,
     /// Newton iterations over all load steps.
     pub iterations: usize,
+    /// What the numbers do not say by themselves, as sentences.
+    pub warnings: Vec<String>,
 }
 
 /// Finds the equilibrium that is reached from rest by raising all loads and voltages together.
@@ -62,6 +64,24 @@ pub fn static_with_curves(
     voltages: &PortVoltages,
 ) -> Result<(StaticResult, BeamMotions), AnalysisError> {
     let point = operating_point(compiled, voltages)?;
+    Ok((result_at(compiled, &point), beam_motions(compiled, &point.q)))
+}
+
+/// [`static_with_curves`] on the mesh that holds the tolerance, which comes with it.
+///
+/// # Errors
+/// See [`AnalysisError`].
+pub fn static_fitted(
+    compiled: &Compiled,
+    voltages: &PortVoltages,
+) -> Result<(Compiled, StaticResult, BeamMotions), AnalysisError> {
+    let (fitted, point) = super::mesh::static_fitted(compiled, voltages)?;
+    let (result, curves) = (result_at(&fitted, &point), beam_motions(&fitted, &point.q));
+    Ok((fitted, result, curves))
+}
+
+/// What there is to tell of an equilibrium.
+pub(crate) fn result_at(compiled: &Compiled, point: &OperatingPoint) -> StaticResult {
     let system = &compiled.parts.system;
     let electrics = &system.electrics;
     let port = |p: usize| electrics.names[p].clone();
@@ -70,23 +90,22 @@ pub fn static_with_curves(
             .map(|g| electrics.gap_rows[(g, p)] * system.capacitance(g, &point.q) * point.volts[g])
             .sum::<f64>()
     };
-    let curves = beam_motions(compiled, &point.q);
     let jumped = point.path.fold.is_some();
     let touching = (0..system.gaps.len()).any(|g| system.touches(g, &point.q));
     let electrical = electrical(compiled, &point.sources, &point.rise);
-    let result = StaticResult {
+    StaticResult {
         nodes: node_motions(compiled, &point.q),
         temperatures_k: electrical.temperatures_k,
         currents_a: electrical.currents_a,
         charges_c: (0..electrics.ports).map(|p| (port(p), charge(p))).collect(),
         pulled_in: jumped && point.volts.iter().any(|v| *v != 0.0) && touching,
         jumped,
-        free_motions: point.free_motions,
+        free_motions: point.free_motions.clone(),
         unknowns: system.model.unknowns(),
         estimated_error: compiled.order.estimated_error,
         iterations: point.path.iterations,
-    };
-    Ok((result, curves))
+        warnings: Vec::new(),
+    }
 }
 
 /// What source voltages and temperature rises say without any mechanics.

@@ -1,5 +1,6 @@
 //! Motion in time.
 use super::contact_range::within_contact_range;
+use super::formulation::Formulation;
 use super::integrator::Integrator;
 use super::joint_transient::joint_transient;
 use super::signal::{Signal, View};
@@ -98,7 +99,7 @@ pub struct Event {
 }
 
 /// Sampled signals.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct TransientResult {
     /// Times [s].
     pub t: Vec<f64>,
@@ -110,6 +111,9 @@ pub struct TransientResult {
     pub unknowns: usize,
     /// Largest estimated relative error by the mesh [1]; none without an estimate.
     pub estimated_error: Option<f64>,
+    /// How far the steps in time may be off by the end, of the amplitude [1]; none where they are not compared, see
+    /// [`super::step_error`].
+    pub step_error: Option<f64>,
     /// Crossings asked for and contacts of gaps, in order of time.
     pub events: Vec<Event>,
     /// What the numbers do not say by themselves.
@@ -117,7 +121,7 @@ pub struct TransientResult {
 }
 
 /// Times of a run at which its stability is looked at, the end included.
-const LOOKS: usize = 16;
+pub(super) const LOOKS: usize = 16;
 
 /// Share of the tolerance that one step may use: errors of many steps add up.
 pub(super) const STEP_SHARE: f64 = 1e-2;
@@ -188,9 +192,13 @@ pub fn transient(
     watch: Watch<'_>,
 ) -> Result<TransientResult, AnalysisError> {
     let system = &compiled.parts.system;
-    match &compiled.joints {
-        None => record(compiled, options, &mut Compliant { system, options }, sample, watch),
-        Some(_) => joint_transient(compiled, compiled.options.formulation, options, sample, watch).map(|(r, _)| r),
+    let (suited, method) = Formulation::of_run(compiled, options);
+    match suited.formulation {
+        formulation @ (Formulation::Rcr | Formulation::RcrElastic) => {
+            let options = TransientOptions { method, ..options.clone() };
+            joint_transient(compiled, formulation, &options, sample, watch).map(|(r, _)| r)
+        }
+        _ => record(compiled, options, &mut Compliant { system, options }, sample, watch),
     }
 }
 
@@ -236,6 +244,7 @@ pub(super) fn record(
         counters: Counters::default(),
         unknowns: compiled.unknowns(),
         estimated_error: compiled.order.estimated_error,
+        step_error: None,
         events: Vec::new(),
         warnings: Vec::new(),
     };

@@ -3,6 +3,7 @@
 use super::failure::Failure;
 use super::model::{Context, ModelArgs, Named};
 use super::output;
+use bimorph::compile::{Compiled, Formulation};
 use bimorph::netlist::Setting;
 use bimorph::structure::Structure;
 use clap::Args;
@@ -88,9 +89,29 @@ impl Check {
             let _ = write!(text, "; {} modes in the band, estimated error {error:.1e}", order.modes_in_band);
         }
         text.push('\n');
+        text.push_str(&formulation(&compiled));
         let warnings = compiled.warnings.items.len();
         let _ = writeln!(text, "no errors, {warnings} warning{}", if warnings == 1 { "" } else { "s" });
         output::print(&text)
+    }
+}
+
+/// What the formulation makes of the model, in a line; nothing for the bodies' own coordinates.
+fn formulation(compiled: &Compiled) -> String {
+    let name = compiled.options.formulation.name();
+    match &compiled.joints {
+        Some(Ok(joints)) => format!(
+            "formulation {name}: {} coordinates, {} loops closed by springs, scheme {}\n",
+            joints.tree.coordinates,
+            joints.tree.closures.len(),
+            compiled.options.scheme.name()
+        ),
+        Some(Err(unfit)) => format!("formulation {name}: not by springs: {unfit}\n"),
+        None if compiled.options.formulation == Formulation::Auto => {
+            let suited = Formulation::suited(compiled, None);
+            format!("formulation auto takes {}: {}\n", suited.formulation.name(), suited.why)
+        }
+        None => String::new(),
     }
 }
 

@@ -7,8 +7,7 @@ use super::solver::ModelChoice;
 use super::{progress, report, statics, value};
 use bimorph::analysis::BeamMotions;
 use bimorph::analysis::frame::{frame, frame_modes};
-use bimorph::analysis::mesh::{Request, fitted};
-use bimorph::analysis::modes::{ModesResult, modes_with_curves};
+use bimorph::analysis::modes::{ModesResult, modes_fitted};
 use bimorph::analysis::statics::NodeMotion;
 use bimorph::compile::Compiled;
 use bimorph::options::Value;
@@ -79,18 +78,14 @@ impl Modes {
         };
         let busy = progress::spinner("modes");
         let drawn = compiled;
-        let fitted = match self.solver {
-            ModelChoice::Recursion => fitted(&drawn, &Request::Modes { count: self.count, voltages: &self.ports }),
-            ModelChoice::Frame => Ok(drawn.clone()),
+        let result = match self.solver {
+            ModelChoice::Recursion => modes_fitted(&drawn, self.count, &self.ports),
+            ModelChoice::Frame => frame(&drawn)
+                .and_then(|frame| frame_modes(&drawn, &frame, self.count, &self.ports))
+                .map(|(result, curves)| (drawn.clone(), result, curves)),
         };
-        let result = fitted.and_then(|compiled| match self.solver {
-            ModelChoice::Recursion => modes_with_curves(&compiled, self.count, &self.ports).map(|r| (compiled, r)),
-            ModelChoice::Frame => frame(&compiled)
-                .and_then(|frame| frame_modes(&compiled, &frame, self.count, &self.ports))
-                .map(|r| (compiled, r)),
-        });
         busy.finish_and_clear();
-        let (compiled, (result, curves)) = result?;
+        let (compiled, result, curves) = result?;
         warn_of_mesh(&drawn, &compiled);
         warn_of(&result.warnings);
         let document = Document {

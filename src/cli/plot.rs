@@ -3,8 +3,7 @@
 use super::failure::Failure;
 use super::output::{check_folder, write};
 use super::{interrupt, statics, value};
-use bimorph::analysis::mesh::{Request, fitted};
-use bimorph::analysis::statics::static_with_curves;
+use bimorph::analysis::statics::static_fitted;
 use bimorph::compile::{CompileOptions, compile};
 use bimorph::netlist::{Bundle, Setting};
 use bimorph::results::format::Format;
@@ -97,8 +96,7 @@ impl Plot {
     fn mechanism(&self, netlist: &Path) -> Result<Picture, Failure> {
         let bundle = Bundle::read(netlist, &[]).map_err(|source| Failure::Read { path: netlist.to_owned(), source })?;
         let compiled = compile(&bundle, &CompileOptions { set: self.set.clone(), ..CompileOptions::default() })?;
-        let compiled = fitted(&compiled, &Request::Static { voltages: &self.ports })?;
-        let (result, curves) = static_with_curves(&compiled, &self.ports)?;
+        let (compiled, result, curves) = static_fitted(&compiled, &self.ports)?;
         let volts: Vec<String> = self.ports.iter().map(|(name, v)| format!("{name} = {v} V")).collect();
         let name = netlist.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
         let title = if volts.is_empty() { name } else { format!("{name} at {}", volts.join(", ")) };

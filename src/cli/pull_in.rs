@@ -4,8 +4,7 @@ use super::failure::Failure;
 use super::model::{Context, ModelArgs, warn_of_mesh};
 use super::output::OutputArgs;
 use super::{progress, report, value};
-use bimorph::analysis::mesh::{Request, fitted};
-use bimorph::analysis::pull_in::{PullInResult, pull_in};
+use bimorph::analysis::pull_in::{PullInResult, pull_in_fitted};
 use bimorph::options::Value;
 use bimorph::options::analysis::PULL_IN_MAX;
 use bimorph::results::plot::axis::quantity;
@@ -56,9 +55,7 @@ impl Pullin {
         let compiled = self.model.compile()?;
         let busy = progress::spinner("pull-in");
         let drawn = compiled;
-        let request = Request::PullIn { port: self.source.as_deref(), max: self.max };
-        let result = fitted(&drawn, &request)
-            .and_then(|compiled| pull_in(&compiled, self.source.as_deref(), self.max).map(|r| (compiled, r)));
+        let result = pull_in_fitted(&drawn, self.source.as_deref(), self.max);
         busy.finish_and_clear();
         let (compiled, result) = result?;
         warn_of_mesh(&drawn, &compiled);

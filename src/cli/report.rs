@@ -48,7 +48,7 @@ pub(crate) fn options(compiled: &Compiled) -> String {
         let _ = write!(text, ", band {}", quantity(band, "Hz"));
     }
     let _ = write!(text, ", junctions {}", options.junctions.name());
-    if options.scheme != Scheme::default() {
+    if options.scheme != Scheme::E4 {
         let _ = write!(text, ", scheme {}", options.scheme.name());
     }
     let words = [

@@ -8,8 +8,7 @@ use super::{progress, report, value};
 use bimorph::analysis::BeamMotions;
 use bimorph::analysis::backbending::backbend;
 use bimorph::analysis::frame::{frame, frame_statics};
-use bimorph::analysis::mesh::{Request, fitted};
-use bimorph::analysis::statics::{NodeMotion, StaticResult, static_with_curves};
+use bimorph::analysis::statics::{NodeMotion, StaticResult, static_fitted};
 use bimorph::compile::Compiled;
 use bimorph::results::plot::axis::quantity;
 use bimorph::results::plot::mechanism::{self, Drawing, Scale};
@@ -88,18 +87,14 @@ impl Static {
         }
         let busy = progress::spinner("static equilibrium");
         let drawn = compiled;
-        let fitted = match self.solver {
-            ModelChoice::Recursion => fitted(&drawn, &Request::Static { voltages: &self.ports }),
-            ModelChoice::Frame => Ok(drawn.clone()),
+        let result = match self.solver {
+            ModelChoice::Recursion => static_fitted(&drawn, &self.ports),
+            ModelChoice::Frame => frame(&drawn)
+                .and_then(|frame| frame_statics(&drawn, &frame, &self.ports))
+                .map(|(result, curves)| (drawn.clone(), result, curves)),
         };
-        let result = fitted.and_then(|compiled| match self.solver {
-            ModelChoice::Recursion => static_with_curves(&compiled, &self.ports).map(|r| (compiled, r)),
-            ModelChoice::Frame => {
-                frame(&compiled).and_then(|frame| frame_statics(&compiled, &frame, &self.ports)).map(|r| (compiled, r))
-            }
-        });
         busy.finish_and_clear();
-        let (compiled, (result, curves)) = result?;
+        let (compiled, result, curves) = result?;
         warn_of_mesh(&drawn, &compiled);
         let document = Document {
             nodes: Named(&result.nodes),

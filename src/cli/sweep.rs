@@ -22,6 +22,7 @@ use std::time::Duration;
     bimorph sweep bank.net --param w=1.8u:2.2u:21 --port heat=2.2 --signals yoke.y --out w.csv\n  \
     bimorph sweep bank.net --param w=1.8u:2.2u:21 --param Lh=200u,206u --analysis modes --count 3\n  \
     bimorph sweep switch.net --param gap=1u:3u:201 --analysis pullin --shard 0/4 --out part0.csv\n  \
+    bimorph sweep bank.net --param wh=1.8u:2.2u:16 --analysis tran --stop 100u --port heat=2.2 --signals yoke.y\n  \
     bimorph sweep bank.net --param w=1.8u:2.2u:21 --to unix:///tmp/bimorph.sock")]
 pub(crate) struct Sweep {
     #[command(flatten)]
@@ -39,11 +40,15 @@ pub(crate) struct Sweep {
     #[arg(long, short = 'n', default_value_t = MODES_COUNT.count())]
     count: usize,
 
-    /// Static: columns wanted, NODE.x, NODE.y, NODE.rz, PORT.i, PORT.q, BEAM.T [default: every node]
+    /// Static: columns wanted, NODE.x, NODE.y, NODE.rz, PORT.i, PORT.q, BEAM.T [default: every node]; tran: signals at the end
     #[arg(long, value_name = "NAMES")]
     signals: Vec<String>,
 
-    /// Static, modes: hold a port at a voltage [V]. Repeatable
+    /// Tran: end time [s]; the motion starts from rest
+    #[arg(long, value_parser = value::number, required_if_eq("analysis", "tran"))]
+    stop: Option<f64>,
+
+    /// Static, modes, tran: hold a port at a voltage [V]. Repeatable
     #[arg(long = "port", short = 'p', value_name = "NAME=VOLTS", value_parser = value::volts)]
     ports: Vec<(String, f64)>,
 
@@ -81,6 +86,7 @@ enum Analysis {
     Static,
     Modes,
     Pullin,
+    Tran,
 }
 
 impl Sweep {
@@ -128,6 +134,17 @@ impl Sweep {
             }
             Analysis::Modes => SweepAnalysis::Modes { count: self.count, voltages: self.ports.clone() },
             Analysis::Pullin => SweepAnalysis::PullIn { port: self.source.clone(), max: self.max },
+            Analysis::Tran => {
+                let stop = self.stop.unwrap_or_default();
+                if !(stop.is_finite() && stop > 0.0) {
+                    return Err(Failure::bad("--stop", "a positive time in seconds", stop.to_string()));
+                }
+                let outputs = value::names(&self.signals);
+                if outputs.is_empty() {
+                    return Err(Failure::bad("--signals", "at least one signal, such as yoke.y", "none".to_owned()));
+                }
+                SweepAnalysis::Transient { stop, outputs, voltages: self.ports.clone() }
+            }
         };
         let spec = SweepSpec { parameters, analysis, shard: self.shard.parse::<Shard>()?, threads: self.threads };
         spec.point_numbers()?;

@@ -5,13 +5,15 @@ use super::model::{Context, ModelArgs, Named, warn_of, warn_of_mesh};
 use super::output::OutputArgs;
 use super::solver::SolverChoice;
 use super::{draw_motion, progress, report, value};
+use bimorph::analysis::Watch;
 use bimorph::analysis::chart::released;
 use bimorph::analysis::frame::{frame, frame_transient};
 use bimorph::analysis::integrator::Integrator;
 use bimorph::analysis::joint_transient::{JointReport, joint_transient};
 use bimorph::analysis::mesh::fitted_in_time;
+use bimorph::analysis::step_error::with_step_error;
 use bimorph::analysis::transient::{Counters, Event, TransientOptions, TransientResult, transient};
-use bimorph::compile::Compiled;
+use bimorph::compile::{Compiled, Formulation};
 use bimorph::multibody::relative::Unfit;
 use bimorph::options::Value;
 use bimorph::options::analysis::{TRAN_POINTS, TRAN_RHO, TRAN_STEP, TRAN_STOP};
@@ -29,7 +31,7 @@ use std::path::PathBuf;
 /// Signals: NODE.x, NODE.y [m], NODE.rz [rad], NODE.vx, NODE.vy [m/s], NODE.vrz [rad/s], BEAM.T [K], GAP.q [C].
 /// JSON: "t" [s]; "signals": samples by name in SI; "units" by name; "method"; "counters": the work done; "events":
 /// crossings of --event levels and contacts of gaps, each with its time "t" [s] and "direction" up or down; "formulation",
-/// and for rcr "joint_coordinates": n, m, evaluations near singular configurations, largest gap of a loop [m].
+/// "estimated_error" by the mesh, "step_error" by the steps, of the amplitude; and for rcr "joint_coordinates": n, m, evaluations near singular configurations, largest gap of a loop [m].
 #[derive(Debug, Args)]
 #[command(after_help = "Methods, with their orders; steps follow --tol, or are equal with --step:\n  \
     rodas4 (4)             the default: one factorization a step; fast motions die out\n  \
@@ -116,7 +118,10 @@ struct Document<'a> {
     counters: Counters,
     events: &'a [Event],
     joint_coordinates: Option<JointReport>,
+    /// What formulation auto took, and why.
+    formulation_taken: Option<String>,
     unknowns: usize,
+    step_error: Option<f64>,
     solver: SolverChoice,
     release: Option<&'a str>,
     port_voltages_v: Named<'a, f64>,
@@ -182,14 +187,30 @@ impl Tran {
             solver: self.solver.linear(),
             keep: true,
         };
+        let decides = formulation == Formulation::Auto && self.method.is_none() && self.solver != SolverChoice::Frame;
+        let suited = decides.then(|| Formulation::of_run(compiled, &options));
+        let (formulation, method) = match &suited {
+            Some((suited, method)) => (suited.formulation, *method),
+            None => (formulation, method),
+        };
+        let options = TransientOptions { method, ..options };
         let bar = progress::bar("transient");
         let watch = &mut progress::watch(&bar);
         let result = match (self.solver, formulation) {
             (SolverChoice::Frame, _) => {
                 frame(compiled).and_then(|frame| frame_transient(compiled, &frame, &options, watch)).map(|r| (r, None))
             }
-            _ if compiled.joints.is_none() => transient(compiled, &options, &mut |_, _| (), watch).map(|r| (r, None)),
-            _ => joint_transient(compiled, formulation, &options, &mut |_, _| (), watch).map(|(r, j)| (r, Some(j))),
+            _ => {
+                let mut run =
+                    |options: &TransientOptions<'_>, sample: &mut dyn FnMut(f64, &[f64]), watch: Watch<'_>| {
+                        if matches!(formulation, Formulation::Rcr | Formulation::RcrElastic) {
+                            joint_transient(compiled, formulation, options, sample, watch).map(|(r, j)| (r, Some(j)))
+                        } else {
+                            transient(compiled, options, sample, watch).map(|r| (r, None))
+                        }
+                    };
+                with_step_error(&options, compiled.unknowns(), &mut run, &mut |_, _| (), watch)
+            }
         };
         bar.finish_and_clear();
         let (mut result, joints) = result?;
@@ -204,6 +225,7 @@ impl Tran {
             signals.push((name.clone(), values.clone()));
             units.push((name.clone(), unit.clone()));
         }
+        let taken = suited.map(|(suited, _)| format!("{}: {}", suited.formulation.name(), suited.why));
         let document = Document {
             t: &result.t,
             signals: Named(&signals),
@@ -212,19 +234,20 @@ impl Tran {
             counters: result.counters,
             events: &result.events,
             joint_coordinates: joints.clone(),
+            formulation_taken: taken.clone(),
             unknowns: result.unknowns,
+            step_error: result.step_error,
             solver: self.solver,
             release: self.release.as_deref(),
             port_voltages_v: Named(&self.ports),
             context: self.model.context(start.unwrap_or(compiled)).with(&result.warnings),
         };
         let title = self.model.title();
-        self.output.finish(
-            || table(&title, &result),
-            || Ok(picture(&title, &result)),
-            &document,
-            &text(compiled, &result, joints.as_ref()),
-        )
+        let mut text = text(compiled, &result, joints.as_ref());
+        if let Some(taken) = &taken {
+            text += &format!("formulation auto took {taken}\n");
+        }
+        self.output.finish(|| table(&title, &result), || Ok(picture(&title, &result)), &document, &text)
     }
 
     fn integrator(&self, compiled: &Compiled) -> Result<Integrator, Failure> {
@@ -327,8 +350,9 @@ fn text(compiled: &Compiled, result: &TransientResult, joints: Option<&JointRepo
             j.accelerations, j.singular_evaluations, j.coordinates, j.constraints, j.largest_gap_m
         ),
     };
+    let off = result.step_error.map_or_else(String::new, |e| format!(", off by {e:.1e} at most"));
     format!(
-        "{}\n{events}{} samples, {} steps ({} rejected), {work}; {}",
+        "{}\n{events}{} samples, {} steps ({} rejected){off}, {work}; {}",
         report::columns(&["signal", "lowest", "highest", "at the end"], &rows),
         result.t.len(),
         c.steps,

@@ -4,17 +4,19 @@
 //! copy, and stores the result under a token that is a hash of the request: the same request always gives the same token
 //! and the same bits, whatever was asked in between.
 
+use super::ports::Ports;
 use super::saved;
 use super::states::{Snapshot, States};
 use super::{
-    Description, Device, DeviceError, Mode, OpenRequest, PortInfo, SignalInfo, SmallSignal, Status, Token, Trial,
-    TrialReply,
+    Description, Device, DeviceError, Mode, OpenRequest, PortInfo, PortKind, SignalInfo, SmallSignal, Status, Token,
+    Trial, TrialReply,
 };
 use crate::analysis::signal::Signal;
 use crate::analysis::transient::first_step;
 use crate::budget;
 use crate::compile::Compiled;
-use crate::gaps::Drive;
+use crate::gaps::drive::Electrics;
+use crate::gaps::{Drive, System};
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
 use crate::solve::equilibrium::{Equilibrium, EquilibriumOptions};
@@ -22,7 +24,6 @@ use crate::solve::harmonic::{ComplexPose, Harmonic};
 use crate::solve::time::adaptive::Adaptive;
 use crate::solve::time::formulated::Formulated;
 use crate::solve::time::method::Motion;
-use std::collections::HashMap;
 use std::sync::Arc;
 
 /// A [`Device`] over a compiled model.
@@ -37,8 +38,7 @@ pub struct LocalDevice {
 pub(super) struct Session {
     /// What it was opened with.
     opened: OpenRequest,
-    /// Source index of each opened port.
-    pub(super) ports: Vec<usize>,
+    pub(super) ports: Ports,
     pub(super) signals: Vec<Signal>,
     pub(super) states: States,
     pub(super) first_step: f64,
@@ -152,18 +152,10 @@ impl Device for LocalDevice {
 
 impl Session {
     fn open(compiled: &Compiled, request: &OpenRequest) -> Result<(Self, Description), DeviceError> {
-        let system = &compiled.parts.system;
+        let ports = Ports::find(compiled, &request.ports)?;
+        let own = ports.system.clone();
+        let system = own.as_deref().unwrap_or(&compiled.parts.system);
         let electrics = &system.electrics;
-        let names = &electrics.names[..electrics.ports];
-        let ports: Vec<usize> = if request.ports.is_empty() {
-            (0..electrics.ports).collect()
-        } else {
-            let known: HashMap<&str, usize> = names.iter().enumerate().map(|(k, name)| (name.as_str(), k)).collect();
-            let unknown = |name: &String| DeviceError::UnknownPort { name: name.clone(), available: names.to_vec() };
-            (request.ports.iter())
-                .map(|name| known.get(name.as_str()).copied().ok_or_else(|| unknown(name)))
-                .collect::<Result<_, _>>()?
-        };
         let signals: Vec<Signal> = (request.signals.iter())
             .map(|name| {
                 budget::check();
@@ -172,7 +164,13 @@ impl Session {
             })
             .collect::<Result<_, _>>()?;
         let description = Description {
-            ports: ports.iter().map(|&p| PortInfo { name: electrics.names[p].clone() }).collect(),
+            ports: if request.ports.is_empty() {
+                let name = |&source: &usize| electrics.names[source].clone();
+                ports.sources.iter().map(|p| PortInfo { name: name(p), kind: PortKind::Electrical }).collect()
+            } else {
+                let kinds = request.ports.iter().zip(&ports.kinds);
+                kinds.map(|(name, &kind)| PortInfo { name: name.clone(), kind }).collect()
+            },
             signals: (request.signals.iter().zip(&signals))
                 .map(|(name, s)| SignalInfo { name: name.clone(), unit: s.unit().into() })
                 .collect(),
@@ -184,7 +182,7 @@ impl Session {
         let heaters = electrics.heating.heaters.len();
         let first_step = first_step(system, f64::INFINITY);
         let joints = match &compiled.joints {
-            Some(Ok(joints)) => Some(Arc::clone(joints)),
+            Some(Ok(joints)) => Some(ports.joints(joints)),
             Some(Err(unfit)) => {
                 return Err(DeviceError::BadRequest {
                     what: "formulation",
@@ -196,7 +194,7 @@ impl Session {
         };
         let session = Self {
             opened: request.clone(),
-            stepper: Adaptive::new(system, Formulated::new(system, joints.as_ref(), first_step, &ports)),
+            stepper: Adaptive::new(system, Formulated::new(system, joints.as_ref(), first_step, &ports.sources)),
             ports,
             signals,
             states: States::default(),
@@ -246,7 +244,7 @@ impl Session {
         if let Some(v) = request.voltages.iter().find(|v| !v.is_finite()) {
             return Err(DeviceError::BadRequest {
                 what: "voltages",
-                expected: "finite volts".into(),
+                expected: "finite numbers".into(),
                 got: v.to_string(),
             });
         }
@@ -260,13 +258,17 @@ impl Session {
         Ok(())
     }
 
-    /// Fills in the source vector: opened ports as asked, the others at 0 V, the netlist's own sources.
-    pub(super) fn fill_sources(&mut self, compiled: &Compiled, voltages: &[f64]) {
-        let electrics = &compiled.parts.system.electrics;
-        self.sources[..electrics.ports].fill(0.0);
-        for (&port, &v) in self.ports.iter().zip(voltages) {
-            self.sources[port] = v;
+    /// The model as it was opened, with the inputs among its ports.
+    pub(super) fn system<'a>(own: &'a Option<Arc<System>>, compiled: &'a Compiled) -> &'a System {
+        own.as_deref().unwrap_or(&compiled.parts.system)
+    }
+
+    /// Fills in the source vector: opened ports as asked, the others at 0, the netlist's own sources.
+    pub(super) fn fill_sources(&mut self, electrics: &Electrics, given: &[f64]) {
+        self.sources.fill(0.0);
+        self.sources[electrics.ports..electrics.voltages()].copy_from_slice(&electrics.fixed);
+        for (&port, &value) in self.ports.sources.iter().zip(given) {
+            self.sources[port] = value;
         }
-        self.sources[electrics.ports..].copy_from_slice(&electrics.fixed);
     }
 }

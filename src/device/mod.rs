@@ -9,14 +9,20 @@
 //! Currents flow into the device at a port's positive node. The circuit current of a port is
 //! i = [`TrialReply::currents`] + d/dt [`TrialReply::charges`]; the caller differentiates the charges, because only it
 //! knows the steps that were accepted.
+//!
+//! Not every port is electrical ([`PortKind`]). To a mechanical or thermal one a force or heat is given in the place of a
+//! voltage, and it answers with a motion or a temperature in the place of a current; it has no charge. What is said of
+//! voltages and currents here holds for what is given and answered.
 
 pub mod local;
+pub mod ports;
 mod saved;
 pub mod shown;
 mod small_signal;
 pub mod states;
 mod trial;
 
+pub use ports::PortKind;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -44,7 +50,7 @@ pub struct Trial<'a> {
     pub t: f64,
     /// Length of the step [s]; positive in [`Mode::Transient`], ignored otherwise.
     pub dt: f64,
-    /// Port voltages at `t` [V], in the order of [`Description::ports`].
+    /// What is given to the ports at `t` [V, N, W, …: [`PortKind::given`]], in the order of [`Description::ports`].
     pub voltages: &'a [f64],
 }
 
@@ -67,11 +73,12 @@ pub struct TrialReply {
     pub token: Option<Token>,
     /// Whether the rest may be used.
     pub status: Status,
-    /// Conduction current into each port [A] (p).
+    /// Conduction current into each port [A], or what it answers in its place [m, K, …: [`PortKind::answered`]] (p).
     pub currents: Vec<f64>,
-    /// Charge on each port [C] (p).
+    /// Charge on each port [C]; 0 for one that is not electrical (p).
     pub charges: Vec<f64>,
-    /// ∂current/∂voltage [S] (p×p).
+    /// ∂current/∂voltage [S] (p×p); for ports that are not electrical ∂answered/∂given, with the mechanical response over
+    /// this dt.
     pub di_dv: Vec<f64>,
     /// ∂charge/∂voltage [F] (p×p), with the mechanical response over this dt.
     pub dq_dv: Vec<f64>,
@@ -88,7 +95,7 @@ pub struct TrialReply {
 /// Small-signal answer about a state: y(ω), and outputs per volt. Matrices row-major, [re, im].
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct SmallSignal {
-    /// Port admittances [S] (p×p), row: current, column: voltage.
+    /// Port admittances [S] (p×p), row: current, column: voltage; for ports that are not electrical answered over given.
     pub admittance: Vec<[f64; 2]>,
     /// Signals per volt (s×p).
     pub outputs: Vec<[f64; 2]>,
@@ -97,8 +104,10 @@ pub struct SmallSignal {
 /// A port as the circuit sees it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PortInfo {
-    /// Name from the netlist.
+    /// Name from the netlist, or of the quantity.
     pub name: String,
+    /// What is given to it and what it answers.
+    pub kind: PortKind,
 }
 
 /// A quantity that can be read from a state.
@@ -124,7 +133,8 @@ pub struct Description {
 /// What to open: which ports, in which order, and which signals.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct OpenRequest {
-    /// Port names in the caller's order; empty: all, in netlist order. A port left out is held at 0 V.
+    /// Port names in the caller's order, see [`ports`]; empty: all electrical ones, in netlist order. A port left out is held
+    /// at 0 V, or free.
     pub ports: Vec<String>,
     /// Signal names, see [`SignalInfo::name`].
     pub signals: Vec<String>,
@@ -135,7 +145,10 @@ pub struct OpenRequest {
 #[non_exhaustive]
 pub enum DeviceError {
     /// No port of that name.
-    #[error("no port named \"{name}\"; the netlist has {available:?}")]
+    #[error(
+        "no port named \"{name}\"; the netlist has {available:?}, and there are NODE.x|y|rz, NODE.vx|vy|vrz, BEAM.T, \
+         frame.ax|ay|wz"
+    )]
     UnknownPort {
         /// The name asked for.
         name: String,

@@ -2,6 +2,7 @@
 //! parent's state; then currents, charges, outputs and their partials from what came out.
 
 use super::local::Session;
+use super::ports::Answer;
 use super::shown::Shown;
 use super::states::Snapshot;
 use super::{Status, Trial, TrialReply};
@@ -36,9 +37,10 @@ impl Session {
         parent: Option<&Snapshot>,
         reply: &mut TrialReply,
     ) {
-        let system = &compiled.parts.system;
+        let own = self.ports.system.clone();
+        let system = Self::system(&own, compiled);
         let electrics = &system.electrics;
-        self.fill_sources(compiled, request.voltages);
+        self.fill_sources(electrics, request.voltages);
         let rest = vec![0.0; self.sources.len()];
         let (from, load) = parent.map_or((rest.as_slice(), 0.0), |p| (p.sources.as_slice(), 1.0));
         self.motion.q.copy_from_slice(parent.map_or(&self.zeros, |p| &p.q));
@@ -57,7 +59,7 @@ impl Session {
         }
         electrics.steady(&self.sources, &mut self.rise, &mut self.drive);
         // ∂q/∂V = −K⁻¹·∂r/∂V with the factor that the last Newton iteration left
-        for (p, &port) in self.ports.iter().enumerate() {
+        for (p, &port) in self.ports.sources.iter().enumerate() {
             self.unit.fill(0.0);
             self.unit[port] = 1.0;
             electrics.steady_slope(&self.sources, &self.unit, &mut self.change);
@@ -80,8 +82,9 @@ impl Session {
         parent: Option<&Snapshot>,
         reply: &mut TrialReply,
     ) {
-        let system = &compiled.parts.system;
-        self.fill_sources(compiled, request.voltages);
+        let own = self.ports.system.clone();
+        let system = Self::system(&own, compiled);
+        self.fill_sources(&system.electrics, request.voltages);
         let from: Vec<f64> = match parent {
             Some(p) => {
                 self.motion.q.copy_from_slice(&p.q);
@@ -145,7 +148,8 @@ impl Session {
         next_step: f64,
         reply: &mut TrialReply,
     ) {
-        let system = &compiled.parts.system;
+        let own = self.ports.system.clone();
+        let system = Self::system(&own, compiled);
         let electrics = &system.electrics;
         let (ports, gaps) = (self.ports.len(), self.drive.volts.len());
         let view = View { q: &self.motion.q, v: &self.motion.v, rise: &self.rise, volts: &self.drive.volts };
@@ -153,20 +157,31 @@ impl Session {
         reply.charges.clear();
         reply.di_dv.clear();
         reply.outputs.clear();
-        for &port in &self.ports {
-            let row = electrics.conductance.row(port);
-            reply.currents.push(row.iter().zip(&self.sources).map(|(g, u)| g * u).sum());
-            reply.di_dv.extend(self.ports.iter().map(|&other| row[other]));
-            reply.charges.push(
-                (0..gaps).map(|g| electrics.gap_rows[(g, port)] * system.capacitance(g, view.q) * view.volts[g]).sum(),
-            );
+        for (&port, answer) in self.ports.sources.iter().zip(&self.ports.answers) {
+            let (mut current, mut charge) = (0.0, 0.0);
+            match answer {
+                Answer::Current => {
+                    let row = electrics.conductance.row(port);
+                    current = row.iter().zip(&self.sources).map(|(g, u)| g * u).sum();
+                    reply.di_dv.extend(self.ports.sources.iter().map(|&other| row[other]));
+                    let of = |g: usize| electrics.gap_rows[(g, port)] * system.capacitance(g, view.q) * view.volts[g];
+                    charge = (0..gaps).map(of).sum();
+                }
+                Answer::Motion(signal) => current = signal.value(compiled, &view),
+                Answer::Rise(heater) => current = view.rise[*heater],
+                Answer::Nothing => {}
+            }
+            reply.currents.push(current);
+            reply.charges.push(charge);
+            // what is not electrical is filled in with the sensitivities
+            reply.di_dv.resize(reply.currents.len() * ports, 0.0);
         }
         reply.outputs.extend(self.signals.iter().map(|s| s.value(compiled, &view)));
         reply.dq_dv.clear();
         reply.dq_dv.resize(ports * ports, 0.0);
         reply.doutputs_dv.clear();
         reply.doutputs_dv.resize(self.signals.len() * ports, 0.0);
-        for (p, &port) in self.ports.iter().enumerate() {
+        for (p, &port) in self.ports.sources.iter().enumerate() {
             let s = &self.stepper.method.sensitivity()[p];
             let gap_row: Vec<f64> = (0..gaps).map(|g| electrics.gap_rows[(g, port)]).collect();
             for k in 0..self.rise_slope.len() {
@@ -174,7 +189,7 @@ impl Session {
                     None => {
                         self.unit.fill(0.0);
                         self.unit[port] = 1.0;
-                        2.0 * electrics.heating.mixed(k, &self.sources, &self.unit)
+                        electrics.heating.slope(k, &self.sources, &self.unit)
                     }
                     Some((from, _)) => Ramp { electrics, from, to: &self.sources, rise: &self.rise, dt: request.dt }
                         .rise_sensitivity(k, request.dt, port),
@@ -183,16 +198,27 @@ impl Session {
             for (g, volts) in gap_row.iter().enumerate() {
                 let dq =
                     system.capacitance(g, view.q) * volts + system.capacitance_slope(g, view.q, &s.q) * view.volts[g];
-                for (row, &other) in self.ports.iter().enumerate() {
-                    reply.dq_dv[row * ports + p] += electrics.gap_rows[(g, other)] * dq;
+                for (row, &other) in self.ports.sources.iter().enumerate() {
+                    if self.ports.answers[row] == Answer::Current {
+                        reply.dq_dv[row * ports + p] += electrics.gap_rows[(g, other)] * dq;
+                    }
                 }
             }
             let change = View { q: &s.q, v: &s.v, rise: &self.rise_slope, volts: &gap_row };
             for (row, signal) in self.signals.iter().enumerate() {
                 reply.doutputs_dv[row * ports + p] = signal.slope(compiled, &view, &change);
             }
+            for (row, answer) in self.ports.answers.iter().enumerate() {
+                match answer {
+                    Answer::Motion(signal) => reply.di_dv[row * ports + p] = signal.slope(compiled, &view, &change),
+                    Answer::Rise(heater) => reply.di_dv[row * ports + p] = change.rise[*heater],
+                    Answer::Current | Answer::Nothing => {}
+                }
+            }
         }
-        let seen = reply.outputs.iter().chain(&reply.charges).copied().collect();
+        let electrical = |row: usize| self.ports.answers[row] == Answer::Current;
+        let shown = (0..ports).map(|row| if electrical(row) { reply.charges[row] } else { reply.currents[row] });
+        let seen = reply.outputs.iter().copied().chain(shown).collect();
         let (shown, bound) = match from {
             None => (Shown::start(seen), f64::INFINITY),
             Some((_, before)) => {
@@ -201,14 +227,21 @@ impl Session {
                 let charge = |capacitance: f64, volts: f64| {
                     capacitance.abs() * (SAME_VOLTAGE[0] + SAME_VOLTAGE[1] * volts.abs())
                 };
-                before.step(request.dt, seen, tol, |n| match self.signals.get(n) {
-                    Some(Signal::Displacement(_, 2)) => nothing,
-                    Some(Signal::Displacement(..) | Signal::Distance(_)) => nothing * system.length_scale,
-                    Some(Signal::Rate(_, 2)) => nothing / self.first_step,
-                    Some(Signal::Rate(..)) => nothing * system.length_scale / self.first_step,
-                    Some(Signal::Temperature(_) | Signal::Prescribed(_)) => SAME_TEMPERATURE,
-                    Some(Signal::Charge(g)) => charge(system.capacitance(*g, view.q), view.volts[*g]),
-                    None => charge(reply.dq_dv[(n - signals) * (ports + 1)], request.voltages[n - signals]),
+                let of_signal = |signal: &Signal| match signal {
+                    Signal::Displacement(_, 2) => nothing,
+                    Signal::Displacement(..) | Signal::Distance(_) => nothing * system.length_scale,
+                    Signal::Rate(_, 2) => nothing / self.first_step,
+                    Signal::Rate(..) => nothing * system.length_scale / self.first_step,
+                    Signal::Temperature(_) | Signal::Prescribed(_) => SAME_TEMPERATURE,
+                    Signal::Charge(g) => charge(system.capacitance(*g, view.q), view.volts[*g]),
+                };
+                before.step(request.dt, seen, tol, |n| match n.checked_sub(signals) {
+                    None => of_signal(&self.signals[n]),
+                    Some(port) => match &self.ports.answers[port] {
+                        Answer::Current => charge(reply.dq_dv[port * (ports + 1)], request.voltages[port]),
+                        Answer::Motion(signal) => of_signal(signal),
+                        Answer::Rise(_) | Answer::Nothing => SAME_TEMPERATURE,
+                    },
                 })
             }
         };

@@ -7,6 +7,8 @@
 
 use super::rigid::Lump;
 use nalgebra::Vector2;
+use std::cell::RefCell;
+use std::collections::HashMap;
 use std::f64::consts::PI;
 
 /// One beam at a junction.
@@ -32,8 +34,32 @@ pub fn turn(a: f64, b: f64) -> f64 {
     PI - between
 }
 
+/// Junctions that a thread remembers.
+const MOST_KNOWN: usize = 512;
+
+thread_local! {
+    /// What is known of junctions: a drawing is laid out on many meshes, and has many junctions of one kind.
+    static KNOWN: RefCell<HashMap<Vec<[u64; 2]>, Lump>> = RefCell::default();
+}
+
 /// Area that the strips have in excess of their union, with its moments about the node: [m²], [m³], [m⁴].
 pub fn overlap(strips: &[Strip]) -> Lump {
+    let key: Vec<[u64; 2]> = strips.iter().map(|s| [s.angle.to_bits(), s.width.to_bits()]).collect();
+    if let Some(known) = KNOWN.with_borrow(|known| known.get(&key).copied()) {
+        return known;
+    }
+    let found = integrated(strips);
+    KNOWN.with_borrow_mut(|known| {
+        if known.len() >= MOST_KNOWN {
+            known.clear();
+        }
+        known.insert(key, found);
+    });
+    found
+}
+
+/// [`overlap`], computed.
+fn integrated(strips: &[Strip]) -> Lump {
     let widest = strips.iter().map(|s| s.width).fold(0.0, f64::max);
     let far = 4.0 * widest;
     let (s0, c0) = strips.first().map_or((0.0, 1.0), |s| s.angle.sin_cos());

@@ -82,5 +82,5 @@ pub fn lay(structure: &Structure, heated: &[usize], rigid: &Assembly) -> Result<
         .map_err(|e| DiscretizeError::NoHeatSink { beam: structure.beams[heated[e.heater]].name.clone() })?;
     let mut conductance = DMatrix::zeros(ports, sources);
     conductance.view_mut((0, 0), (ports, driven)).copy_from(&potentials.conductance.rows(0, ports));
-    Ok(Electrics { ports, fixed, names, gap_rows, conductance, heating })
+    Ok(Electrics { ports, fixed, names, gap_rows, conductance, heating, inputs: Vec::new() })
 }

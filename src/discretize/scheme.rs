@@ -92,7 +92,7 @@ impl Scheme {
             Self::A0 => 1,
             Self::A2 | Self::B => 2,
             Self::C1 => 3,
-            Self::D1 | Self::E4 | Self::Es => 4,
+            Self::D1 | Self::E4 | Self::Auto | Self::Es => 4,
         }
     }
 
@@ -135,7 +135,8 @@ impl Scheme {
                 let pins = places.iter().map(|&at| turning(bar, at, h)).collect();
                 Cut { parts: rods(bar, &places), pins, couplings: Vec::new(), nodes: (0..=n).collect() }
             }
-            Self::B | Self::E4 | Self::Es => {
+            // where nothing has been decided, what bodies take
+            Self::B | Self::E4 | Self::Auto | Self::Es => {
                 let pins = (0..n).map(|k| self.elastic(bar, n, k)).collect();
                 let parts = if self == Self::B { rods(bar, &middles(n, h)) } else { self.points(bar, n) };
                 Cut { parts, pins, couplings: Vec::new(), nodes: (0..=n).collect() }

@@ -1,6 +1,8 @@
-//! From source voltages to what a mechanism feels: the voltage of each gap and the free strain of each heated beam.
+//! From source voltages to what a mechanism feels: the voltage of each gap and the free strain of each heated beam, and with
+//! them the inputs that are no voltages.
 
-use super::thermal::{Heating, lagged};
+use super::inputs::Input;
+use super::thermal::{Heating, Lag, lagged};
 use crate::multibody::forces::RestStrain;
 use nalgebra::DMatrix;
 
@@ -13,6 +15,10 @@ pub struct Drive {
     pub expansion: Vec<f64>,
     /// Share of the dead loads and built-in strains that acts [1].
     pub load: f64,
+    /// Value of each input in its own unit, in the order of [`Electrics::inputs`].
+    pub inputs: Vec<f64>,
+    /// Rate of change of the frame's rate [rad/s²].
+    pub turning: f64,
 }
 
 impl Drive {
@@ -20,9 +26,21 @@ impl Drive {
     pub fn rest(&self) -> RestStrain<'_> {
         RestStrain { expansion: &self.expansion, built_in: self.load }
     }
+
+    /// Leaves of a change what acts in proportion to the drive that it changes: voltages, and the rate of the frame.
+    pub fn keep_quadratic(&mut self, electrics: &Electrics) {
+        self.expansion.fill(0.0);
+        (self.load, self.turning) = (0.0, 0.0);
+        for (value, input) in self.inputs.iter_mut().zip(&electrics.inputs) {
+            if *input != Input::Rate {
+                *value = 0.0;
+            }
+        }
+    }
 }
 
-/// The electrical side of a system. The source vector u holds the ports first, then the netlist's own sources.
+/// The electrical side of a system. The source vector u holds the ports first, then the netlist's own sources, then the inputs
+/// that are no voltages.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Electrics {
     /// Number of ports.
@@ -37,23 +55,51 @@ pub struct Electrics {
     pub conductance: DMatrix<f64>,
     /// Heated beams.
     pub heating: Heating,
+    /// What is given beside voltages.
+    pub inputs: Vec<Input>,
 }
 
 impl Electrics {
     /// Length of the source vector.
     pub fn sources(&self) -> usize {
+        self.voltages() + self.inputs.len()
+    }
+
+    /// Voltages in the source vector: the place of the first input.
+    pub fn voltages(&self) -> usize {
         self.ports + self.fixed.len()
+    }
+
+    /// The same with these inputs.
+    pub fn with_inputs(&self, inputs: Vec<Input>) -> Self {
+        let sources = self.voltages() + inputs.len();
+        let (gaps, ports) = (self.gap_rows.nrows(), self.conductance.nrows());
+        crate::budget::lay_out_matrix(gaps + ports + self.heating.heaters.len(), sources);
+        Self {
+            gap_rows: self.gap_rows.clone().resize(gaps, sources, 0.0),
+            conductance: self.conductance.clone().resize(ports, sources, 0.0),
+            heating: self.heating.with_heat(&inputs),
+            inputs,
+            ..self.clone()
+        }
     }
 
     /// A drive of the right size, all zero, loads acting fully.
     pub fn drive(&self) -> Drive {
-        Drive { volts: vec![0.0; self.gap_rows.nrows()], expansion: vec![0.0; self.heating.heaters.len()], load: 1.0 }
+        Drive {
+            volts: vec![0.0; self.gap_rows.nrows()],
+            expansion: vec![0.0; self.heating.heaters.len()],
+            load: 1.0,
+            inputs: vec![0.0; self.inputs.len()],
+            turning: 0.0,
+        }
     }
 
     /// Fills in the source vector for given port voltages.
     pub fn fill_sources(&self, ports: &[f64], u: &mut [f64]) {
         u[..self.ports].copy_from_slice(ports);
-        u[self.ports..].copy_from_slice(&self.fixed);
+        u[self.ports..self.voltages()].copy_from_slice(&self.fixed);
+        u[self.voltages()..].fill(0.0);
     }
 
     /// The drive at source voltages `u` when every heater is at its steady rise, which goes to `rise` [K].
@@ -70,15 +116,18 @@ impl Electrics {
         for (k, heater) in self.heating.heaters.iter().enumerate() {
             drive.expansion[k] = heater.expansion * rise[k];
         }
+        drive.inputs.copy_from_slice(&u[self.voltages()..]);
+        drive.turning = 0.0;
     }
 
     /// The change of the steady drive with source `s`, at source voltages `u`.
     pub fn steady_slope(&self, u: &[f64], unit: &[f64], slope: &mut Drive) {
         self.gap_volts(unit, &mut slope.volts);
         for (k, heater) in self.heating.heaters.iter().enumerate() {
-            slope.expansion[k] = heater.expansion * 2.0 * self.heating.mixed(k, u, unit);
+            slope.expansion[k] = heater.expansion * self.heating.slope(k, u, unit);
         }
-        slope.load = 0.0;
+        slope.inputs.copy_from_slice(&unit[self.voltages()..]);
+        (slope.load, slope.turning) = (0.0, 0.0);
     }
 
     #[inline]
@@ -113,9 +162,20 @@ impl Ramp<'_> {
 
     /// Rise of heater `k` at time `s` after the start [K].
     pub fn rise_at(&self, k: usize, s: f64) -> f64 {
-        let p = self.parabola(k);
+        self.rise_after(k, s, self.parabola(k), &mut None)
+    }
+
+    /// The same with what is known of it: the parabola, and the exponentials of the heater before.
+    #[inline]
+    fn rise_after(&self, k: usize, s: f64, p: [f64; 3], lag: &mut Option<Lag>) -> f64 {
         let tau = self.electrics.heating.heaters[k].time_constant;
-        if tau > 0.0 { lagged(self.rise[k], tau, s, p) } else { p[0] + s * (p[1] + s * p[2]) }
+        if tau <= 0.0 {
+            return p[0] + s * (p[1] + s * p[2]);
+        }
+        match lag {
+            Some(lag) if lag.is_of(tau) => lag.rise(self.rise[k], p),
+            other => other.insert(Lag::new(tau, s)).rise(self.rise[k], p),
+        }
     }
 
     /// The drive at time `s` after the start.
@@ -124,8 +184,19 @@ impl Ramp<'_> {
         for (g, v) in drive.volts.iter_mut().enumerate() {
             *v = self.gap(g, |i| self.from[i] + x * (self.to[i] - self.from[i]));
         }
+        let mut lag = None;
         for k in 0..drive.expansion.len() {
-            drive.expansion[k] = self.electrics.heating.heaters[k].expansion * self.rise_at(k, s);
+            let rise = self.rise_after(k, s, self.parabola(k), &mut lag);
+            drive.expansion[k] = self.electrics.heating.heaters[k].expansion * rise;
+        }
+        let first = self.electrics.voltages();
+        drive.turning = 0.0;
+        for (k, value) in drive.inputs.iter_mut().enumerate() {
+            let change = self.to[first + k] - self.from[first + k];
+            *value = self.from[first + k] + x * change;
+            if self.electrics.inputs[k] == Input::Rate {
+                drive.turning += change / self.dt;
+            }
         }
     }
 
@@ -134,17 +205,27 @@ impl Ramp<'_> {
         for (g, v) in rate.volts.iter_mut().enumerate() {
             *v = self.gap(g, |i| (self.to[i] - self.from[i]) / self.dt);
         }
+        let mut lag = None;
         for k in 0..rate.expansion.len() {
-            let heater = &self.electrics.heating.heaters[k];
-            let p = self.parabola(k);
-            let slope = if heater.time_constant > 0.0 {
-                (p[0] + s * (p[1] + s * p[2]) - self.rise_at(k, s)) / heater.time_constant
-            } else {
-                p[1] + 2.0 * s * p[2]
-            };
-            rate.expansion[k] = heater.expansion * slope;
+            rate.expansion[k] = self.expansion_rate(k, s, self.parabola(k), &mut lag);
         }
-        rate.load = 0.0;
+        let first = self.electrics.voltages();
+        for (k, value) in rate.inputs.iter_mut().enumerate() {
+            *value = (self.to[first + k] - self.from[first + k]) / self.dt;
+        }
+        (rate.load, rate.turning) = (0.0, 0.0);
+    }
+
+    /// Rate of the free strain of heater `k` at time `s` [1/s].
+    #[inline]
+    fn expansion_rate(&self, k: usize, s: f64, p: [f64; 3], lag: &mut Option<Lag>) -> f64 {
+        let heater = &self.electrics.heating.heaters[k];
+        let slope = if heater.time_constant > 0.0 {
+            (p[0] + s * (p[1] + s * p[2]) - self.rise_after(k, s, p, lag)) / heater.time_constant
+        } else {
+            p[1] + 2.0 * s * p[2]
+        };
+        heater.expansion * slope
     }
 
     /// The change of the drive at time `s` with the final voltage of source `port`.
@@ -158,6 +239,15 @@ impl Ramp<'_> {
             out.expansion[k] = heater.expansion * self.rise_sensitivity(k, s, port);
         }
         out.load = 0.0;
+        out.turning = if self.set_input(port, x, out) == Some(Input::Rate) { 1.0 / self.dt } else { 0.0 };
+    }
+
+    /// Sets the input that source `port` is, if it is one, and all others to 0.
+    fn set_input(&self, port: usize, value: f64, out: &mut Drive) -> Option<Input> {
+        out.inputs.fill(0.0);
+        let k = port.checked_sub(self.electrics.voltages())?;
+        out.inputs[k] = value;
+        Some(self.electrics.inputs[k])
     }
 
     /// The change of the rise of heater `k` at time `s` with the final voltage of source `port` [K/V].
@@ -182,21 +272,60 @@ impl Ramp<'_> {
             };
             out.expansion[k] = heater.expansion * slope;
         }
-        out.load = 0.0;
+        self.set_input(port, 1.0 / self.dt, out);
+        (out.load, out.turning) = (0.0, 0.0);
     }
 
     /// Change of the parabola's second and third coefficient with the final voltage of source `port`; the first has none.
     fn parabola_change(&self, k: usize, port: usize) -> [f64; 2] {
         let (b, c) = (self.row(k, port, self.from), self.row(k, port, self.to));
-        [2.0 * b / self.dt, 2.0 * (c - b) / (self.dt * self.dt)]
+        let heat = self.electrics.heating.per_watt(k, port);
+        [(2.0 * b + heat) / self.dt, 2.0 * (c - b) / (self.dt * self.dt)]
     }
 
     /// (Q·u)_port of heater `k`.
     fn row(&self, k: usize, port: usize, u: &[f64]) -> f64 {
-        (0..u.len()).map(|j| self.electrics.heating.entry(k, port, j) * u[j]).sum()
+        let voltages = self.electrics.voltages();
+        if port >= voltages {
+            return 0.0;
+        }
+        (0..voltages).map(|j| self.electrics.heating.entry(k, port, j) * u[j]).sum()
     }
 
     fn gap(&self, g: usize, u: impl Fn(usize) -> f64) -> f64 {
         (0..self.from.len()).map(|i| self.electrics.gap_rows[(g, i)] * u(i)).sum()
+    }
+}
+
+/// A ramp with what does not depend on the time looked up once: the same bits, for runs of many steps.
+#[derive(Debug, Clone)]
+pub struct Course<'a> {
+    /// The ramp.
+    pub ramp: Ramp<'a>,
+    parabolas: Vec<[f64; 3]>,
+}
+
+impl<'a> Course<'a> {
+    /// Of a ramp.
+    pub fn new(ramp: Ramp<'a>) -> Self {
+        let parabolas = (0..ramp.electrics.heating.heaters.len()).map(|k| ramp.parabola(k)).collect();
+        Self { ramp, parabolas }
+    }
+
+    /// The free strains at time `s` after the start, heater by heater.
+    pub fn expansions(&self, s: f64, mut put: impl FnMut(usize, f64)) {
+        let mut lag = None;
+        for (k, p) in self.parabolas.iter().enumerate() {
+            let rise = self.ramp.rise_after(k, s, *p, &mut lag);
+            put(k, self.ramp.electrics.heating.heaters[k].expansion * rise);
+        }
+    }
+
+    /// Their rates of change in time [1/s].
+    pub fn expansion_rates(&self, s: f64, mut put: impl FnMut(usize, f64)) {
+        let mut lag = None;
+        for (k, p) in self.parabolas.iter().enumerate() {
+            put(k, self.ramp.expansion_rate(k, s, *p, &mut lag));
+        }
     }
 }

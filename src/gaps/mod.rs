@@ -17,6 +17,7 @@
 //! | [`network`] | potentials of a resistive network driven by ports and sources |
 //! | [`thermal`] | mean temperature rise of beams that carry current; its lag in time |
 //! | [`drive`] | ports → gap voltages and free strains, at a time within a step |
+//! | [`inputs`] | forces at points, heat into beams, the motion of the frame |
 //! | [`energy`] | the potential of it all, and the energy that an undamped motion keeps |
 //! | [`stop`] | how a stop bears |
 //! | `touching` | which gaps touch, and the energy in contacts |
@@ -29,11 +30,15 @@ pub mod contact;
 pub mod drive;
 pub mod energy;
 pub mod facing;
+pub mod inputs;
 pub mod network;
+mod pull;
 pub mod stop;
+mod stress_stiffness;
 pub mod system;
 pub mod thermal;
 mod touching;
 
-pub use drive::{Drive, Ramp};
+pub use drive::{Course, Drive, Ramp};
+pub use inputs::Input;
 pub use system::{Gap, Load, Point, System};

@@ -104,6 +104,7 @@ impl System {
             self.add_gap_force(gap, q, -0.5 * volts * volts, true, r);
         }
         self.add_loads(q, -drive.load, r);
+        self.add_input_forces(q, drive, r);
     }
 
     /// `tangent +=` the share of gaps, contacts and dead loads in ∂r/∂q.
@@ -112,6 +113,7 @@ impl System {
             self.add_gap_tangent(gap, q, -0.5 * volts * volts, tangent);
         }
         self.add_load_tangent(q, -drive.load, tangent);
+        self.add_input_tangent(q, drive, tangent);
     }
 
     /// The tangent ∂r/∂q and the residual r. The tangent's held directions are left to the caller, who may add inertia.
@@ -146,6 +148,7 @@ impl System {
         if change.load != 0.0 {
             self.add_loads(q, -change.load, out);
         }
+        self.add_input_change(q, drive, change, out);
         self.model.project(out);
     }
 
@@ -202,6 +205,20 @@ impl System {
                 stop::nearer(ways, approach.value(q, self.model.linear)).1 * along(approach)
             }
         }
+    }
+
+    /// Bodies that gaps and dead loads act on, ascending.
+    pub fn acted_on(&self) -> Vec<usize> {
+        let of_gap = |gap: &Gap| match gap {
+            Gap::Single { approach, .. } | Gap::Stop { approach, .. } => vec![approach.a.body, approach.b.body],
+            Gap::Facing { ends, .. } => quad(ends).to_vec(),
+        };
+        let ids = self.gaps.iter().flat_map(of_gap).chain(self.loads.iter().map(|load| load.point.body));
+        let free = |id: BodyId| if let BodyId::Free(k) = id { Some(k) } else { None };
+        let mut bodies: Vec<usize> = ids.filter_map(free).collect();
+        bodies.sort_unstable();
+        bodies.dedup();
+        bodies
     }
 
     fn add_loads(&self, q: &[Pose], scale: f64, r: &mut [Pose]) {

@@ -8,11 +8,13 @@
 //! ```
 //! For a beam clamped to ambient at both ends, T̄ = V²/(12·ρ_el·k), whatever its length. Beams that meet share the
 //! temperature of their node; anchors are at ambient. Since currents are linear in the source voltages u, each mean rise is
-//! a quadratic form T̄ = uᵀ·Q·u. Resistance and conductivity do not depend on temperature here.
+//! a quadratic form T̄ = uᵀ·Q·u. Heat W that comes from elsewhere, spread evenly along a beam, acts as P does and adds Z·W with
+//! the same thermal resistances Z. Resistance and conductivity do not depend on temperature here.
 //!
 //! With a time constant τ the rise follows its steady value, dT̄/dt = (T̄_steady(u(t)) − T̄)/τ. During a step u goes
 //! linearly in time, T̄_steady is a parabola, and the lag is integrated exactly.
 
+use super::inputs::Input;
 use super::network::Potentials;
 use nalgebra::{DMatrix, DVector};
 use thiserror::Error;
@@ -44,6 +46,10 @@ pub struct Heating {
     sources: usize,
     /// Heater by heater, its symmetric form Q over the sources, row-major [K/V²].
     form: Vec<f64>,
+    /// Nodes that stay at ambient.
+    sink: Vec<bool>,
+    /// Heater by heater, its rise for each watt of the inputs that follow the sources [K/W].
+    heat: Vec<f64>,
 }
 
 /// A heated beam whose heat cannot leave: nothing conducts from it to an anchor.
@@ -67,50 +73,15 @@ impl Heating {
         sink: &[bool],
     ) -> Result<Self, NoHeatSink> {
         let driven = potentials.potential.ncols();
-        let mut row = vec![usize::MAX; sink.len()];
-        let mut free = 0;
-        for h in &heaters {
-            for node in [h.a, h.b] {
-                if !sink[node] && row[node] == usize::MAX {
-                    row[node] = free;
-                    free += 1;
-                }
-            }
-        }
-        if let Some(heater) = without_sink(&heaters, sink) {
-            return Err(NoHeatSink { heater });
-        }
-        crate::budget::lay_out_matrix(2 * free, free + heaters.len());
+        let node_rise = Conduction::new(&heaters, sink)?;
         crate::budget::lay_out_matrix(heaters.len(), sources.saturating_mul(sources).saturating_add(driven));
-        let mut conduction = DMatrix::<f64>::zeros(free, free);
-        let mut share = DMatrix::<f64>::zeros(free, heaters.len());
-        for (k, h) in heaters.iter().enumerate() {
-            for (i, j) in [(row[h.a], row[h.b]), (row[h.b], row[h.a])] {
-                if i != usize::MAX {
-                    conduction[(i, i)] += h.conductance;
-                    share[(i, k)] += 0.5;
-                    if j != usize::MAX {
-                        conduction[(i, j)] -= h.conductance;
-                    }
-                }
-            }
-        }
-        let node_rise = if free == 0 {
-            share
-        } else {
-            conduction.lu().solve(&share).unwrap_or_else(|| DMatrix::zeros(free, heaters.len()))
-        };
         let currents: Vec<DVector<f64>> =
             heaters.iter().map(|h| potentials.difference(h.a, h.b) / h.resistance).collect();
         let mut form = vec![0.0; heaters.len() * sources * sources];
-        for (k, h) in heaters.iter().enumerate() {
+        for k in 0..heaters.len() {
             crate::budget::check();
             for (c, source) in heaters.iter().enumerate() {
-                let at = |node: usize| if row[node] == usize::MAX { 0.0 } else { node_rise[(row[node], c)] };
-                let mut per_watt = 0.5 * (at(h.a) + at(h.b));
-                if c == k {
-                    per_watt += 1.0 / (12.0 * h.conductance);
-                }
+                let per_watt = node_rise.per_watt(&heaters, k, c);
                 for i in 0..driven {
                     for j in 0..driven {
                         form[(k * sources + i) * sources + j] +=
@@ -119,7 +90,42 @@ impl Heating {
                 }
             }
         }
-        Ok(Self { heaters, sources, form })
+        Ok(Self { heaters, sources, form, sink: sink.to_vec(), heat: Vec::new() })
+    }
+
+    /// The same with inputs behind the sources, some of them heat.
+    pub fn with_heat(&self, inputs: &[Input]) -> Self {
+        let mut heat = vec![0.0; self.heaters.len() * inputs.len()];
+        if inputs.iter().any(|input| matches!(input, Input::Heat { .. }))
+            && let Ok(conduction) = Conduction::new(&self.heaters, &self.sink)
+        {
+            for (i, input) in inputs.iter().enumerate() {
+                let Input::Heat { heater } = input else { continue };
+                for k in 0..self.heaters.len() {
+                    heat[k * inputs.len() + i] = conduction.per_watt(&self.heaters, k, *heater);
+                }
+            }
+        }
+        Self { heat, ..self.clone() }
+    }
+
+    /// Inputs behind the sources.
+    fn inputs(&self) -> usize {
+        self.heat.len().checked_div(self.heaters.len()).unwrap_or(0)
+    }
+
+    /// Rise of heater `k` for each unit of source `source` in so far as that is heat [K/W].
+    pub fn per_watt(&self, k: usize, source: usize) -> f64 {
+        source.checked_sub(self.sources).map_or(0.0, |i| self.heat[k * self.inputs() + i])
+    }
+
+    /// Steady rise of heater `k` by the heat among the sources `u` [K].
+    fn heated(&self, k: usize, u: &[f64]) -> f64 {
+        let count = self.inputs();
+        if count == 0 {
+            return 0.0;
+        }
+        self.heat[k * count..(k + 1) * count].iter().zip(&u[self.sources..]).map(|(z, w)| z * w).sum()
     }
 
     /// Entry (i, j) of the form of heater `k` [K/V²].
@@ -133,7 +139,7 @@ impl Heating {
     pub fn mixed(&self, k: usize, u: &[f64], w: &[f64]) -> f64 {
         let s = self.sources;
         let mut sum = 0.0;
-        for (i, u) in u.iter().enumerate() {
+        for (i, u) in u[..s].iter().enumerate() {
             let row = &self.form[(k * s + i) * s..(k * s + i + 1) * s];
             sum += u * row.iter().zip(w).map(|(q, w)| q * w).sum::<f64>();
         }
@@ -144,12 +150,74 @@ impl Heating {
     /// c₀ + c₁·x + c₂·x² [K].
     pub fn between(&self, k: usize, from: &[f64], to: &[f64]) -> [f64; 3] {
         let (a, b, c) = (self.mixed(k, from, from), self.mixed(k, from, to), self.mixed(k, to, to));
-        [a, 2.0 * (b - a), a - 2.0 * b + c]
+        let (before, after) = (self.heated(k, from), self.heated(k, to));
+        [a + before, 2.0 * (b - a) + (after - before), a - 2.0 * b + c]
+    }
+
+    /// Change of the steady mean rise of heater `k` at source voltages `u` with the sources, along `unit` [K].
+    pub fn slope(&self, k: usize, u: &[f64], unit: &[f64]) -> f64 {
+        2.0 * self.mixed(k, u, unit) + self.heated(k, unit)
     }
 
     /// Steady mean rise of heater `k` at source voltages `u` [K].
     pub fn steady(&self, k: usize, u: &[f64]) -> f64 {
-        self.mixed(k, u, u)
+        self.mixed(k, u, u) + self.heated(k, u)
+    }
+}
+
+/// Rise of every node for each watt in each heater.
+struct Conduction {
+    /// Row of each node; none for one at ambient.
+    row: Vec<usize>,
+    /// Rows × heaters [K/W].
+    rise: DMatrix<f64>,
+}
+
+impl Conduction {
+    /// # Errors
+    /// [`NoHeatSink`].
+    fn new(heaters: &[Heater], sink: &[bool]) -> Result<Self, NoHeatSink> {
+        let mut row = vec![usize::MAX; sink.len()];
+        let mut free = 0;
+        for h in heaters {
+            for node in [h.a, h.b] {
+                if !sink[node] && row[node] == usize::MAX {
+                    row[node] = free;
+                    free += 1;
+                }
+            }
+        }
+        if let Some(heater) = without_sink(heaters, sink) {
+            return Err(NoHeatSink { heater });
+        }
+        crate::budget::lay_out_matrix(2 * free, free + heaters.len());
+        let mut conduction = DMatrix::<f64>::zeros(free, free);
+        let mut share = DMatrix::<f64>::zeros(free, heaters.len());
+        for (k, h) in heaters.iter().enumerate() {
+            for (i, j) in [(row[h.a], row[h.b]), (row[h.b], row[h.a])] {
+                if i != usize::MAX {
+                    conduction[(i, i)] += h.conductance;
+                    share[(i, k)] += 0.5;
+                    if j != usize::MAX {
+                        conduction[(i, j)] -= h.conductance;
+                    }
+                }
+            }
+        }
+        let rise = if free == 0 {
+            share
+        } else {
+            conduction.lu().solve(&share).unwrap_or_else(|| DMatrix::zeros(free, heaters.len()))
+        };
+        Ok(Self { row, rise })
+    }
+
+    /// Mean rise of heater `k` for each watt in heater `source` [K/W].
+    fn per_watt(&self, heaters: &[Heater], k: usize, source: usize) -> f64 {
+        let at = |node: usize| if self.row[node] == usize::MAX { 0.0 } else { self.rise[(self.row[node], source)] };
+        let h = &heaters[k];
+        let own = if source == k { 1.0 / (12.0 * h.conductance) } else { 0.0 };
+        0.5 * (at(h.a) + at(h.b)) + own
     }
 }
 
@@ -193,9 +261,38 @@ pub fn phi(z: f64) -> [f64; 3] {
 
 /// The rise at time `t` after it was `start`, while its steady value is p₀ + p₁·s + p₂·s² [K].
 pub fn lagged(start: f64, time_constant: f64, t: f64, p: [f64; 3]) -> f64 {
-    let x = t / time_constant;
-    let [f1, f2, f3] = phi(-x);
-    start * (-x).exp() + x * (p[0] * f1 + p[1] * t * f2 + 2.0 * p[2] * t * t * f3)
+    Lag::new(time_constant, t).rise(start, p)
+}
+
+/// What a time is to a time constant: the exponentials that all heaters with this time constant have in common.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lag {
+    time_constant: f64,
+    t: f64,
+    x: f64,
+    f: [f64; 3],
+    decay: f64,
+}
+
+impl Lag {
+    /// At time `t` after the start [s].
+    pub fn new(time_constant: f64, t: f64) -> Self {
+        let x = t / time_constant;
+        Self { time_constant, t, x, f: phi(-x), decay: (-x).exp() }
+    }
+
+    /// True where this is the time constant.
+    #[inline]
+    pub fn is_of(&self, time_constant: f64) -> bool {
+        self.time_constant == time_constant
+    }
+
+    /// See [`lagged`].
+    #[inline]
+    pub fn rise(&self, start: f64, p: [f64; 3]) -> f64 {
+        let (t, x, [f1, f2, f3], decay) = (self.t, self.x, &self.f, self.decay);
+        start * decay + x * (p[0] * f1 + p[1] * t * f2 + 2.0 * p[2] * t * t * f3)
+    }
 }
 
 #[cfg(test)]

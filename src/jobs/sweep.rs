@@ -1,23 +1,28 @@
 //! A parameter grid over one analysis, on all cores, in a fixed order.
 //!
-//! Each point of the grid compiles the netlist with its own parameter values and runs one analysis on it. Points do not
-//! know of each other, and rows come back in grid order, so the table has the same bits on one thread and on many, and
-//! the shards of a sweep put together are the whole sweep.
+//! The netlist is read once. Each point of the grid draws it with its own parameter values and runs one analysis, on a mesh
+//! that was searched once for all (`family`) where the estimate of its error says so. Points do not know of each other, and
+//! rows come back in grid order, so the table has the same bits on one thread and on many, and the shards of a sweep put
+//! together are the whole sweep.
 
+mod family;
 pub mod parse;
 mod point;
 mod table;
+mod transient;
 
 pub use table::{SweepRow, SweepTable};
 
 use crate::budget::{self, Budget, Stopped};
 use crate::compile::CompileOptions;
-use crate::netlist::{Bundle, Setting};
+use crate::netlist::{Bundle, Setting, Source};
+use family::Family;
 use rayon::prelude::*;
 use std::collections::HashSet;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use thiserror::Error;
+use transient::Transients;
 
 /// What to sweep.
 #[derive(Debug, Clone, PartialEq)]
@@ -65,6 +70,15 @@ pub enum SweepAnalysis {
         port: Option<String>,
         /// Highest voltage tried [V].
         max: f64,
+    },
+    /// Motion from rest, by Rodas4: signals at its end.
+    Transient {
+        /// End time [s].
+        stop: f64,
+        /// Columns wanted, as signals of a transient: `NODE.x` [m], `NODE.vx` [m/s], `BEAM.T` [K], `GAP.gap` [m], ….
+        outputs: Vec<String>,
+        /// Port voltages held during the run, by name [V].
+        voltages: Vec<(String, f64)>,
     },
 }
 
@@ -137,7 +151,7 @@ pub enum SweepError {
 /// [`SweepError::BadSpec`] with the first such parameter or output.
 pub fn check_names(spec: &SweepSpec, bundle: &Bundle, options: &CompileOptions) -> Result<(), SweepError> {
     spec.point_numbers()?;
-    point::check_names(spec, bundle, options)
+    point::check_names(spec, &Source::new(bundle), options)
 }
 
 /// Runs a sweep; under a budget, each point has all of its allowance, and the rows together have it once more. `progress` is told after every point, from any thread, and answers whether to go on.
@@ -154,11 +168,9 @@ pub fn run(
     let points = numbers.len() as u64;
     let (done, failed, stop) = (AtomicU64::new(0), AtomicU64::new(0), AtomicBool::new(false));
     let (budget, full) = (budget::current(), OnceLock::new());
-    let one = |&number: &usize| -> Option<point::Outcome> {
-        if stop.load(Ordering::Relaxed) {
-            return None;
-        }
-        let outcome = point::run(spec, number, bundle, options, budget.as_ref().map(Budget::part));
+    let source = Source::new(bundle);
+    let family = Family::new(spec, &source, options);
+    let counted = |outcome: &point::Outcome| {
         if let Some(Err(Stopped::Bytes { most, .. })) = budget.as_ref().map(|budget| budget.take(outcome.bytes())) {
             let _ = full.set(most);
             stop.store(true, Ordering::Relaxed);
@@ -170,18 +182,36 @@ pub fn run(
         if !progress(SweepProgress { done, points, failed: failed.load(Ordering::Relaxed) }) {
             stop.store(true, Ordering::Relaxed);
         }
-        Some(outcome)
     };
+    let one = |&number: &usize| -> Option<Vec<point::Outcome>> {
+        if stop.load(Ordering::Relaxed) {
+            return None;
+        }
+        let outcome = point::run(spec, number, &source, options, &family, budget.as_ref().map(Budget::part));
+        counted(&outcome);
+        Some(vec![outcome])
+    };
+    let transients = Transients::new(spec, &source, options);
+    let some = |numbers: &[usize]| -> Option<Vec<point::Outcome>> {
+        transients.run(numbers, budget.as_ref(), &|outcome| {
+            outcome.into_iter().for_each(counted);
+            !stop.load(Ordering::Relaxed)
+        })
+    };
+    let in_time = matches!(spec.analysis, SweepAnalysis::Transient { .. });
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(spec.threads.unwrap_or(0))
         .build()
         .map_err(|error| SweepError::Threads { reason: error.to_string() })?;
-    let outcomes: Option<Vec<_>> = pool.install(|| numbers.par_iter().map(one).collect());
+    let outcomes: Option<Vec<Vec<_>>> = pool.install(|| match in_time {
+        true => numbers.par_chunks(transient::CHUNK).map(some).collect(),
+        false => numbers.par_iter().map(one).collect(),
+    });
     if let Some(&most) = full.get() {
         return Err(SweepError::TooLarge { most });
     }
     match outcomes {
-        Some(outcomes) => Ok(table::assemble(spec, outcomes)),
+        Some(outcomes) => Ok(table::assemble(spec, outcomes.into_iter().flatten().collect())),
         None => Err(SweepError::Cancelled { done: done.into_inner(), points }),
     }
 }

@@ -34,7 +34,7 @@ pub struct BlockMatrix<T: Scalar, const N: usize> {
 
 /// A pivot smaller than this share of its diagonal entry is taken for zero. A beam cut into
 /// 10,000 segments reaches 2.5e-13.
-const LOST: f64 = 1e-13;
+pub(super) const LOST: f64 = 1e-13;
 
 /// Bodies eliminated between two looks at the budget, some ten microseconds.
 const BODIES_PER_CHECK: usize = 64;

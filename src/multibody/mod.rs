@@ -25,6 +25,7 @@ pub mod body;
 pub mod double;
 pub mod factor;
 pub mod forces;
+pub mod lanes;
 pub mod linear_system;
 pub mod model;
 pub mod order;

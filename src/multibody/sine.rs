@@ -27,7 +27,7 @@ pub fn sin_cos(x: f64) -> (f64, f64) {
     if x.abs() <= FRAC_PI_4 { small(x) } else { x.sin_cos() }
 }
 
-#[inline]
+#[inline(always)]
 fn small(x: f64) -> (f64, f64) {
     let z = x * x;
     let w = z * z;
@@ -36,6 +36,23 @@ fn small(x: f64) -> (f64, f64) {
     let half = 0.5 * z;
     let less = 1.0 - half;
     (x + z * x * (SIN[0] + z * s), less + (((1.0 - less) - half) + z * c))
+}
+
+/// [`sin_cos`] of some angles at once, the bits of each alone.
+#[inline(always)]
+pub fn sin_cos_lanes<const N: usize>(x: [f64; N]) -> ([f64; N], [f64; N]) {
+    let (mut sin, mut cos) = (x, x);
+    let mut near = true;
+    for k in 0..N {
+        near &= x[k].abs() <= FRAC_PI_4;
+        (sin[k], cos[k]) = small(x[k]);
+    }
+    if !near {
+        for k in 0..N {
+            (sin[k], cos[k]) = sin_cos(x[k]);
+        }
+    }
+    (sin, cos)
 }
 
 /// Largest angle of [`reduced`] [rad].
@@ -90,6 +107,10 @@ mod tests {
             assert_eq!(sin_cos(-x), (-s, c));
         }
         assert_eq!(sin_cos(2.0), 2f64.sin_cos());
+        for x in [[0.1, -0.7, 0.0, 1e-9], [0.1, 2.0, -9.0, 0.5]] {
+            let (s, c) = sin_cos_lanes(x);
+            assert_eq!(x.map(sin_cos), std::array::from_fn(|k| (s[k], c[k])));
+        }
         assert!(sin_cos(f64::NAN).0.is_nan());
     }
 }

@@ -1,12 +1,12 @@
 //! The syntax tree of a netlist with all its includes in place.
 
 use super::source::Span;
-use std::rc::Rc;
+use std::sync::Arc;
 
 /// A name with its place.
 #[derive(Debug, Clone)]
 pub(crate) struct Ident {
-    pub(crate) name: Rc<str>,
+    pub(crate) name: Arc<str>,
     pub(crate) span: Span,
 }
 
@@ -48,14 +48,14 @@ pub(crate) struct Expr {
 #[derive(Debug, Clone)]
 pub(crate) enum ExprKind {
     Number(f64),
-    Text(Rc<str>),
+    Text(Arc<str>),
     /// `?`: an argument that may stay open.
     Undefined,
-    Variable(Rc<str>, Slot),
+    Variable(Arc<str>, Slot),
     Negate(Box<Expr>),
     Not(Box<Expr>),
     Binary(Binary, Box<Expr>, Box<Expr>),
-    Call(Rc<str>, Vec<Expr>),
+    Call(Arc<str>, Vec<Expr>),
 }
 
 /// `ID = expr`.

@@ -11,7 +11,7 @@ use super::value::{Value, short};
 use crate::structure::NodeId;
 use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, HashMap, HashSet};
-use std::rc::Rc;
+use std::sync::Arc;
 
 /// Blocks, conditions, loops and instances together may nest this deep while running: bounds the stack.
 const DEEPEST_RUN: usize = 400;
@@ -21,13 +21,13 @@ const MOST_STEPS: usize = 30_000_000;
 const MOST_ELEMENTS: usize = 300_000;
 
 /// A layer's entries, evaluated: its own before its parent's.
-pub(crate) type LayerValues<'p> = Rc<Vec<(&'p str, Value)>>;
+pub(crate) type LayerValues<'p> = Arc<Vec<(&'p str, Value)>>;
 
 /// Variables and nodes of the netlist or of one subnet instance.
 pub(super) struct Frame {
     pub(super) values: Vec<Value>,
     /// Nodes by the name they have here.
-    pub(super) nodes: HashMap<Rc<str>, NodeId>,
+    pub(super) nodes: HashMap<Arc<str>, NodeId>,
     /// Names of the enclosing instances with a point after each.
     pub(super) prefix: String,
     pub(super) rotation: Rotation,
@@ -191,7 +191,7 @@ impl<'p> Elaborator<'p> {
     fn parameter(&mut self, name: &'p str, span: Span, default: Option<&'p Expr>) -> Value {
         let value = match (self.settings.get(name), default) {
             (Some(Setting::Number(x)), _) => Value::Number(*x),
-            (Some(Setting::Text(text)), _) => Value::Text(Rc::from(text.as_str())),
+            (Some(Setting::Text(text)), _) => Value::Text(Arc::from(text.as_str())),
             (None, Some(default)) => self.evaluate(default).unwrap_or(Value::Failed),
             (None, None) => {
                 let help = format!("give it from outside: `--set {name}=VALUE`");
@@ -244,9 +244,9 @@ impl<'p> Elaborator<'p> {
 
     // ---- names ----
 
-    pub(super) fn name(&mut self, name: &'p Name) -> Result<Rc<str>, Reported> {
+    pub(super) fn name(&mut self, name: &'p Name) -> Result<Arc<str>, Reported> {
         if name.indices.is_empty() {
-            return Ok(Rc::clone(&name.base.name));
+            return Ok(Arc::clone(&name.base.name));
         }
         let mut spelled = format!("{}(", name.base.name);
         for (i, index) in name.indices.iter().enumerate() {
@@ -256,7 +256,7 @@ impl<'p> Elaborator<'p> {
             spelled.push_str(&self.whole(index, "an index")?.to_string());
         }
         spelled.push(')');
-        Ok(Rc::from(spelled))
+        Ok(Arc::from(spelled))
     }
 
     /// The node of that name in the frame at hand; a new one when the name is new.

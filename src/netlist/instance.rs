@@ -11,7 +11,7 @@ use super::value::Value;
 use crate::budget;
 use crate::structure::NodeId;
 use std::collections::HashMap;
-use std::rc::Rc;
+use std::sync::Arc;
 
 /// Subnet instances may nest this deep.
 const DEEPEST_INSTANCE: usize = 100;
@@ -33,7 +33,7 @@ struct Call<'a, 'p> {
 impl<'p> Elaborator<'p> {
     pub(super) fn element(&mut self, element: &'p Element) -> Result<(), Reported> {
         self.elements += 1;
-        let local: Rc<str> = match &element.name {
+        let local: Arc<str> = match &element.name {
             Some(name) => {
                 let local = self.name(name)?;
                 let full = format!("{}{local}", self.here().prefix);
@@ -52,7 +52,7 @@ impl<'p> Elaborator<'p> {
             }
             None => {
                 budget::lay_out(ELEMENT_BYTES + NAME_COPIES * self.here().prefix.len());
-                Rc::from(format!("anon{}", element.number))
+                Arc::from(format!("anon{}", element.number))
             }
         };
         let mut nodes = Vec::with_capacity(element.nodes.len());
@@ -97,7 +97,7 @@ impl<'p> Elaborator<'p> {
                 self.subnet(&Call { element, subnet, local: &local, nodes: &nodes, given: &given, rotation, layer })
             }
             None => {
-                let values = layer.map_or_else(|| Ok(Rc::new(Vec::new())), |layer| self.layer(layer))?;
+                let values = layer.map_or_else(|| Ok(Arc::new(Vec::new())), |layer| self.layer(layer))?;
                 let instance = Instance {
                     name: format!("{}{local}", self.here().prefix),
                     anonymous: element.name.is_none(),
@@ -127,7 +127,7 @@ impl<'p> Elaborator<'p> {
     /// Values of a layer's entries, evaluated now: a layer may name variables that change along the netlist.
     fn layer(&mut self, index: usize) -> Result<LayerValues<'p>, Reported> {
         if let Some(values) = &self.layers[index] {
-            return Ok(Rc::clone(values));
+            return Ok(Arc::clone(values));
         }
         let program = self.program;
         let mut values = Vec::new();
@@ -140,9 +140,9 @@ impl<'p> Elaborator<'p> {
             }
             next = layer.parent.map(|parent| &program.layers[parent]);
         }
-        let values = Rc::new(values);
+        let values = Arc::new(values);
         if program.layers[index].constant {
-            self.layers[index] = Some(Rc::clone(&values));
+            self.layers[index] = Some(Arc::clone(&values));
         }
         Ok(values)
     }
@@ -172,7 +172,7 @@ impl<'p> Elaborator<'p> {
             return Err(self.sink.error("E052", element.model.span, message, help));
         }
         elements::stray_actuals(model, given, subnet.formals.iter().map(|f| &*f.name.name), self.sink);
-        let layer_values = layer.map_or_else(|| Ok(Rc::new(Vec::new())), |layer| self.layer(layer))?;
+        let layer_values = layer.map_or_else(|| Ok(Arc::new(Vec::new())), |layer| self.layer(layer))?;
         let prefix = format!("{}{}.", self.here().prefix, call.local);
         let frame = Frame {
             values: vec![Value::Undefined; subnet.variables],

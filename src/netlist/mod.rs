@@ -61,25 +61,53 @@ pub struct Loaded {
 /// # Errors
 /// Every error found in one run; warnings are among them.
 pub fn load(bundle: &Bundle, set: &[(String, Setting)]) -> Result<Loaded, Diagnostics> {
-    let mut sink = Sink::new(&bundle.root);
-    let mut program = parser::parse(bundle, &mut sink);
-    if !sink.failed() || program.incomplete {
-        resolve::resolve(&mut program, &mut sink);
-        check_settings(&program, set, &mut sink);
+    Source::new(bundle).load(set)
+}
+
+/// A bundle that has been read: parsed, and its names bound. What is drawn depends on the values of parameters too.
+#[derive(Debug)]
+pub struct Source {
+    bundle: Bundle,
+    program: Program,
+    /// What reading had to say.
+    sink: Sink,
+}
+
+impl Source {
+    /// Reads a bundle. Errors come out with [`Source::load`].
+    pub fn new(bundle: &Bundle) -> Self {
+        let mut sink = Sink::new(&bundle.root);
+        let mut program = parser::parse(bundle, &mut sink);
+        if !sink.failed() || program.incomplete {
+            resolve::resolve(&mut program, &mut sink);
+        }
+        Self { bundle: bundle.clone(), program, sink }
     }
-    if sink.failed() {
-        return Err(sink.finish(bundle));
+
+    /// Elaborates it with parameters set from outside.
+    ///
+    /// # Errors
+    /// Every error found in one run, those of reading too; warnings are among them.
+    pub fn load(&self, set: &[(String, Setting)]) -> Result<Loaded, Diagnostics> {
+        let (bundle, program) = (&self.bundle, &self.program);
+        let mut sink = self.sink.clone();
+        if !sink.failed() || program.incomplete {
+            check_settings(program, set, &mut sink);
+        }
+        if sink.failed() {
+            return Err(sink.finish(bundle));
+        }
+        let mut elaborated = Elaborator::run(program, set, &mut sink);
+        if !sink.failed() {
+            place::place(&mut elaborated.drawing, &mut sink);
+            check::check(&elaborated.drawing, &mut sink);
+        }
+        if sink.failed() {
+            return Err(sink.finish(bundle));
+        }
+        let warnings = sink.finish(bundle);
+        Ok(Loaded { structure: elaborated.drawing.structure, parameters: elaborated.parameters, warnings })
     }
-    let mut elaborated = Elaborator::run(&program, set, &mut sink);
-    if !sink.failed() {
-        place::place(&mut elaborated.drawing, &mut sink);
-        check::check(&elaborated.drawing, &mut sink);
-    }
-    if sink.failed() {
-        return Err(sink.finish(bundle));
-    }
-    let warnings = sink.finish(bundle);
-    Ok(Loaded { structure: elaborated.drawing.structure, parameters: elaborated.parameters, warnings })
 }
 
 /// The names of all built-in elements, in the order of docs/netlist.md.

@@ -7,7 +7,7 @@ use super::sink::{Reported, Sink};
 use super::source::Span;
 use super::token::{Kind, Token};
 use std::collections::HashMap;
-use std::rc::Rc;
+use std::sync::Arc;
 
 /// Blocks, conditions and loops may nest this deep.
 const DEEPEST_NESTING: usize = 100;
@@ -50,7 +50,7 @@ pub(super) struct Parser<'a> {
     /// Operators, calls and brackets of the expression at hand.
     pub(super) nodes: usize,
     pub(super) anonymous: usize,
-    words: HashMap<&'a str, Rc<str>>,
+    words: HashMap<&'a str, Arc<str>>,
     pub(super) program: Program,
 }
 
@@ -96,8 +96,8 @@ impl<'a> Parser<'a> {
         self.text.get(span.start as usize..span.end as usize).unwrap_or("")
     }
 
-    pub(super) fn word(&mut self, text: &'a str) -> Rc<str> {
-        Rc::clone(self.words.entry(text).or_insert_with(|| Rc::from(text)))
+    pub(super) fn word(&mut self, text: &'a str) -> Arc<str> {
+        Arc::clone(self.words.entry(text).or_insert_with(|| Arc::from(text)))
     }
 
     pub(super) fn ident(&mut self, wanted: &str) -> Parsed<Ident> {

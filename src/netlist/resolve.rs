@@ -9,7 +9,7 @@ use super::functions;
 use super::sink::Sink;
 use super::suggest::did_you_mean;
 use std::collections::{BTreeMap, BTreeSet};
-use std::rc::Rc;
+use std::sync::Arc;
 
 /// Resolves every name of a program; errors go to the sink.
 pub(crate) fn resolve(program: &mut Program, sink: &mut Sink) {
@@ -26,14 +26,14 @@ pub(crate) fn resolve(program: &mut Program, sink: &mut Sink) {
         beside: Vec::new(),
         layers_used: 0,
     };
-    let pi = resolver.define(&Rc::from("pi"));
+    let pi = resolver.define(&Arc::from("pi"));
     debug_assert_eq!(pi, super::evaluate::PI_SLOT);
     let mut statements = std::mem::take(&mut program.statements);
     // A subnet may be used before its text (SUGAR has no such rule, but no other meaning either) unless an element of
     // that name is built in.
     for (index, subnet) in program.subnets.iter().enumerate() {
         if elements::model(&subnet.name.name).is_none() {
-            resolver.subnets.entry(Rc::clone(&subnet.name.name)).or_insert(index);
+            resolver.subnets.entry(Arc::clone(&subnet.name.name)).or_insert(index);
         }
     }
     resolver.statements(&mut statements, program);
@@ -43,17 +43,17 @@ pub(crate) fn resolve(program: &mut Program, sink: &mut Sink) {
 
 struct Resolver<'a> {
     sink: &'a mut Sink,
-    scopes: Vec<BTreeMap<Rc<str>, Slot>>,
+    scopes: Vec<BTreeMap<Arc<str>, Slot>>,
     globals: usize,
     /// Number of variables of the subnet at hand; none outside subnets.
     locals: Option<usize>,
-    layers: BTreeMap<Rc<str>, usize>,
-    subnets: BTreeMap<Rc<str>, usize>,
+    layers: BTreeMap<Arc<str>, usize>,
+    subnets: BTreeMap<Arc<str>, usize>,
     /// Names already reported while an include is missing: one message each is enough then.
-    unknown: BTreeSet<Rc<str>>,
+    unknown: BTreeSet<Arc<str>>,
     incomplete: bool,
     /// Parameters of the list at hand, for the message that they do not see each other.
-    beside: Vec<Rc<str>>,
+    beside: Vec<Arc<str>>,
     /// Counts variables met, to tell constant layers.
     layers_used: usize,
 }
@@ -64,18 +64,18 @@ impl Resolver<'_> {
     }
 
     /// The variable that a definition of `name` here sets: an existing one or a new one.
-    fn define(&mut self, name: &Rc<str>) -> Slot {
+    fn define(&mut self, name: &Arc<str>) -> Slot {
         let known = self.lookup(name).filter(|slot| self.locals.is_none() || !slot.global);
         known.unwrap_or_else(|| self.fresh(name))
     }
 
-    fn fresh(&mut self, name: &Rc<str>) -> Slot {
+    fn fresh(&mut self, name: &Arc<str>) -> Slot {
         let count = self.locals.as_mut().unwrap_or(&mut self.globals);
         let index = *count;
         *count += 1;
         let slot = Slot { global: self.locals.is_none(), index };
         if let Some(scope) = self.scopes.last_mut() {
-            scope.insert(Rc::clone(name), slot);
+            scope.insert(Arc::clone(name), slot);
         }
         slot
     }
@@ -130,7 +130,7 @@ impl Resolver<'_> {
 
     /// Values of a parameter list: they see what stands outside the list, not each other.
     fn list(&mut self, defs: &mut [Def]) {
-        self.beside = defs.iter().map(|def| Rc::clone(&def.name.name)).collect();
+        self.beside = defs.iter().map(|def| Arc::clone(&def.name.name)).collect();
         for def in defs {
             self.expression(&mut def.value);
         }
@@ -151,14 +151,14 @@ impl Resolver<'_> {
                 None => self.unknown_layer(parent),
             }
         }
-        self.layers.insert(Rc::clone(&layer.name.name), index);
+        self.layers.insert(Arc::clone(&layer.name.name), index);
         program.layers[index] = layer;
     }
 
     fn subnet(&mut self, index: usize, program: &mut Program) {
         let mut subnet = program.subnets[index].clone();
         // Known inside its own body already: subnets may call themselves.
-        self.subnets.insert(Rc::clone(&subnet.name.name), index);
+        self.subnets.insert(Arc::clone(&subnet.name.name), index);
         self.locals = Some(0);
         self.scopes.push(BTreeMap::new());
         for name in &mut subnet.nodes {
@@ -235,8 +235,8 @@ impl Resolver<'_> {
     }
 
     /// False when an include is missing and this name was reported before.
-    fn first(&mut self, name: &Rc<str>) -> bool {
-        !self.incomplete || self.unknown.insert(Rc::clone(name))
+    fn first(&mut self, name: &Arc<str>) -> bool {
+        !self.incomplete || self.unknown.insert(Arc::clone(name))
     }
 
     fn expression(&mut self, expr: &mut Expr) {
@@ -281,6 +281,6 @@ impl Resolver<'_> {
     }
 }
 
-fn listed<'a>(names: impl Iterator<Item = &'a Rc<str>>) -> String {
+fn listed<'a>(names: impl Iterator<Item = &'a Arc<str>>) -> String {
     names.take(super::MOST_LISTED).map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", ")
 }

@@ -22,7 +22,7 @@ const LONGEST_MESSAGE: usize = 4000;
 const LONGEST_NAME: usize = 60;
 
 /// The messages of one load.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Sink {
     /// Names of the files in reading order; [`Span::file`] is an index here.
     pub(crate) files: Vec<String>,

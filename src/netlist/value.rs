@@ -1,12 +1,12 @@
 //! Values of netlist expressions.
 
-use std::rc::Rc;
+use std::sync::Arc;
 
 /// A value of the language.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) enum Value {
     Number(f64),
-    Text(Rc<str>),
+    Text(Arc<str>),
     /// An argument that was left open (`?`).
     #[default]
     Undefined,

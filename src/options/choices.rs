@@ -46,10 +46,23 @@ choice! {
         /// Exact joints, natural rods.
         B = "b",
         /// Exact joints, masses of fourth order.
-        #[default]
         E4 = "e4",
         /// Tuned pair of shear flexibility and rotary inertia.
         Es = "es",
+        /// What suits the formulation: E4, or Es in joint coordinates, where every body needs rotary inertia.
+        #[default]
+        Auto = "auto",
+    }
+}
+
+impl Scheme {
+    /// The scheme that stands for this one in a formulation.
+    pub fn in_formulation(self, formulation: Formulation) -> Self {
+        match (self, formulation) {
+            (Self::Auto, Formulation::Rcr | Formulation::RcrElastic) => Self::Es,
+            (Self::Auto, _) => Self::E4,
+            (given, _) => given,
+        }
     }
 }
 
@@ -96,6 +109,6 @@ mod tests {
             assert_eq!(serde_json::to_value(one).ok(), Some(name.into()));
         }
         assert_eq!(Scheme::named("e5"), None);
-        assert_eq!((Scheme::ALL.len(), Junctions::ALL.len()), (7, 3));
+        assert_eq!((Scheme::ALL.len(), Junctions::ALL.len()), (8, 3));
     }
 }

@@ -78,8 +78,9 @@ options! {
     /// Leave out gas damping.
     undamped: bool = false, "undamped" = 5, [""], Range::Flag, "";
 
-    /// How beams are cut into bodies and joints (docs/theory.md has their errors).
-    scheme: Scheme = Scheme::E4, "scheme" = 7, [""], Range::Names(&Scheme::NAMES), "";
+    /// How beams are cut into bodies and joints (docs/theory.md has their errors). auto: e4; es in joint coordinates, where every
+    /// body needs rotary inertia.
+    scheme: Scheme = Scheme::Auto, "scheme" = 7, [""], Range::Names(&Scheme::NAMES), "";
 
     /// Segments of every beam, whatever band and tol say.
     segments: Option<usize> = None, "segments" = 8, [""], Range::Count(1, 100_000), "by band and tol";
@@ -129,7 +130,19 @@ impl CompileOptions {
     /// # Errors
     /// [`Refused`]: the first that is not.
     pub fn check(&self) -> Result<(), Refused> {
-        MODEL.iter().try_for_each(|option| option.about.check(&self.value(option)))
+        MODEL.iter().try_for_each(|option| option.about.check(&self.value(option)))?;
+        match (self.scheme, self.formulation) {
+            (Scheme::E4, Formulation::Rcr | Formulation::RcrElastic) => Err(Refused {
+                option: "scheme",
+                expected: format!(
+                    "es, which is taken where none is given, beside formulation {}, or formulation compliant (bodies inside an \
+                     e4 beam have no rotary inertia, which joint coordinates need)",
+                    self.formulation.name()
+                ),
+                got: self.scheme.name().to_owned(),
+            }),
+            _ => Ok(()),
+        }
     }
 }
 

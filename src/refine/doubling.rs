@@ -19,7 +19,7 @@ const MOST_SEGMENTS: usize = 60_000;
 /// Groups that are doubled alone at most.
 const MOST_GROUPS: usize = 8;
 /// Share of the tolerance that the estimate may use: it has been found up to a quarter smaller than the error (docs/accuracy.md).
-const SAFETY: f64 = 0.75;
+pub const SAFETY: f64 = 0.75;
 /// Results that decide, at most: the worst.
 const MOST_RESULTS: usize = 24;
 

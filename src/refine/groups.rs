@@ -56,14 +56,15 @@ impl Groups {
         let now: Vec<usize> = self.0.iter().map(|g| most(g, segments)).collect();
         let mut next: Vec<usize> = self.0.iter().map(|g| most(g, floor)).collect();
         let power = options.scheme.order();
-        let scaled = |g: usize, n: usize| (now[g] as f64 / n as f64).powi(power);
+        // rigid beams have no segments, and no share
+        let scaled = |g: usize, n: usize| if now[g] == 0 { 0.0 } else { (now[g] as f64 / n as f64).powi(power) };
         let mut sums: Vec<f64> =
             shares.iter().map(|s| s.iter().enumerate().map(|(g, s)| s.abs() * scaled(g, next[g])).sum()).collect();
         // a step in N of at least a fiftieth keeps long searches short
         let step = |n: usize| options.scheme.segments(n + 1 + n / 50);
         for _ in 0..100_000 {
             let gain = |g: usize| {
-                if next[g] > MOST_GROWTH * (now[g] + 1) {
+                if now[g] == 0 || next[g] > MOST_GROWTH * (now[g] + 1) {
                     return 0.0;
                 }
                 let less = scaled(g, next[g]) - scaled(g, step(next[g]));

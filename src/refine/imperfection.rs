@@ -24,6 +24,7 @@ pub fn apply(parts: &mut Discretized, size: f64) {
     let mut tangent = BlockMatrix::new(&system.model.pattern);
     let mut residual = zeros.clone();
     system.tangent(&zeros, &drive, &mut tangent, &mut residual);
+    system.add_stress_stiffness(&zeros, &drive, &mut tangent);
     let Ok(found) = lowest_modes(system, (&zeros, &drive), &tangent, 1) else { return };
     let (Some(&lambda), Some(shape)) = (found.lambda.first(), found.shapes.first()) else { return };
     let moved = |p: &Pose| p.x.hypot(p.y);

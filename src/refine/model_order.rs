@@ -41,6 +41,8 @@ const MOST_MODES: usize = 64;
 pub(super) const MOST_SEGMENTS: usize = 10_000;
 /// Models tried.
 const MOST_PASSES: usize = 24;
+/// Models without an estimate that are refined as a whole.
+const MOST_BLIND: usize = 3;
 
 /// The chosen order.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -113,6 +115,16 @@ pub fn choose_for(structure: &Structure, options: &CompileOptions, aim: &Aim) ->
         let Some(error) = &now.error else {
             if holds.is_some() {
                 break;
+            }
+            // modes of so few segments may not be told apart: with more they are
+            let finer: Vec<usize> = segments.iter().map(|&n| options.scheme.segments(2 * n)).collect();
+            if now.modes > 0
+                && passes <= MOST_BLIND
+                && finer != segments
+                && finer.iter().sum::<usize>() <= MOST_SEGMENTS
+            {
+                segments = finer;
+                continue;
             }
             return Ok(ModelOrder { segments, estimated_error: None, modes_in_band: now.modes, passes });
         };

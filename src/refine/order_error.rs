@@ -165,7 +165,7 @@ struct Pencil<'a> {
 /// True where the model's tangent is that of the cubic frame: schemes E4 and B without rigid beams. Only then is the
 /// estimate that of a loaded equilibrium too.
 pub fn own_stiffness(options: &CompileOptions, parts: &Discretized) -> bool {
-    let exact = matches!(options.scheme, Scheme::E4 | Scheme::B);
+    let exact = matches!(options.scheme, Scheme::Auto | Scheme::E4 | Scheme::B);
     exact && parts.beams.iter().all(|points| points.len() > 2 || points[0].body != points[1].body)
 }
 

@@ -8,7 +8,8 @@ use super::sweeps::Sweep;
 use super::turns::Place;
 use super::{proto, status};
 use crate::analysis::AnalysisError;
-use crate::analysis::mesh::fitted_in_time;
+use crate::analysis::mesh::{self, fitted_in_time};
+use crate::analysis::step_error::{self, with_step_error};
 use crate::analysis::transient::{TransientOptions, TransientResult, transient};
 use crate::compile::Compiled;
 use prost::Message;
@@ -131,7 +132,11 @@ pub(super) fn send_transient(
     };
     let result = fitted_in_time(compiled, options).and_then(|(moving, start)| {
         let options = TransientOptions { release: start.as_ref(), ..options.clone() };
-        transient(&moving, &options, &mut sample, &mut watch)
+        let run: step_error::Run<'_, ()> =
+            &mut |options, sample, watch| transient(&moving, options, sample, watch).map(|r| (r, ()));
+        let (mut result, ()) = with_step_error(&options, moving.unknowns(), run, &mut sample, &mut watch)?;
+        result.warnings.extend(mesh::warnings(&moving));
+        Ok(result)
     });
     let mut outlet = outlet.into_inner();
     if !pending.t.is_empty() {

@@ -222,10 +222,9 @@ impl proto::bimorph_server::Bimorph for Calls {
         let request = request.into_inner();
         let voltages = voltages(request.voltages)?;
         let job = move |model: &Model| {
-            let fitted = mesh::fitted(&model.compiled, &mesh::Request::Static { voltages: &voltages });
-            let result = fitted
-                .and_then(|compiled| statics::static_equilibrium(&compiled, &voltages))
-                .map_err(status::analysis)?;
+            let (fitted, mut result, _) =
+                statics::static_fitted(&model.compiled, &voltages).map_err(status::analysis)?;
+            result.warnings.extend(mesh::warnings(&fitted));
             Ok(results::static_to_wire(&result))
         };
         self.analyse(&request.model, job).await
@@ -244,9 +243,9 @@ impl proto::bimorph_server::Bimorph for Calls {
             if work > most {
                 return Err(status::limit("mode_work", most, work));
             }
-            let fitted = mesh::fitted(&model.compiled, &mesh::Request::Modes { count, voltages: &voltages });
-            let result =
-                fitted.and_then(|compiled| modes::modes(&compiled, count, &voltages)).map_err(status::analysis)?;
+            let (fitted, mut result, _) =
+                modes::modes_fitted(&model.compiled, count, &voltages).map_err(status::analysis)?;
+            result.warnings.extend(mesh::warnings(&fitted));
             Ok(results::modes_to_wire(&result))
         };
         self.analyse(&request.model, job).await
@@ -258,10 +257,9 @@ impl proto::bimorph_server::Bimorph for Calls {
         convert::options::analysis(&PULL_IN_MAX, Value::Number(max)).map_err(status::violation)?;
         let port = (!request.port.is_empty()).then_some(request.port);
         let job = move |model: &Model| {
-            let fitted = mesh::fitted(&model.compiled, &mesh::Request::PullIn { port: port.as_deref(), max });
-            let result = fitted
-                .and_then(|compiled| pull_in::pull_in(&compiled, port.as_deref(), max))
-                .map_err(status::analysis)?;
+            let (fitted, mut result) =
+                pull_in::pull_in_fitted(&model.compiled, port.as_deref(), max).map_err(status::analysis)?;
+            result.warnings.extend(mesh::warnings(&fitted));
             Ok(results::pull_in_to_wire(&result))
         };
         self.analyse(&request.model, job).await

@@ -126,14 +126,18 @@ impl Equilibrium {
             let step = f64::min(ds, 1.0 - s);
             let to = if 1.0 - s - step < 1e-12 { 1.0 } else { s + step };
             self.predict(system, path, s, to - s, q)?;
+            // held where the step begins; what a wild trial holds says nothing
+            let free = self.held.first().copied();
             match self.correct(system, path, to, &mut done) {
                 Corrected::Stable => {
                     q.copy_from_slice(&self.trial);
                     s = to;
                     ds = 2.0 * step;
                 }
-                // a free motion that a load excites never settles: there is no equilibrium to look for
-                Corrected::No if !self.held.is_empty() => return Err(SolveError::singular(system, self.held[0])),
+                Corrected::No if free.is_some() => {
+                    // a free motion that a load excites never settles: there is no equilibrium to look for
+                    return free.map_or(Ok(done), |pivot| Err(SolveError::singular(system, pivot)));
+                }
                 Corrected::No if step > self.options.smallest_step => ds = 0.5 * step,
                 Corrected::No => {
                     done.fold.get_or_insert(s);

@@ -23,7 +23,7 @@ pub use frequency::{eigen, fastest, harmonic, subspace};
 pub use time::interpolation as dense;
 pub use time::{
     adaptive, avf, centred, dormand_prince, doubling, event, generalized_alpha, joint_adaptive, joint_dirk,
-    joint_loads, joint_motion, joint_stage, method, midpoint, radau5, rk45, rodas4, sdirk4, tr_bdf2,
+    joint_loads, joint_motion, joint_stage, method, midpoint, radau5, rk45, rodas4,
 };
 
 use crate::multibody::factor::ZeroPivot;
@@ -43,7 +43,8 @@ pub enum SolveError {
     },
     /// Load steps became too small and no other equilibrium was found.
     #[error(
-        "equilibrium lost at {share:.6} of the load after {iterations} iterations (residual {residual:.3e} at \"{body}\"){unheld}"
+        "equilibrium lost at {share:.6} of the load after {iterations} iterations (residual {residual:.3e} at \"{body}\"): \
+         nothing that was found bears more{unheld}"
     )]
     Lost {
         /// Share of the load path that was reached [1].

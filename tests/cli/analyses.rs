@@ -14,6 +14,34 @@ fn check() {
     assert!(bench.run("check p.net").stdout.contains("no errors, 0 warnings"));
 }
 
+/// `--formulation auto` says what it takes and why: joint coordinates for plates on pivots that only turn, the bodies' own where a
+/// flexure is elastic in every direction, and for a release. `check` says it without a run.
+#[test]
+fn auto_says_what_it_takes() {
+    let bench = Bench::new(&[
+        ("poly.net", include_str!("../../examples/poly.net")),
+        ("pivots.net", &include_str!("../../examples/pivots/pivots.net").replace("../poly", "poly")),
+    ]);
+    let words = "tran pivots.net --stop 50u --undamped --segments 1 --formulation auto --points 3 --signals plate(8).y";
+    let turning = bench.json(&format!("{words} --scheme a2"));
+    let taken = |found: &serde_json::Value| found["formulation_taken"].as_str().unwrap_or_default().to_owned();
+    assert!(taken(&turning).starts_with("rcr: joints only turn"), "{}", taken(&turning));
+    assert_eq!((&turning["method"], &turning["joint_coordinates"]["coordinates"]), (&"rk45".into(), &8.into()));
+    for other in ["", "--scheme a2 --release F", "--scheme a2 --method tr-bdf2"] {
+        let found = bench.json(&format!("{words} {other}"));
+        assert!(
+            !taken(&found).starts_with("rcr") && found["joint_coordinates"].is_null(),
+            "{other}: {}",
+            taken(&found)
+        );
+    }
+    assert!(bench.run(&format!("{words} --scheme a2")).stdout.contains("formulation auto took rcr"));
+    let told = bench.run("check pivots.net --formulation auto").stdout;
+    assert!(told.contains("formulation auto takes compliant: joints are elastic in every direction"), "{told}");
+    let told = bench.run("check pivots.net --formulation rcr --segments 1").stdout;
+    assert!(told.contains("formulation rcr: 24 coordinates, 0 loops closed by springs, scheme es"), "{told}");
+}
+
 /// The tip of a cantilever moves by F·l³/(3·E·I) and turns by F·l²/(2·E·I); every option is in the document.
 #[test]
 fn static_equilibrium() {
@@ -115,7 +143,7 @@ fn sweep() {
     assert_eq!(whole.status, 0, "{}", whole.stderr);
     assert!(whole.stderr.contains("5 points"), "{}", whole.stderr);
     let lines: Vec<&str> = whole.stdout.lines().collect();
-    assert_eq!(lines[0], "point,F,b.y [m],error");
+    assert_eq!(lines[0], "point,F,b.y [m],estimated_error [1],warning,error");
     let cells: Vec<&str> = lines[5].split(',').collect();
     let tip: f64 = cells[2].parse().expect("a number");
     assert_relative_eq!(tip, 2e-18 / (3.0 * 165e9 * 2e-6 * 8e-18 / 12.0), max_relative = 1e-9);

@@ -18,6 +18,7 @@ mod paths;
 mod relative;
 mod scenes;
 mod schemes;
+mod told;
 
 use bimorph::analysis::statics::{NodeMotion, StaticResult, static_equilibrium};
 use bimorph::compile::{CompileOptions, Compiled, Junctions, compile};

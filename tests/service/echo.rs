@@ -3,8 +3,8 @@
 
 use bimorph::compile::Compiled;
 use bimorph::device::{
-    Description, Device, DeviceError, Mode, OpenRequest, PortInfo, SignalInfo, SmallSignal, Status, Token, Trial,
-    TrialReply,
+    Description, Device, DeviceError, Mode, OpenRequest, PortInfo, PortKind, SignalInfo, SmallSignal, Status, Token,
+    Trial, TrialReply,
 };
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -50,7 +50,7 @@ impl Device for Echo {
         (self.ports, self.signals) = (ports.len(), request.signals.len());
         self.tokens.clear();
         Ok(Description {
-            ports: ports.into_iter().map(|name| PortInfo { name }).collect(),
+            ports: ports.into_iter().map(|name| PortInfo { name, kind: PortKind::Electrical }).collect(),
             signals: request.signals.iter().map(|name| SignalInfo { name: name.clone(), unit: "s".into() }).collect(),
             unknowns: 3,
         })

@@ -2,9 +2,10 @@
 
 use super::running::{DEADLINE, PLATE, Running, bundle, start_with};
 use bimorph::analysis::integrator::Integrator;
-use bimorph::analysis::mesh::{Request, fitted, fitted_in_time};
+use bimorph::analysis::mesh::fitted_in_time;
+use bimorph::analysis::step_error::with_step_error;
 use bimorph::analysis::transient::{TransientOptions, transient};
-use bimorph::analysis::{modes::modes, pull_in::pull_in, statics::static_equilibrium};
+use bimorph::analysis::{modes::modes_fitted, pull_in::pull_in_fitted, statics::static_fitted};
 use bimorph::compile::{CompileOptions, Compiled, compile};
 use bimorph::device::local::LocalDevice;
 use bimorph::device::{Device, Mode, OpenRequest, SmallSignal, Status, Token, Trial, TrialReply};
@@ -36,13 +37,15 @@ fn compiled(bundle: &Bundle) -> Arc<Compiled> {
     Arc::new(compile(bundle, &CompileOptions::default()).unwrap_or_else(|error| panic!("{error}")))
 }
 
-/// Drives a device as a circuit would, with rejected attempts in between, and writes down all it said.
-fn drive(device: &mut dyn Device, ports: usize, signals: &[&str]) -> Vec<String> {
+/// Drives a device as a circuit would, each port in proportion to its number, with rejected attempts in between, and writes down
+/// all it said.
+fn drive(device: &mut dyn Device, ports: &[(&str, f64)], signals: &[&str]) -> Vec<String> {
     let mut said = Vec::new();
     let signals = signals.iter().map(|&signal| signal.to_owned()).collect();
-    said.push(format!("{:?}", device.open(&OpenRequest { ports: vec![], signals })));
+    let names = ports.iter().map(|(name, _)| (*name).to_owned()).collect();
+    said.push(format!("{:?}", device.open(&OpenRequest { ports: names, signals })));
     let mut ask = |device: &mut dyn Device, mode, parent, dt: f64, v: f64| -> Option<Token> {
-        let voltages = vec![v; ports];
+        let voltages: Vec<f64> = ports.iter().map(|(_, share)| share * v).collect();
         let mut reply = TrialReply::default();
         let outcome = device.trial(&Trial { mode, parent, t: dt, dt, voltages: &voltages }, &mut reply);
         said.push(format!("{outcome:?} {reply:?}"));
@@ -70,7 +73,7 @@ fn drive(device: &mut dyn Device, ports: usize, signals: &[&str]) -> Vec<String>
     said
 }
 
-fn compare(limits: Limits, netlist: &Bundle, ports: usize, signals: &[&str]) {
+fn compare(limits: Limits, netlist: &Bundle, ports: &[(&str, f64)], signals: &[&str]) {
     let server = local_server(limits);
     let mut remote = RemoteDevice::connect(&server.address.uri(), netlist, &CompileOptions::default(), DEADLINE)
         .unwrap_or_else(|error| panic!("{error}"));
@@ -86,19 +89,36 @@ fn compare(limits: Limits, netlist: &Bundle, ports: usize, signals: &[&str]) {
 /// A circuit's run over the wire is the same run, to the bit, rejected steps, faults and small signals included.
 #[test]
 fn trials_have_the_same_bits() {
-    compare(Limits::default(), &bundle(), 1, &["m.x", "m.vx"]);
+    compare(Limits::default(), &bundle(), &[("drive", 1.0)], &["m.x", "m.vx"]);
 }
 
 /// The same for a model with heat and a second port.
 #[test]
 fn trials_of_a_heated_beam_have_the_same_bits() {
-    compare(Limits::default(), &Bundle::from_text("bank.net", BANK), 2, &["m.x", "m.y"]);
+    compare(Limits::default(), &Bundle::from_text("bank.net", BANK), &[("heat", 1.0), ("sense", 1.0)], &["m.x", "m.y"]);
+}
+
+/// The same with ports of every kind.
+#[test]
+fn trials_with_ports_of_other_kinds_have_the_same_bits() {
+    let ports = [
+        ("m.y", 1e-6),
+        ("heat", 1.0),
+        ("left.T", 1e-4),
+        ("m.vx", 1e-6),
+        ("m.rz", 1e-11),
+        ("sense", 1.0),
+        ("m.vrz", -1e-11),
+        ("frame.ax", 1e3),
+        ("frame.ay", -1e3),
+    ];
+    compare(Limits::default(), &Bundle::from_text("bank.net", BANK), &ports, &["m.x", "m.y"]);
 }
 
 /// The same when the model counts as large and is stepped on threads of its own.
 #[test]
 fn trials_on_other_threads_have_the_same_bits() {
-    compare(Limits { inline_unknowns: 0, ..Limits::default() }, &bundle(), 1, &["m.x"]);
+    compare(Limits { inline_unknowns: 0, ..Limits::default() }, &bundle(), &[("drive", 1.0)], &["m.x"]);
 }
 
 /// Every analysis over the wire is the analysis in process.
@@ -109,12 +129,11 @@ fn analyses_have_the_same_bits() {
     let model = client.compile(&bundle(), &CompileOptions::default()).expect("compiles");
     let here = compiled(&bundle());
     let volts = [("drive".to_owned(), 2.0)];
-    let on = |request: Request<'_>| fitted(&here, &request).expect("a mesh");
-    let still = static_equilibrium(&on(Request::Static { voltages: &volts }), &volts).expect("one");
+    let (_, still, _) = static_fitted(&here, &volts).expect("one");
     assert_eq!(client.statics(&model, &volts).expect("an answer"), still);
-    let ringing = modes(&on(Request::Modes { count: 1, voltages: &volts }), 1, &volts).expect("one");
+    let (_, ringing, _) = modes_fitted(&here, 1, &volts).expect("one");
     assert_eq!(client.modes(&model, 1, &volts).expect("an answer"), ringing);
-    let closed = pull_in(&on(Request::PullIn { port: None, max: 10.0 }), None, 10.0).expect("one");
+    let (_, closed) = pull_in_fitted(&here, None, 10.0).expect("one");
     assert_eq!(client.pull_in(&model, None, 10.0).expect("an answer"), closed);
 
     let options = TransientOptions {
@@ -128,7 +147,13 @@ fn analyses_have_the_same_bits() {
         ..TransientOptions::default()
     };
     let (moving, _) = fitted_in_time(&here, &options).expect("a mesh");
-    let local = transient(&moving, &options, &mut |_, _| {}, &mut |_| true).expect("runs");
+    let mut run =
+        |options: &TransientOptions<'_>, sample: &mut dyn FnMut(f64, &[f64]), watch: &mut dyn FnMut(f64) -> bool| {
+            transient(&moving, options, sample, watch).map(|r| (r, ()))
+        };
+    let (local, ()) =
+        with_step_error(&options, moving.unknowns(), &mut run, &mut |_, _| {}, &mut |_| true).expect("runs");
+    assert!(local.step_error.is_some());
     let remote = RemoteTransient {
         stop: options.stop,
         signals: options.signals.clone(),

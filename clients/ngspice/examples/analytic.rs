@@ -11,8 +11,8 @@
 //! `target/debug/examples/libanalytic.so` with `pre_codemodel`.
 
 use bimorph::device::{
-    Description, Device, DeviceError, Mode, OpenRequest, PortInfo, SignalInfo, SmallSignal, Status, Token, Trial,
-    TrialReply,
+    Description, Device, DeviceError, Mode, OpenRequest, PortInfo, PortKind, SignalInfo, SmallSignal, Status, Token,
+    Trial, TrialReply,
 };
 use bimorph_ngspice::model_card::ModelCard;
 use bimorph_ngspice::opener::OpenError;
@@ -103,7 +103,7 @@ impl Plate {
 impl Device for Plate {
     fn open(&mut self, request: &OpenRequest) -> Result<Description, DeviceError> {
         self.states.clear();
-        let port = |name: &str| PortInfo { name: name.to_owned() };
+        let port = |name: &str| PortInfo { name: name.to_owned(), kind: PortKind::Electrical };
         if let Some(name) = request.signals.iter().find(|s| *s != "plate.x") {
             return Err(DeviceError::UnknownSignal { name: name.clone(), hint: "there is plate.x".into() });
         }

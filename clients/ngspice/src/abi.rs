@@ -25,6 +25,10 @@ pub(crate) mod port {
     pub(crate) const CONDUCTANCE: c_int = 5;
     /// Current between two nodes that depends on the voltage between them.
     pub(crate) const DIFF_CONDUCTANCE: c_int = 6;
+    /// Voltage of a node that depends on the current into it.
+    pub(crate) const RESISTANCE: c_int = 7;
+    /// Voltage between two nodes that depends on the current into the first.
+    pub(crate) const DIFF_RESISTANCE: c_int = 8;
     /// Direction: output.
     pub(crate) const OUT: c_int = 1;
     /// Direction: input and output.
@@ -146,6 +150,8 @@ pub(crate) struct Parameter {
 
 /// Offsets inside a port's data.
 pub(crate) mod port_data {
+    /// Kind of the port, of those in [`super::port`].
+    pub(crate) const KIND: usize = 0;
     /// Input value.
     pub(crate) const INPUT: usize = 48;
     /// Output value.
@@ -153,6 +159,8 @@ pub(crate) mod port_data {
     /// Node and branch numbers within a port's matrix data: positive, negative, branch.
     pub(crate) const NODES: [usize; 2] = [0, 4];
     pub(crate) const BRANCH: usize = 8;
+    /// The branch whose current is the input.
+    pub(crate) const INPUT_BRANCH: usize = 12;
     /// Element pointers over the inputs within a port's matrix data, up to ngspice 41.
     pub(crate) const INPUTS_39: usize = 80;
     /// Partials in ngspice 39; null in later hosts, where they follow at + 8.

@@ -1,6 +1,6 @@
 //! ngspice's memory, read and written: parameters at setup, inputs and outputs at each call.
 
-use crate::abi::{self, Complex, Connection, Instance, Model, Parameter, Tail, Value, analysis, port_data};
+use crate::abi::{self, Complex, Connection, Instance, Model, Parameter, Tail, Value, analysis, port, port_data};
 use crate::circuit::Circuit;
 use crate::deck_options::{Written, declared};
 use crate::instance::Question;
@@ -9,7 +9,7 @@ use crate::model_card::RawCard;
 use crate::table::OWN_COUNT;
 use std::ffi::{CStr, c_char, c_int, c_void};
 
-/// Electrical ports.
+/// Ports that are driven.
 pub(crate) const PORTS: usize = 0;
 /// Monitors.
 pub(crate) const MONITORS: usize = 1;
@@ -84,6 +84,23 @@ pub(crate) unsafe fn size(conn: *mut *mut Connection, which: usize) -> usize {
     // SAFETY: by contract.
     let connection = unsafe { &**conn.add(which) };
     if connection.is_null == 0 { connection.size.max(0) as usize } else { 0 }
+}
+
+/// Whether each driven port is a branch: its current is given, and it answers with the voltage across it.
+///
+/// # Safety
+/// As for [`size`].
+pub(crate) unsafe fn branches(conn: *mut *mut Connection) -> Vec<bool> {
+    // SAFETY: by contract; a port begins with its kind.
+    unsafe { (0..size(conn, PORTS)).map(|n| is_branch(*(**conn.add(PORTS)).port.add(n))).collect() }
+}
+
+/// # Safety
+/// `port` is a port of the host's.
+unsafe fn is_branch(port: *const u8) -> bool {
+    // SAFETY: by contract.
+    let kind = unsafe { *port.add(port_data::KIND).cast::<c_int>() };
+    kind == port::RESISTANCE || kind == port::DIFF_RESISTANCE
 }
 
 /// Whether ports keep their partials where ngspice 39 does. To be asked after the host's own setup.
@@ -191,9 +208,25 @@ impl Call<'_> {
     }
 
     /// Positive and negative node of a port.
-    pub(crate) fn nodes(&self, which: usize, n: usize) -> [i32; 2] {
+    fn nodes(&self, which: usize, n: usize) -> [i32; 2] {
         // SAFETY: a port's matrix data begin with its two nodes, set by the host.
         port_data::NODES.map(|at| unsafe { *self.port(which, n).add(self.matrix + at).cast::<i32>() })
+    }
+
+    /// Whether a port answers with the voltage across it: a monitor, or one whose current is given.
+    fn is_branch(&self, which: usize, n: usize) -> bool {
+        // SAFETY: a port of this instance.
+        which == MONITORS || unsafe { is_branch(self.port(which, n)) }
+    }
+
+    /// The two places in the solution whose difference is given to a port: its nodes, or the branch and ground.
+    pub(crate) fn given(&self, n: usize) -> [i32; 2] {
+        if self.is_branch(PORTS, n) {
+            // SAFETY: matrix data of a port, set by the host.
+            [unsafe { *self.port(PORTS, n).add(self.matrix + port_data::INPUT_BRANCH).cast::<i32>() }, 0]
+        } else {
+            self.nodes(PORTS, n)
+        }
     }
 
     fn input(&self, n: usize) -> *mut f64 {
@@ -201,7 +234,7 @@ impl Call<'_> {
         unsafe { self.port(PORTS, n).add(port_data::INPUT).cast() }
     }
 
-    /// Port voltages. The host's are not right where it takes the load for a small signal, and it does not know those that
+    /// Port voltages, or currents where these are given. The host's are not right where it takes the load for a small signal, and it does not know those that
     /// a transient starts from (`uic`); what is read instead is given to it, too, now and for the first step.
     pub(crate) fn voltages(&self, into: &mut Vec<f64>) {
         into.clear();
@@ -212,7 +245,7 @@ impl Call<'_> {
             unsafe {
                 if self.large_as_small() || given {
                     let first = self.circuit.first() && !given;
-                    *self.input(n) = if first { 0.0 } else { self.circuit.loaded_at(self.nodes(PORTS, n)) };
+                    *self.input(n) = if first { 0.0 } else { self.circuit.loaded_at(self.given(n)) };
                     let kept = *self.port(PORTS, n).add(self.partial + 16).cast::<i32>();
                     *self.circuit.states().add(kept as usize) = *self.input(n);
                 }
@@ -221,7 +254,7 @@ impl Call<'_> {
         }
     }
 
-    /// Sets a port's output and its partials over the electrical ports.
+    /// Sets a port's output and its partials over the driven ports.
     pub(crate) fn set(&self, which: usize, n: usize, output: f64, partials: &[f64]) {
         if self.large_as_small() {
             self.set_gains(which, n, partials.iter().map(|gain| [*gain, 0.0]));
@@ -230,7 +263,7 @@ impl Call<'_> {
             let [positive, negative] = self.nodes(which, n);
             // SAFETY: equations of the circuit, which is being loaded.
             unsafe {
-                if which == PORTS {
+                if !self.is_branch(which, n) {
                     self.circuit.add(positive, linear - output);
                     self.circuit.add(negative, output - linear);
                 } else {
@@ -241,7 +274,7 @@ impl Call<'_> {
             return;
         }
         let port = self.port(which, n);
-        // SAFETY: the host allocated an output and one partial per electrical port for every output port.
+        // SAFETY: the host allocated an output and one partial per driven port for every output port.
         unsafe {
             *port.add(port_data::OUTPUT).cast::<f64>() = output;
             let row = **port.add(self.partial).cast::<*const *mut f64>();
@@ -249,7 +282,7 @@ impl Call<'_> {
         }
     }
 
-    /// Sets a port's small-signal gains over the electrical ports.
+    /// Sets a port's small-signal gains over the driven ports.
     pub(crate) fn set_gains(&self, which: usize, n: usize, gains: impl Iterator<Item = [f64; 2]>) {
         let port = self.port(which, n);
         if self.small_as_large() {
@@ -259,7 +292,7 @@ impl Call<'_> {
                 unsafe {
                     *self.input(m) = 0.0;
                     *(**port.add(self.partial).cast::<*const *mut f64>()).add(m) = re;
-                    self.add_imaginary(which, port, m, im);
+                    self.add_imaginary((which, n), m, im);
                 }
             }
             return;
@@ -274,18 +307,24 @@ impl Call<'_> {
         }
     }
 
-    /// Adds the imaginary part of a gain to the matrix.
+    /// Adds the imaginary part of a port's gain to the matrix.
     ///
     /// # Safety
-    /// The host is ngspice 39 to 41 and is loading the complex matrix; `port` is a port of connection `which`.
-    unsafe fn add_imaginary(&self, which: usize, port: *mut u8, input: usize, im: f64) {
+    /// The host is ngspice 39 to 41 and is loading the complex matrix.
+    unsafe fn add_imaginary(&self, (which, n): (usize, usize), input: usize, im: f64) {
         /// Words of a port's element pointers, one set for each input.
         const SET: usize = 4;
+        // In the order of the host: voltages give currents, currents give currents; voltages give voltages, currents do.
+        let signs: &[f64] = match (self.is_branch(which, n), self.is_branch(PORTS, input)) {
+            (false, false) => &[1.0, -1.0, -1.0, 1.0],
+            (false, true) => &[1.0, -1.0],
+            (true, false) => &[-1.0, 1.0],
+            (true, true) => &[-1.0],
+        };
         // SAFETY: the host made these elements when it set the instance up; each is a pair of doubles.
         unsafe {
-            let inputs = *port.add(self.matrix + port_data::INPUTS_39).cast::<*const *const *mut f64>();
+            let inputs = *self.port(which, n).add(self.matrix + port_data::INPUTS_39).cast::<*const *const *mut f64>();
             let elements = (*inputs.add(PORTS)).add(SET * input);
-            let signs: &[f64] = if which == PORTS { &[1.0, -1.0, -1.0, 1.0] } else { &[-1.0, 1.0] };
             for (k, sign) in signs.iter().enumerate() {
                 *(*elements.add(k)).add(1) += sign * im;
             }

@@ -5,9 +5,10 @@
 
 use crate::companion::{Companion, shortest};
 use crate::history::{Base, History};
-use crate::settings::Monitor;
+use crate::scale::Scale;
+use crate::settings::{Monitor, PortName};
 use bimorph::device::{
-    Description, Device, DeviceError, Mode, OpenRequest, SmallSignal, Status, Token, Trial, TrialReply,
+    Description, Device, DeviceError, Mode, OpenRequest, PortKind, SmallSignal, Status, Token, Trial, TrialReply,
 };
 
 /// How often in a row a step or an operating point may fail before the analysis ends. Each attempt of a transient is
@@ -54,9 +55,9 @@ pub struct Answer {
     pub token: Option<Token>,
     /// Step that led to it [s]; 0 for equilibrium.
     pub step: f64,
-    /// Current into each port [A] (p).
+    /// Current into each port [A], or the voltage across one whose current is given [V] (p).
     pub currents: Vec<f64>,
-    /// ∂current/∂voltage [S] (p×p).
+    /// ∂current/∂voltage [S], or of what else is answered and given (p×p).
     pub conductances: Vec<f64>,
     /// Charges [C] (p).
     pub charges: Vec<f64>,
@@ -74,6 +75,10 @@ pub struct Instance {
     device: Box<dyn Device>,
     monitors: Vec<Monitor>,
     description: Description,
+    /// Of each port.
+    scales: Vec<Scale>,
+    /// What is given to each port, in its own unit.
+    given: Vec<f64>,
     reply: TrialReply,
     answer: Answer,
     small: SmallSignal,
@@ -85,28 +90,59 @@ pub struct Instance {
 }
 
 impl Instance {
-    /// Opens `device` for an instance of `ports` ports. An empty `names` stands for every port of the netlist.
+    /// Opens `device` for an instance. `branches` tells for each port whether it is one whose current is given (`%hd`). No
+    /// `names` stand for every port of the netlist.
     ///
     /// # Errors
-    /// What the device refuses, or a wrong number of ports.
+    /// What the device refuses, a wrong number of ports, or a connection that does not suit a port.
     pub fn open(
         name: &str,
         mut device: Box<dyn Device>,
-        names: &[String],
-        ports: usize,
+        names: &[PortName],
+        branches: &[bool],
         monitors: &[Monitor],
     ) -> Result<Self, DeviceError> {
         let signals = monitors.iter().map(|m| m.signal.clone()).collect();
-        let description = device.open(&OpenRequest { ports: names.to_vec(), signals })?;
-        if description.ports.len() != ports {
+        let description =
+            device.open(&OpenRequest { ports: names.iter().map(|p| p.name.clone()).collect(), signals })?;
+        if description.ports.len() != branches.len() {
             let names: Vec<_> = description.ports.iter().map(|p| p.name.as_str()).collect();
             return Err(DeviceError::BadRequest {
                 what: "ports",
                 expected: format!("{} node pairs for the ports {names:?}", names.len()),
-                got: ports.to_string(),
+                got: branches.len().to_string(),
             });
         }
+        let mut scales = Vec::with_capacity(branches.len());
+        for (n, (port, &branch)) in description.ports.iter().zip(branches).enumerate() {
+            if port.kind.given_flow() != branch {
+                let (right, wrong) = if branch { ("%gd", "%hd") } else { ("%hd", "%gd") };
+                return Err(DeviceError::BadRequest {
+                    what: "ports",
+                    expected: format!(
+                        "{right} before the nodes of \"{}\", a port of {}",
+                        port.name,
+                        port.kind.given().0
+                    ),
+                    got: wrong.into(),
+                });
+            }
+            let across = names.get(n).and_then(|p| p.scale);
+            if across.is_some_and(|scale| port.kind == PortKind::Electrical || scale == 0.0) {
+                return Err(DeviceError::BadRequest {
+                    what: "ports",
+                    expected: format!(
+                        "\"{}\" without a scale, or one that is not 0 on a port of another kind",
+                        port.name
+                    ),
+                    got: across.map_or(String::new(), |scale| format!("{}:{scale}", port.name)),
+                });
+            }
+            scales.push(Scale::new(port.kind, across));
+        }
         Ok(Self {
+            scales,
+            given: Vec::new(),
             name: name.to_owned(),
             device,
             monitors: monitors.to_vec(),
@@ -137,14 +173,20 @@ impl Instance {
         &self.answer
     }
 
-    /// The last small-signal answer, monitors unscaled.
-    pub fn small_signal(&self) -> &SmallSignal {
-        &self.small
+    /// What the last small-signal answer says of port `row` over the ports.
+    pub fn admittances(&self, row: usize) -> impl Iterator<Item = [f64; 2]> {
+        let ports = self.scales.len();
+        self.over_ports(self.scales[row].answered, &self.small.admittance[row * ports..(row + 1) * ports])
     }
 
-    /// Scale of each monitor [V per unit].
-    pub fn monitors(&self) -> &[Monitor] {
-        &self.monitors
+    /// What it says of monitor `row`.
+    pub fn monitor_responses(&self, row: usize) -> impl Iterator<Item = [f64; 2]> {
+        let ports = self.scales.len();
+        self.over_ports(self.monitors[row].scale, &self.small.outputs[row * ports..(row + 1) * ports])
+    }
+
+    fn over_ports(&self, answered: f64, row: &[[f64; 2]]) -> impl Iterator<Item = [f64; 2]> {
+        row.iter().zip(&self.scales).map(move |(part, scale)| part.map(|x| answered * x * scale.given))
     }
 
     /// Longest next step the device is likely to bear [s].
@@ -154,6 +196,15 @@ impl Instance {
 
     /// Asks the device. `previous` is the last accepted point; for a small signal, the operating point.
     pub fn ask(&mut self, question: Question, voltages: &[f64], previous: &History) -> Outcome {
+        let mut given = std::mem::take(&mut self.given);
+        given.clear();
+        given.extend(voltages.iter().zip(&self.scales).map(|(v, scale)| v * scale.given));
+        let outcome = self.ask_given(question, &given, previous);
+        self.given = given;
+        outcome
+    }
+
+    fn ask_given(&mut self, question: Question, voltages: &[f64], previous: &History) -> Outcome {
         match question {
             Question::Static => {
                 let outcome = self.trial(Mode::Static, 0.0, 0.0, voltages, previous.token);
@@ -183,7 +234,8 @@ impl Instance {
             return false;
         }
         for (n, row) in dq_dv.chunks_exact(ports.max(1)).enumerate() {
-            answer.charges[n] += row.iter().zip(volts).map(|(c, v)| c * v).sum::<f64>();
+            let given = volts.iter().zip(&self.scales).map(|(v, scale)| v * scale.given);
+            answer.charges[n] += row.iter().zip(given).map(|(c, v)| c * v).sum::<f64>();
         }
         answer.base.charges.clone_from(&answer.charges);
         true
@@ -271,12 +323,16 @@ impl Instance {
             base.charges_before.clone_from(&reply.charges);
             base.charges.clone_from(&reply.charges);
         }
+        for (row, scale) in answer.conductances.chunks_exact_mut(ports.max(1)).zip(&self.scales) {
+            row.iter_mut().zip(&self.scales).for_each(|(g, input)| *g *= scale.answered * input.given);
+        }
+        answer.currents.iter_mut().zip(&self.scales).for_each(|(current, scale)| *current *= scale.answered);
         answer.monitors.clear();
         answer.monitor_gains.clear();
         for (s, monitor) in self.monitors.iter().enumerate() {
             answer.monitors.push(monitor.scale * reply.outputs[s]);
             let row = &reply.doutputs_dv[s * ports..(s + 1) * ports];
-            answer.monitor_gains.extend(row.iter().map(|d| monitor.scale * d));
+            answer.monitor_gains.extend(row.iter().zip(&self.scales).map(|(d, port)| monitor.scale * d * port.given));
         }
     }
 

@@ -14,7 +14,7 @@
 //! `circuit` what it is part of. Between the two sides stand
 //! `callbacks`, `opening` and `respond`, with the `registry` of instances. What does not know ngspice: [`model_card`],
 //! [`settings`], [`deck_options`] and `names` the `.model` line, [`opener`] from line to device, [`instance`] questions and outcomes,
-//! [`companion`] charges to currents, [`history`] what an accepted point leaves behind.
+//! [`companion`] charges to currents, [`scale`] volts to micrometres, [`history`] what an accepted point leaves behind.
 //!
 //! This is the only crate of the project with `unsafe` code; each block says why it holds.
 
@@ -39,6 +39,7 @@ mod opening;
 mod panics;
 mod registry;
 mod respond;
+pub mod scale;
 pub mod settings;
 mod table;
 mod trace;

@@ -1,7 +1,7 @@
 //! The `.model` line of a device: what was given, checked and with its defaults.
 
 use crate::deck_options::{self, Written};
-use crate::settings::{self, Monitor};
+use crate::settings::{self, Monitor, PortName};
 use bimorph::compile::CompileOptions;
 use bimorph::options::{MODEL, Refused};
 use std::time::Duration;
@@ -31,8 +31,8 @@ pub struct RawCard {
 pub struct ModelCard {
     /// Netlist, as spelled.
     pub file: String,
-    /// Port names in the order of the node pairs; empty: all, in netlist order.
-    pub ports: Vec<String>,
+    /// Ports in the order of the node pairs; empty: all of the netlist, in its order.
+    pub ports: Vec<PortName>,
     /// Signals shown as voltages, in the order of the monitor nodes.
     pub monitors: Vec<Monitor>,
     /// Address of a server; none: in process.
@@ -105,7 +105,7 @@ impl ModelCard {
         }
         Ok(Self {
             file: raw.file.clone().filter(|f| !f.is_empty()).ok_or(CardError::NoFile)?,
-            ports: settings::rejoin(&raw.ports),
+            ports: settings::rejoin(&raw.ports).iter().map(|p| PortName::parse(p)).collect(),
             monitors: settings::rejoin(&raw.monitors).iter().map(|m| Monitor::parse(m)).collect(),
             remote: match remote.or_else(|| raw.remote.clone()).filter(|r| !r.is_empty()) {
                 Some(cut) if ["unix:", "http:", "grpc:"].contains(&cut.as_str()) => return Err(CardError::Address),

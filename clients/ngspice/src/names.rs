@@ -18,23 +18,32 @@ fn spelled<'a>(wanted: &str, candidates: impl Iterator<Item = &'a str> + Clone) 
 /// refuse.
 pub(crate) fn respell(card: &mut ModelCard, structure: &Structure) {
     let ports = structure.ports.iter().map(|p| p.name.as_str());
-    for name in &mut card.ports {
-        if let Some(port) = spelled(name, ports.clone()) {
-            *name = port.to_owned();
-        }
-    }
     let owners = (structure.nodes.iter().map(|n| n.name.as_str()))
         .chain(structure.beams.iter().map(|b| b.name.as_str()))
         .chain(structure.combs.iter().map(|c| c.name.as_str()))
         .chain(structure.plate_gaps.iter().map(|g| g.name.as_str()))
         .chain(structure.beam_gaps.iter().map(|g| g.name.as_str()))
         .chain(structure.stops.iter().map(|s| s.name.as_str()));
+    let quantity = |name: &str| {
+        let (owner, quantity) = name.rsplit_once('.')?;
+        let owner = spelled(owner, owners.clone()).unwrap_or(owner);
+        let owner = if owner.eq_ignore_ascii_case("frame") && spelled(owner, owners.clone()).is_none() {
+            "frame"
+        } else {
+            owner
+        };
+        // Temperature is the only quantity with a capital letter.
+        Some(format!("{owner}.{}", if quantity == "t" { "T" } else { quantity }))
+    };
+    for port in &mut card.ports {
+        let known = spelled(&port.name, ports.clone()).map(str::to_owned);
+        if let Some(name) = known.or_else(|| quantity(&port.name)) {
+            port.name = name;
+        }
+    }
     for monitor in &mut card.monitors {
-        if let Some((owner, quantity)) = monitor.signal.rsplit_once('.') {
-            let owner = spelled(owner, owners.clone()).unwrap_or(owner);
-            // Temperature is the only quantity with a capital letter.
-            let quantity = if quantity == "t" { "T" } else { quantity };
-            monitor.signal = format!("{owner}.{quantity}");
+        if let Some(signal) = quantity(&monitor.signal) {
+            monitor.signal = signal;
         }
     }
 }
@@ -92,7 +101,7 @@ mod tests {
         let words = |text: &str| text.split(' ').map(str::to_owned).collect();
         let raw = RawCard {
             file: Some("n".into()),
-            ports: words("drive other"),
+            ports: words("drive other yoke.x:1e5 Frame.ax"),
             monitors: words("yoke.x:1e6 gap.q yoke.t"),
             set: words("width=3u w=4u"),
             ..RawCard::default()
@@ -100,7 +109,8 @@ mod tests {
         let mut card = ModelCard::new(&raw, None).unwrap();
         respell(&mut card, &loaded.structure);
         respell_settings(&mut card, loaded.parameters.iter().map(|(n, _)| n.as_str()));
-        assert_eq!(card.ports, ["Drive", "other"]);
+        let ports: Vec<_> = card.ports.iter().map(|p| (p.name.as_str(), p.scale)).collect();
+        assert_eq!(ports, [("Drive", None), ("other", None), ("Yoke.x", Some(1e5)), ("frame.ax", None)]);
         let signals: Vec<_> = card.monitors.iter().map(|m| m.signal.as_str()).collect();
         assert_eq!(signals, ["Yoke.x", "Gap.q", "Yoke.T"]);
         let set: Vec<_> = card.options.set.iter().map(|(n, _)| n.as_str()).collect();

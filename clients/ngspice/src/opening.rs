@@ -1,7 +1,7 @@
 //! Setup of the instances: from ngspice's lists of models and instances to open devices.
 
 use crate::abi::{Connection, Model};
-use crate::call::{self, MONITORS, PORTS};
+use crate::call::{self, MONITORS};
 use crate::instance::Instance;
 use crate::model_card::ModelCard;
 use crate::registry::register;
@@ -24,22 +24,22 @@ pub(crate) unsafe fn open_all(model: *mut Model, circuit: *mut c_void) -> Result
                 call::text(instance.name).unwrap_or_default(),
                 call::text(model.name).unwrap_or_default(),
                 call::card(model.param, model.num_param),
-                call::size(instance.conn, PORTS),
+                call::branches(instance.conn),
                 call::size(instance.conn, MONITORS),
                 deck_directory(instance.conn, circuit),
             )
         };
-        let card = ModelCard::new(&raw, remote.clone()).and_then(|c| c.check_counts(ports, monitors).map(|()| c));
+        let card = ModelCard::new(&raw, remote.clone()).and_then(|c| c.check_counts(ports.len(), monitors).map(|()| c));
         let opened = card
             .map_err(|e| e.to_string())
-            .and_then(|mut card| open(&name, &mut card, ports, directory.as_deref()))
+            .and_then(|mut card| open(&name, &mut card, &ports, directory.as_deref()))
             .map_err(|e| format!("instance {name} (model {model_name}): {e}"))?;
         register(instance.conn as usize, opened);
     }
     Ok(())
 }
 
-fn open(name: &str, card: &mut ModelCard, ports: usize, directory: Option<&Path>) -> Result<Instance, String> {
+fn open(name: &str, card: &mut ModelCard, ports: &[bool], directory: Option<&Path>) -> Result<Instance, String> {
     let device = opener::open(card, directory).map_err(|e| e.to_string())?;
     trace::line(format_args!("{name}: {card:?}, deck in {directory:?}"));
     Instance::open(name, device, &card.ports, ports, &card.monitors).map_err(|e| format!("\"{}\": {e}", card.file))

@@ -15,13 +15,13 @@ pub(crate) struct Entry {
     pub(crate) epoch: u64,
     /// The device.
     pub(crate) instance: Instance,
-    /// Port voltages of the call.
+    /// Port voltages of the call, or currents where these are given.
     pub(crate) voltages: Vec<f64>,
     /// The last accepted point.
     pub(crate) previous: History,
     /// Whether the host knows the charges as integrals.
     pub(crate) integrals: bool,
-    /// Positive and negative node of each port.
+    /// The two places in the solution whose difference is given to each port.
     pub(crate) nodes: Vec<[i32; 2]>,
     /// State of the last equilibrium: the operating point of a small signal.
     pub(crate) balanced: Option<Token>,

@@ -60,7 +60,7 @@ pub(crate) fn respond(call: &Call<'_>, registry: &mut Registry) -> Outcome {
 fn write_answer(call: &Call<'_>, entry: &mut Entry, doubles: usize) {
     let (answer, ports) = (entry.instance.answer(), call.size(PORTS));
     entry.nodes.clear();
-    entry.nodes.extend((0..ports).map(|n| call.nodes(PORTS, n)));
+    entry.nodes.extend((0..ports).map(|n| call.given(n)));
     for n in 0..ports {
         call.set(PORTS, n, answer.currents[n], &answer.conductances[n * ports..(n + 1) * ports]);
     }
@@ -105,13 +105,12 @@ pub(crate) fn settle(entry: &mut Entry, circuit: Circuit) {
 }
 
 fn write_gains(call: &Call<'_>, instance: &Instance) {
-    let (small, ports) = (instance.small_signal(), call.size(PORTS));
+    let ports = call.size(PORTS);
     for n in 0..ports {
-        call.set_gains(PORTS, n, small.admittance[n * ports..(n + 1) * ports].iter().copied());
+        call.set_gains(PORTS, n, instance.admittances(n));
     }
-    for (n, monitor) in instance.monitors().iter().enumerate() {
-        let row = &small.outputs[n * ports..(n + 1) * ports];
-        call.set_gains(MONITORS, n, row.iter().map(|[re, im]| [monitor.scale * re, monitor.scale * im]));
+    for n in 0..call.size(MONITORS) {
+        call.set_gains(MONITORS, n, instance.monitor_responses(n));
     }
 }
 

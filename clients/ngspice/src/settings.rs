@@ -1,4 +1,4 @@
-//! Values on the `.model` line: netlist parameters with SUGAR's suffixes, monitors with a scale.
+//! Values on the `.model` line: netlist parameters with SUGAR's suffixes, ports and monitors with a scale.
 //!
 //! ngspice 39 drops the quotes inside a `.model` line and splits what is left at blanks, commas, equals signs and
 //! parentheses. So `set=["w=2.1u" "F=0"]` arrives as w, 2.1u, F, 0, and a node `x1(2)` arrives as two words. Later
@@ -21,6 +21,25 @@ impl Monitor {
         let scaled = text.rsplit_once(':').and_then(|(name, scale)| Some((name, number(scale)?)));
         let (signal, scale) = scaled.unwrap_or((text, 1.0));
         Self { signal: signal.to_owned(), scale }
+    }
+}
+
+/// A port as the line names it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PortName {
+    /// Name of the port.
+    pub name: String,
+    /// Volts per unit of what lies across it, where the line says so.
+    pub scale: Option<f64>,
+}
+
+impl PortName {
+    /// Reads `NAME` or `NAME:SCALE`.
+    pub fn parse(text: &str) -> Self {
+        match text.rsplit_once(':').and_then(|(name, scale)| Some((name, number(scale)?))) {
+            Some((name, scale)) => Self { name: name.to_owned(), scale: Some(scale) },
+            None => Self { name: text.to_owned(), scale: None },
+        }
     }
 }
 

@@ -35,7 +35,13 @@ const NOTHING: Value = Value { complex: Complex { re: 0.0, im: 0.0 } };
 /// The parameters that are the plug-in's own; the options of a model follow them.
 const OWN: [(&str, c_int, c_int, Option<f64>, &str); OWN_COUNT] = [
     ("file", kind::STRING, kind::IF_STRING, None, "netlist of the mechanical part"),
-    ("ports", kind::STRING, STRINGS, None, "names of the electrical ports, in the order of the node pairs"),
+    (
+        "ports",
+        kind::STRING,
+        STRINGS,
+        None,
+        "names of the ports, in the order of the node pairs; NAME:SCALE where they are not electrical",
+    ),
     ("monitors", kind::STRING, STRINGS, None, "signals shown as voltages, NAME or NAME:SCALE"),
     ("set", kind::STRING, STRINGS, None, "netlist parameters, NAME=VALUE"),
     ("remote", kind::STRING, kind::IF_STRING, None, "address of a server that steps the model"),
@@ -89,12 +95,15 @@ unsafe impl Send for Declarations {}
 unsafe impl Sync for Declarations {}
 
 /// Port kinds and their names, as pairs of arrays.
-struct Kinds([c_int; 2], [*const c_char; 2]);
+struct Kinds<const N: usize>([c_int; N], [*const c_char; N]);
 // SAFETY: constants.
-unsafe impl Sync for Kinds {}
+unsafe impl<const N: usize> Sync for Kinds<N> {}
 
-static PORT_KINDS: Kinds = Kinds([port::DIFF_CONDUCTANCE, port::CONDUCTANCE], [c"gd".as_ptr(), c"g".as_ptr()]);
-static MONITOR_KINDS: Kinds = Kinds([port::VOLTAGE, port::DIFF_VOLTAGE], [c"v".as_ptr(), c"vd".as_ptr()]);
+static PORT_KINDS: Kinds<4> = Kinds(
+    [port::DIFF_CONDUCTANCE, port::CONDUCTANCE, port::DIFF_RESISTANCE, port::RESISTANCE],
+    [c"gd".as_ptr(), c"g".as_ptr(), c"hd".as_ptr(), c"h".as_ptr()],
+);
+static MONITOR_KINDS: Kinds<2> = Kinds([port::VOLTAGE, port::DIFF_VOLTAGE], [c"v".as_ptr(), c"vd".as_ptr()]);
 
 fn declarations() -> &'static Declarations {
     static DECLARATIONS: OnceLock<Declarations> = OnceLock::new();
@@ -171,14 +180,19 @@ fn declarations() -> &'static Declarations {
     })
 }
 
-fn connection(name: &'static CStr, direction: c_int, kinds: &'static Kinds, optional: bool) -> ConnectionInfo {
+fn connection<const N: usize>(
+    name: &'static CStr,
+    direction: c_int,
+    kinds: &'static Kinds<N>,
+    optional: bool,
+) -> ConnectionInfo {
     ConnectionInfo {
         name: name.as_ptr(),
         description: name.as_ptr(),
         direction,
         default_type: kinds.0[0],
         default_name: kinds.1[0],
-        allowed_count: 2,
+        allowed_count: N as c_int,
         allowed: kinds.0.as_ptr(),
         allowed_names: kinds.1.as_ptr(),
         is_array: 1,

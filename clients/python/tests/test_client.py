@@ -61,6 +61,29 @@ def test_transient_streams_its_samples(plate: bimorph.Model) -> None:
     assert result.t[-1] == pytest.approx(5e-5)
     assert max(result.signals["m.x"]) > closed_form(1.0)
     assert seen == sorted(seen) and seen[-1] == 1.0
+    assert result.step_error is not None and 0 < result.step_error < 1e-3
+    assert result.warnings == ()
+
+
+def test_what_the_numbers_do_not_say_arrives(client: bimorph.Client) -> None:
+    """A linear cantilever under half of Euler's load says what stress would do; a gap in one piece, that it should bend."""
+    silicon = "process p = [Youngsmodulus=165e9 density=2300 h=2u]\nanchor p [a] []\n"
+    pressed = "beam2d p [a b] [l=200u w=2u]\nf2d * [b] [F=6.8u oz=pi]\nf2d * [b] [F=1n oz=pi/2]\n"
+    model = client.compile(bimorph.Netlist("pressed.net", {"pressed.net": silicon + pressed}), linear=True)
+    (warning,) = model.static().warnings
+    assert "stress" in warning
+    assert not model.static().jumped
+    facing = """beam2d p [a b] [l=200u w=2u]
+        gap2dforce p [a b c d] [l=200u w1=2u w2=2u gap=2u]
+        R * [a b] [R=1]
+        R * [c d] [R=1]
+        anchor p [c] []
+        anchor p [d] []
+        eground * [a] []
+        drive port * [c a] []
+        """
+    found = client.compile(bimorph.Netlist("gap.net", {"gap.net": silicon + facing})).pull_in(max_v=200.0)
+    assert found.held and any("acts on the ends" in warning for warning in found.warnings)
 
 
 def test_a_session_steps_and_reads(plate: bimorph.Model) -> None:
@@ -188,3 +211,18 @@ def test_serve_says_why_it_does_not_start(tmp_path: Path) -> None:
         pass
     with pytest.raises(bimorph.Unavailable, match="did not start"), bimorph.serve("/bin/false"):
         pass
+
+
+def test_ports_take_forces_and_accelerations(plate: bimorph.Model) -> None:
+    """x = (F − m·a)/k, and ∂x/∂F = 1/k, ∂x/∂a = −m/k; a force and a voltage move the plate together."""
+    with plate.session(ports=["m.x", "frame.ax", "drive"]) as session:
+        assert session.port_kinds == {"m.x": "force", "frame.ax": "acceleration", "drive": "electrical"}
+        reply = session.operating_point({"m.x": 1e-8, "frame.ax": 40.0})
+        assert reply.currents["m.x"] == pytest.approx((1e-8 - M * 40.0) / K, rel=1e-9)
+        assert reply.di_dv["m.x"]["m.x"] == pytest.approx(1 / K, rel=1e-9)
+        assert reply.di_dv["m.x"]["frame.ax"] == pytest.approx(-M / K, rel=1e-9)
+        assert reply.currents["frame.ax"] == reply.charges["m.x"] == 0.0
+        # what the force moves the charge by, the voltage moves the plate by
+        biased = session.operating_point({"drive": 2.0, "m.x": 0.0, "frame.ax": 0.0})
+        assert biased.currents["m.x"] == pytest.approx(closed_form(2.0), rel=1e-6)
+        assert biased.dq_dv["drive"]["m.x"] == pytest.approx(biased.di_dv["m.x"]["drive"], rel=1e-9)

@@ -37,11 +37,7 @@ mod tests {
         TransientResult {
             t: vec![],
             signals: signals.iter().map(|(unit, v)| (String::new(), (*unit).to_owned(), v.to_vec())).collect(),
-            counters: Default::default(),
-            unknowns: 1,
-            estimated_error: None,
-            events: vec![],
-            warnings: vec![],
+            ..TransientResult::default()
         }
     }
 

@@ -1,7 +1,7 @@
 //! The runs of the precision and order parts, each with its reference.
 
 use super::error::relative_error;
-use super::variant::Variant;
+use super::variant::{Models, Variant};
 use super::{Chart, ChartError, ChartPoint, ChartSpec, Formulation, Measured, Part};
 use crate::analysis::formulation::Formulation as Joints;
 use crate::analysis::frame::{frame, frame_transient};
@@ -114,7 +114,7 @@ impl Request<'_> {
 
 /// Methods and tolerances on one model.
 pub(super) fn precision(
-    model: &Variant,
+    models: &Models,
     request: &Request<'_>,
     chart: &mut Chart,
     progress: &mut Progress<'_>,
@@ -126,32 +126,54 @@ pub(super) fn precision(
         if methods.is_empty() {
             continue;
         }
-        let (reference, _) = request.run(formulation, model, (REFERENCE, tight), progress)?;
+        let model = models.of(formulation);
+        let bodies = models.bodies.moving();
+        let mut push = |method: Integrator, tol: f64, unknowns: usize, point: ChartPoint| {
+            chart.points.push(ChartPoint {
+                part: Part::Precision,
+                formulation,
+                method: method.name(),
+                solver: SolverKind::Recursion.name(),
+                tol,
+                band_hz: bodies.options.band,
+                unknowns,
+                ..point
+            });
+        };
+        let reference = match model {
+            Ok(model) => request.run(formulation, model, (REFERENCE, tight), progress).map(|(found, _)| (model, found)),
+            Err(reason) => Err(AnalysisError::NotConverged { detail: reason.to_owned() }),
+        };
+        let (model, reference) = match reference {
+            Ok(found) => found,
+            // what does not fit a formulation takes no chart from the others
+            Err(error) if formulation != Formulation::Compliant && error != AnalysisError::Cancelled => {
+                let reason = model.err().map_or_else(|| error.to_string(), str::to_owned);
+                for method in methods {
+                    for &tol in &spec.tols {
+                        push(method, tol, bodies.parts.system.model.unknowns(), failed(reason.clone()));
+                    }
+                }
+                continue;
+            }
+            Err(error) => return Err(error.into()),
+        };
         let (second, _) = request.run(formulation, model, (SECOND, 10.0 * tight), progress)?;
-        let apart = relative_error(&reference, &second);
-        chart.reference_error = Some(chart.reference_error.unwrap_or(0.0).max(apart));
         for method in methods {
             for &tol in &spec.tols {
                 let found = request.point(formulation, model, (method, tol), progress)?;
-                chart.points.push(ChartPoint {
-                    part: Part::Precision,
-                    formulation,
-                    method: method.name(),
-                    solver: SolverKind::Recursion.name(),
-                    tol,
-                    band_hz: model.moving().options.band,
-                    unknowns: reference.unknowns,
-                    ..compared(found, &reference)
-                });
+                push(method, tol, reference.unknowns, compared(found, &reference));
             }
         }
+        let apart = relative_error(&reference, &second);
+        chart.reference_error = Some(chart.reference_error.unwrap_or(0.0).max(apart));
     }
     Ok(())
 }
 
 /// Models of growing order, against the finest.
 pub(super) fn order(
-    models: &[Variant],
+    models: &[Models],
     request: &Request<'_>,
     chart: &mut Chart,
     progress: &mut Progress<'_>,
@@ -159,53 +181,68 @@ pub(super) fn order(
     let spec = request.spec;
     let tol = spec.tols.iter().copied().fold(f64::INFINITY, f64::min);
     let Some(last) = models.len().checked_sub(1) else { return Ok(()) };
-    let (finest, _) = request.run(Formulation::Compliant, &models[last], (REFERENCE, tol), progress)?;
+    let (finest, _) = request.run(Formulation::Compliant, &models[last].bodies, (REFERENCE, tol), progress)?;
     for &formulation in &spec.formulations {
         let method = formulation.methods(&[REFERENCE]).first().map_or("newmark", |m| m.name());
         let solver = if formulation == Formulation::Frame { SolverKind::Sparse } else { SolverKind::Recursion };
-        for (k, model) in models.iter().enumerate() {
+        for (k, models) in models.iter().enumerate() {
             if formulation == Formulation::Compliant && k == last {
                 continue;
             }
-            let found = request.point(formulation, model, (REFERENCE, tol), progress)?;
-            let unknowns = found.as_ref().map_or(model.moving().parts.system.model.unknowns(), |f| f.0.unknowns);
+            let bodies = models.bodies.moving();
+            let (unknowns, point) = match models.of(formulation) {
+                Ok(model) => {
+                    let found = request.point(formulation, model, (REFERENCE, tol), progress)?;
+                    let unknowns = found.as_ref().map_or(bodies.parts.system.model.unknowns(), |f| f.0.unknowns);
+                    (unknowns, compared(found, &finest))
+                }
+                Err(reason) => (bodies.parts.system.model.unknowns(), failed(reason.to_owned())),
+            };
             chart.points.push(ChartPoint {
                 part: Part::Order,
                 formulation,
                 method,
                 solver: solver.name(),
                 tol,
-                band_hz: model.moving().options.band,
+                band_hz: bodies.options.band,
                 unknowns,
-                ..compared(found, &finest)
+                ..point
             });
         }
     }
     Ok(())
 }
 
+/// A point without numbers; the rest is to be filled in.
+const EMPTY: ChartPoint = ChartPoint {
+    part: Part::Precision,
+    formulation: Formulation::Compliant,
+    method: "",
+    solver: "",
+    tol: 0.0,
+    band_hz: None,
+    unknowns: 0,
+    measured: None,
+    failed: None,
+};
+
+/// A point with the reason why it has no numbers.
+fn failed(reason: String) -> ChartPoint {
+    ChartPoint { failed: Some(reason), ..EMPTY }
+}
+
 /// The numbers or the reason of a point; the rest is to be filled in.
 fn compared(found: Result<(TransientResult, f64), AnalysisError>, reference: &TransientResult) -> ChartPoint {
-    let empty = ChartPoint {
-        part: Part::Precision,
-        formulation: Formulation::Compliant,
-        method: "",
-        solver: "",
-        tol: 0.0,
-        band_hz: None,
-        unknowns: 0,
-        measured: None,
-        failed: None,
-    };
     match found {
         Ok((result, seconds)) => {
             let error = relative_error(reference, &result);
             if !error.is_finite() {
-                return ChartPoint { failed: Some("the motion is not finite".into()), ..empty };
+                return failed("the motion is not finite".into());
             }
             let c = result.counters;
             let measured = Measured {
                 error: Some(error),
+                told: None,
                 seconds,
                 steps: c.steps,
                 rejected: c.rejected,
@@ -214,9 +251,9 @@ fn compared(found: Result<(TransientResult, f64), AnalysisError>, reference: &Tr
                 forces: c.forces,
                 multiplications: None,
             };
-            ChartPoint { measured: Some(measured), ..empty }
+            ChartPoint { measured: Some(measured), ..EMPTY }
         }
-        Err(error) => ChartPoint { failed: Some(error.to_string()), ..empty },
+        Err(error) => failed(error.to_string()),
     }
 }
 

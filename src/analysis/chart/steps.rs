@@ -86,6 +86,7 @@ pub(super) fn measure(model: &Variant, request: &Request<'_>, kind: SolverKind) 
     }
     point.measured = Some(Measured {
         error: None,
+        told: None,
         seconds: median(&mut seconds),
         steps: 1,
         rejected: 0,

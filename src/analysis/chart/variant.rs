@@ -1,6 +1,6 @@
 //! The mechanism of a chart at one model order, held and let go.
 
-use super::ChartError;
+use super::{ChartError, Formulation};
 use crate::analysis::AnalysisError;
 use crate::compile::{CompileOptions, Compiled, compile};
 use crate::netlist::{Bundle, Setting};
@@ -34,6 +34,41 @@ impl Variant {
     /// The mechanism whose equilibrium is the beginning; none: rest.
     pub(super) fn held(&self) -> Option<&Compiled> {
         self.released.as_ref().map(|_| &self.initial)
+    }
+}
+
+/// The mechanism at one model order in every formulation of a chart.
+#[derive(Debug, Clone)]
+pub(super) struct Models {
+    /// In the bodies' own coordinates.
+    pub(super) bodies: Variant,
+    joints: Vec<(Formulation, Result<Variant, String>)>,
+}
+
+impl Models {
+    /// Compiles `bundle` for one band, once for each formulation that lays it out in its own way.
+    pub(super) fn new(
+        bundle: &Bundle,
+        options: &CompileOptions,
+        band: Option<f64>,
+        release: Option<&str>,
+        formulations: &[Formulation],
+    ) -> Result<Self, ChartError> {
+        let bodies = Variant::new(bundle, options, band, release)?;
+        let compiled = |&one: &Formulation| {
+            let options = CompileOptions { formulation: one.compiled_as()?, ..options.clone() };
+            // what bodies can be made of may not suit joints: points that say so
+            Some((one, Variant::new(bundle, &options, band, release).map_err(|e| e.to_string())))
+        };
+        Ok(Self { bodies, joints: formulations.iter().filter_map(compiled).collect() })
+    }
+
+    /// The model in a formulation, or why there is none.
+    pub(super) fn of(&self, formulation: Formulation) -> Result<&Variant, &str> {
+        match self.joints.iter().find(|(one, _)| *one == formulation) {
+            Some((_, model)) => model.as_ref().map_err(String::as_str),
+            None => Ok(&self.bodies),
+        }
     }
 }
 

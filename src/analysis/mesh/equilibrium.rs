@@ -16,52 +16,88 @@ use std::borrow::Cow;
 /// Share of the largest displacement below which errors are relative to that.
 const SMALL: f64 = 1.0 / 30.0;
 
-/// The mesh for the equilibrium at these voltages, from `segments` upwards.
+/// The mesh for the equilibrium at these voltages, from `segments` upwards, and the equilibrium on it.
 pub(super) fn order(
     compiled: &Compiled,
     voltages: &PortVoltages,
     segments: Vec<usize>,
-) -> Result<ModelOrder, AnalysisError> {
+) -> Result<(ModelOrder, OperatingPoint), AnalysisError> {
     if chosen(compiled) {
         return estimated(compiled, voltages, segments);
     }
-    let mut known = None;
-    let mut analyse = |segments: &[usize]| follow(compiled, voltages, segments, &mut known);
-    doubling::fit(&compiled.structure, &compiled.options, segments, &mut analyse)
+    let mut search = Search { compiled, voltages, last: None, points: Vec::new() };
+    let mut analyse = |segments: &[usize]| search.follow(segments);
+    let order = doubling::fit(&compiled.structure, &compiled.options, segments, &mut analyse)?;
+    search.ended(order)
 }
 
-/// A mesh as it is, with the estimate of its error.
+/// A mesh as it is, with the estimate of its error and its equilibrium.
 pub(super) fn estimated(
     compiled: &Compiled,
     voltages: &PortVoltages,
     segments: Vec<usize>,
-) -> Result<ModelOrder, AnalysisError> {
-    let mut known = None;
-    doubling::estimate(&compiled.options, segments, &mut |segments| follow(compiled, voltages, segments, &mut known))
+) -> Result<(ModelOrder, OperatingPoint), AnalysisError> {
+    let mut search = Search { compiled, voltages, last: None, points: Vec::new() };
+    let order = doubling::estimate(&compiled.options, segments, &mut |segments| search.follow(segments))?;
+    search.ended(order)
 }
 
-/// A mesh with its equilibrium.
-type Known<'a> = Option<(Cow<'a, Compiled>, OperatingPoint)>;
-
-/// The equilibrium on a mesh, next to that of the mesh before.
-fn follow<'a>(
-    compiled: &'a Compiled,
+/// The equilibrium on the mesh as it is, and the estimate of its error.
+pub(super) fn judged(
+    compiled: &Compiled,
     voltages: &PortVoltages,
-    segments: &[usize],
-    known: &mut Known<'a>,
-) -> Result<Vec<Output>, AnalysisError> {
-    let model = meshed(compiled, segments)?;
-    let linear = model.parts.system.model.linear;
-    let point = match known {
-        None => operating_point(&model, voltages)?,
-        Some((before, point)) => {
-            let start = carried(&model.structure, &before.parts, &model.parts, &point.q, linear);
-            operating_point_near(&model, voltages, start)?
+) -> Result<(OperatingPoint, Option<f64>), AnalysisError> {
+    if compiled.order.segments.is_empty() {
+        return Ok((operating_point(compiled, voltages)?, Some(0.0)));
+    }
+    let (order, point) = estimated(compiled, voltages, compiled.order.segments.clone())?;
+    Ok((point, order.estimated_error))
+}
+
+/// Equilibria on one mesh after the other.
+struct Search<'a> {
+    compiled: &'a Compiled,
+    voltages: &'a PortVoltages,
+    /// The last model.
+    last: Option<Cow<'a, Compiled>>,
+    /// Its equilibrium, after those of all before.
+    points: Vec<(Vec<usize>, OperatingPoint)>,
+}
+
+impl Search<'_> {
+    /// The equilibrium on a mesh, next to that of the mesh before.
+    fn follow(&mut self, segments: &[usize]) -> Result<Vec<Output>, AnalysisError> {
+        let model = meshed(self.compiled, segments)?;
+        let linear = model.parts.system.model.linear;
+        let mut point = match (&self.last, self.points.last()) {
+            (Some(before), Some((_, point))) => {
+                let start = carried(&model.structure, &before.parts, &model.parts, &point.q, linear);
+                operating_point_near(&model, self.voltages, start)?
+            }
+            _ => operating_point(&model, self.voltages)?,
+        };
+        if let Some((_, first)) = self.points.first() {
+            // the way from rest is that of the first mesh
+            point.path.fold = point.path.fold.or(first.path.fold);
+            point.path.iterations += first.path.iterations;
         }
-    };
-    let outputs = outputs(&model, &point);
-    *known = Some((model, point));
-    Ok(outputs)
+        let outputs = outputs(&model, &point);
+        self.last = Some(model);
+        self.points.push((segments.to_vec(), point));
+        Ok(outputs)
+    }
+
+    /// The mesh that came out, with its equilibrium.
+    fn ended(mut self, order: ModelOrder) -> Result<(ModelOrder, OperatingPoint), AnalysisError> {
+        let mut found = self.points.iter().position(|(segments, _)| *segments == order.segments);
+        if found.is_none() {
+            self.follow(&order.segments)?;
+            found = self.points.len().checked_sub(1);
+        }
+        let point = found.map(|k| self.points.swap_remove(k).1);
+        let lost = || AnalysisError::NotConverged { detail: "no mesh has an equilibrium".into() };
+        Ok((order, point.ok_or_else(lost)?))
+    }
 }
 
 /// What is compared.

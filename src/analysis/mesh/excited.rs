@@ -55,8 +55,8 @@ pub(super) fn order(moving: &Compiled, options: &TransientOptions<'_>) -> Result
         return Ok(moving.order.clone()); // another drawing: the run itself says so
     }
     let at = |model: &Compiled, segments: Vec<usize>| match given {
-        true => equilibrium::estimated(model, voltages, segments),
-        false => equilibrium::order(model, voltages, segments),
+        true => equilibrium::estimated(model, voltages, segments).map(|(order, _)| order),
+        false => equilibrium::order(model, voltages, segments).map(|(order, _)| order),
     };
     let mut still = at(start, moving.order.segments.clone())?;
     if options.release.is_some() {
@@ -88,8 +88,11 @@ pub(super) fn order(moving: &Compiled, options: &TransientOptions<'_>) -> Result
             let estimated_error = told(&moving.options, &still.segments, &swings, &mut analyse);
             return Ok(merged(&still, &ModelOrder { estimated_error, ..still.clone() }));
         }
-        let aim = Aim { band: 1.01 * modes[highest].frequency, tolerances: tolerances.clone(), rigid: false };
+        // the estimates of frequencies have been found too small: a part of the tolerance is theirs, and what is told is the estimate
+        let sharper = tolerances.iter().map(|t| (counted::SAFETY * t).max(SHARPEST)).collect();
+        let aim = Aim { band: 1.01 * modes[highest].frequency, tolerances: sharper, rigid: false };
         let order = model_order::choose_for(&moving.structure, &moving.options, &aim).map_err(refused)?;
+        let order = ModelOrder { estimated_error: order.estimated_error.map(|e| counted::SAFETY * e), ..order };
         let mesh = merged(&still, &order);
         if order.estimated_error.is_some() {
             return Ok(mesh);
@@ -133,7 +136,7 @@ fn refused(error: DiscretizeError) -> AnalysisError {
 /// Error that the frequency of a mode may have.
 fn tolerance(mode: &Excited, stop: f64, tol: f64) -> f64 {
     let lasts = stop.min(2.0 / mode.decay.max(f64::MIN_POSITIVE));
-    let weight = mode.amplitude * (TAU * mode.frequency * lasts / 3f64.sqrt()).max(1.0) / counted::SAFETY;
+    let weight = mode.amplitude * (TAU * mode.frequency * lasts / 3f64.sqrt()).max(1.0);
     (tol / weight.max(f64::MIN_POSITIVE)).clamp(SHARPEST, 0.3)
 }
 
@@ -171,6 +174,7 @@ fn excited(
     let mut stiffness = BlockMatrix::new(&system.model.pattern);
     let mut residual = to.q.clone();
     system.tangent(&to.q, &drive, &mut stiffness, &mut residual);
+    system.add_stress_stiffness(&to.q, &drive, &mut stiffness);
     let found = lowest_modes(system, (&to.q, &drive), &stiffness, count)?;
 
     let mut way = pushed(&model, &from, &drive, &stiffness)

@@ -46,7 +46,7 @@ pub(super) fn html(title: &str, chart: &Chart, picture: &Picture) -> String {
                     cells[..4].iter().for_each(|c| {
                         let _ = write!(text, "<td>{}</td>", escape(c));
                     });
-                    let _ = write!(text, "<td class=\"failed\" colspan=\"3\">{}</td>", escape(reason));
+                    let _ = write!(text, "<td class=\"failed\" colspan=\"4\">{}</td>", escape(reason));
                 }
                 None => cells.iter().for_each(|c| {
                     let _ = write!(text, "<td>{}</td>", escape(c));

@@ -8,7 +8,8 @@ use bimorph::results::plot::loglog::{self, Curve, LogChart, Panel, Slope};
 
 /// Draws a chart.
 pub(super) fn draw(title: &str, chart: &Chart, work: Work) -> Picture {
-    let panels = Part::ALL.into_iter().filter_map(|part| panel(chart, part, work)).collect();
+    let mut panels: Vec<Panel> = Part::ALL.into_iter().filter_map(|part| panel(chart, part, work)).collect();
+    panels.extend((work == Work::Time).then(|| cost(chart)).flatten());
     let mut notes = vec![format!(
         "Error of {}: root mean square over {}, relative to amplitude.",
         chart.signals.join(", "),
@@ -20,6 +21,9 @@ pub(super) fn draw(title: &str, chart: &Chart, work: Work) -> Picture {
     }
     if shown(Part::Order) {
         notes.push("Model order: against the finest compliant model; figures are unknowns.".into());
+    }
+    if shown(Part::Defaults) {
+        notes.push("Defaults: commands with a tolerance and nothing else, against a tenth of the tightest; figures are unknowns.".into());
     }
     if shown(Part::Solvers) {
         notes.push("Solvers: one step of Rodas4, a tangent, a factorization and six solves.".into());
@@ -50,6 +54,7 @@ fn panel(chart: &Chart, part: Part, work: Work) -> Option<Panel> {
                 name => name.to_owned(),
             },
             Part::Solvers => p.solver.to_owned(),
+            Part::Defaults => p.method.to_owned(),
         };
         let k = curves.iter().position(|c| c.name == name).unwrap_or_else(|| {
             curves.push(Curve { name, points: Vec::new(), labels: Vec::new() });
@@ -59,9 +64,10 @@ fn panel(chart: &Chart, part: Part, work: Work) -> Option<Panel> {
             let work = effort(m, work);
             match part {
                 Part::Solvers => curves[k].points.push([p.unknowns as f64, work]),
+                Part::Defaults => curves[k].points.push([p.tol, m.error.unwrap_or(f64::NAN)]),
                 _ => curves[k].points.push([work, m.error.unwrap_or(f64::NAN)]),
             }
-            if part == Part::Order {
+            if matches!(part, Part::Order | Part::Defaults) {
                 curves[k].labels.push(p.unknowns.to_string());
             }
         }
@@ -101,6 +107,37 @@ fn panel(chart: &Chart, part: Part, work: Work) -> Option<Panel> {
             curves,
             floor: None,
         },
+        Part::Defaults => {
+            let loosest = points.iter().map(|p| p.tol).fold(0.0, f64::max);
+            Panel {
+                title: "Defaults: asked for, come out".into(),
+                x_name: "tolerance asked for".into(),
+                y_name: "true relative error".into(),
+                slopes: vec![Slope { name: "asked for".into(), through: [loosest, loosest], exponent: 1.0 }],
+                curves,
+                floor: None,
+            }
+        }
+    })
+}
+
+/// What the tolerance of a default analysis costs.
+fn cost(chart: &Chart) -> Option<Panel> {
+    let mut curves: Vec<Curve> = Vec::new();
+    for (p, m) in chart.points.iter().filter(|p| p.part == Part::Defaults).filter_map(|p| Some((p, p.measured?))) {
+        let k = curves.iter().position(|c| c.name == p.method).unwrap_or_else(|| {
+            curves.push(Curve { name: p.method.to_owned(), points: Vec::new(), labels: Vec::new() });
+            curves.len() - 1
+        });
+        curves[k].points.push([p.tol, m.seconds]);
+    }
+    (!curves.is_empty()).then(|| Panel {
+        title: "Defaults: what it costs".into(),
+        x_name: "tolerance asked for".into(),
+        y_name: "time of a command [s]".into(),
+        curves,
+        floor: None,
+        slopes: Vec::new(),
     })
 }
 

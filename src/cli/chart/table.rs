@@ -9,7 +9,7 @@ use std::fmt::Write;
 /// Columns of the CSV file. Times are wall-clock times of the machine it was made on; everything else is the same on
 /// every run.
 pub(crate) const HEADER: &str = "part,formulation,method,solver,tol,band [Hz],unknowns,error,wall-clock time [s],\
-    steps,rejected,factorizations,solves,force evaluations,multiplications,failed";
+    steps,rejected,factorizations,solves,force evaluations,multiplications,told,failed";
 
 /// All points, one line each. A point that failed has its reason in the last column and no numbers.
 pub(crate) fn csv(chart: &Chart) -> String {
@@ -30,13 +30,14 @@ pub(crate) fn csv(chart: &Chart) -> String {
             Some(m) => {
                 let error = m.error.map(|e| format!("{e:e}")).unwrap_or_default();
                 let products = m.multiplications.map(|n| n.to_string()).unwrap_or_default();
+                let told = m.told.map(|e| format!("{e:e}")).unwrap_or_default();
                 let _ = write!(
                     text,
-                    "{error},{:e},{},{},{},{},{},{products},",
+                    "{error},{:e},{},{},{},{},{},{products},{told},",
                     m.seconds, m.steps, m.rejected, m.factorizations, m.solves, m.forces
                 );
             }
-            None => text.push_str(",,,,,,,,"),
+            None => text.push_str(",,,,,,,,,"),
         }
         let _ = writeln!(text, "{}", field(p.failed.as_deref().unwrap_or_default()));
     }
@@ -44,7 +45,7 @@ pub(crate) fn csv(chart: &Chart) -> String {
 }
 
 /// Heads of the columns for people.
-pub(crate) const HEADS: [&str; 7] = ["run", "tolerance", "band", "unknowns", "error", "time", "work"];
+pub(crate) const HEADS: [&str; 8] = ["run", "tolerance", "band", "unknowns", "error", "told", "time", "work"];
 
 /// The cells of a point for people: short, in engineering units; a failure is told instead of numbers.
 pub(crate) fn cells(p: &ChartPoint) -> Vec<String> {
@@ -52,17 +53,19 @@ pub(crate) fn cells(p: &ChartPoint) -> Vec<String> {
         Part::Precision => format!("{} {}", p.formulation.name(), p.method),
         Part::Order => p.formulation.name().to_owned(),
         Part::Solvers => p.solver.to_owned(),
+        Part::Defaults => p.method.to_owned(),
     };
     let band = p.band_hz.map_or_else(|| "by shape".to_owned(), |b| quantity(b, "Hz"));
     let mut cells = vec![run, format!("{:.0e}", p.tol), band, p.unknowns.to_string()];
     match (&p.measured, &p.failed) {
         (Some(m), _) => {
-            cells.push(m.error.map_or_else(|| "-".to_owned(), |e| format!("{e:.1e}")));
+            let number = |x: Option<f64>| x.map_or_else(|| "-".to_owned(), |e| format!("{e:.1e}"));
+            cells.extend([number(m.error), number(m.told)]);
             cells.push(quantity(m.seconds, "s"));
             cells.push(m.count().to_string());
         }
         (None, reason) => {
-            cells.extend(["failed".to_owned(), "-".to_owned(), "-".to_owned()]);
+            cells.extend(["failed", "-", "-", "-"].map(str::to_owned));
             let _ = reason;
         }
     }
@@ -75,6 +78,9 @@ pub(crate) fn caption(part: Part) -> &'static str {
         Part::Precision => "Methods and tolerances on one model; work: factorizations, solves and force evaluations",
         Part::Order => "Models of growing order against the finest; work: factorizations, solves and force evaluations",
         Part::Solvers => "One step of Rodas4 by solver; work: multiplications of its factorization and solves",
+        Part::Defaults => {
+            "Default analyses by tolerance, against a tenth of the tightest: asked for, come out, told, and the time"
+        }
     }
 }
 

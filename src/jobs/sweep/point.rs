@@ -1,11 +1,14 @@
 //! One point of a grid: compile with its parameter values, run the analysis, keep named numbers.
 
+use super::family::Family;
 use super::{SweepAnalysis, SweepError, SweepSpec};
-use crate::analysis::mesh::{Request, fitted};
-use crate::analysis::{modes, pull_in, statics};
+use crate::analysis::mesh::given::{Answer, answered, judged};
+use crate::analysis::mesh::{self, Request};
+use crate::analysis::signal::Signal;
+use crate::analysis::{AnalysisError, statics};
 use crate::budget::{self, Budget};
-use crate::compile::{CompileError, CompileOptions, Compiled, compile};
-use crate::netlist::{Bundle, Setting, Severity};
+use crate::compile::{CompileError, CompileOptions, draw};
+use crate::netlist::{Setting, Severity, Source};
 use std::collections::HashSet;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -25,7 +28,16 @@ pub(super) struct Value {
 pub(super) struct Outcome {
     pub(super) number: usize,
     pub(super) parameters: Vec<Setting>,
-    pub(super) values: Result<Vec<Value>, String>,
+    pub(super) values: Result<Found, String>,
+}
+
+/// The results of a point.
+pub(super) struct Found {
+    pub(super) values: Vec<Value>,
+    /// Largest estimated relative error by the mesh [1].
+    pub(super) estimated_error: Option<f64>,
+    /// Code and message; empty without one.
+    pub(super) warning: String,
 }
 
 impl Outcome {
@@ -34,7 +46,10 @@ impl Outcome {
         let parameter = |value: &Setting| if let Setting::Text(text) = value { text.len() } else { 0 };
         let parameters: usize = self.parameters.iter().map(|value| size_of::<Setting>() + parameter(value)).sum();
         let values = match &self.values {
-            Ok(values) => values.iter().map(|value| size_of::<Value>() + value.name.len()).sum(),
+            Ok(found) => {
+                let values = found.values.iter().map(|value| size_of::<Value>() + value.name.len());
+                values.sum::<usize>() + found.warning.len()
+            }
             Err(error) => error.len(),
         };
         // and once more in the table
@@ -46,12 +61,13 @@ impl Outcome {
 pub(super) fn run(
     spec: &SweepSpec,
     number: usize,
-    bundle: &Bundle,
+    source: &Source,
     options: &CompileOptions,
+    family: &Family<'_>,
     part: Option<Budget>,
 ) -> Outcome {
     let settings = spec.settings(number);
-    let solve = || solve(spec, &settings, bundle, options);
+    let solve = || solve(spec, &settings, source, options, family);
     let values = catch_unwind(AssertUnwindSafe(|| match part {
         Some(part) => budget::within(&part, solve).unwrap_or_else(|why| Err(why.to_string())),
         None => solve(),
@@ -61,11 +77,11 @@ pub(super) fn run(
 }
 
 /// Refuses parameters and outputs that the netlist does not have: at every point they would be an error.
-pub(super) fn check_names(spec: &SweepSpec, bundle: &Bundle, options: &CompileOptions) -> Result<(), SweepError> {
+pub(super) fn check_names(spec: &SweepSpec, source: &Source, options: &CompileOptions) -> Result<(), SweepError> {
     let refused =
         |what: &str, expected: String, got: String| Err(SweepError::BadSpec { what: what.into(), expected, got });
-    let compiled = match compile(bundle, &at(options, &spec.settings(0))) {
-        Ok(compiled) => compiled,
+    let drawn = match draw(source, &at(options, &spec.settings(0))) {
+        Ok(drawn) => drawn,
         Err(CompileError::Netlist(diagnostics)) => {
             let Some(d) = diagnostics.items.iter().find(|d| d.code == NO_PARAMETER) else { return Ok(()) };
             let name = d.message.split('`').nth(1).unwrap_or_default();
@@ -74,8 +90,19 @@ pub(super) fn check_names(spec: &SweepSpec, bundle: &Bundle, options: &CompileOp
         // the points will say it
         Err(_) => return Ok(()),
     };
-    let SweepAnalysis::Static { outputs, .. } = &spec.analysis else { return Ok(()) };
-    let structure = &compiled.structure;
+    let outputs = match &spec.analysis {
+        SweepAnalysis::Static { outputs, .. } => outputs,
+        SweepAnalysis::Transient { outputs, .. } => {
+            let Ok(compiled) = drawn.compile() else { return Ok(()) };
+            let refusal = outputs.iter().find_map(|name| Signal::find(&compiled, name).err());
+            return match refusal {
+                Some(error) => refused("outputs", "signals of the netlist".to_owned(), error.to_string()),
+                None => Ok(()),
+            };
+        }
+        SweepAnalysis::Modes { .. } | SweepAnalysis::PullIn { .. } => return Ok(()),
+    };
+    let structure = &drawn.structure;
     let nodes = structure.nodes.iter().filter(|node| node.mechanical).map(|node| (node.name.as_str(), 'n'));
     let beams = structure.beams.iter().map(|beam| (beam.name.as_str(), 'b'));
     let ports = structure.ports.iter().map(|port| (port.name.as_str(), 'p'));
@@ -97,7 +124,7 @@ pub(super) fn check_names(spec: &SweepSpec, bundle: &Bundle, options: &CompileOp
 }
 
 /// Options with the settings of a point.
-fn at(options: &CompileOptions, settings: &[(String, Setting)]) -> CompileOptions {
+pub(super) fn at(options: &CompileOptions, settings: &[(String, Setting)]) -> CompileOptions {
     let mut options = options.clone();
     let swept: HashSet<&str> = settings.iter().map(|(name, _)| name.as_str()).collect();
     options.set.retain(|(name, _)| !swept.contains(name.as_str()));
@@ -108,15 +135,39 @@ fn at(options: &CompileOptions, settings: &[(String, Setting)]) -> CompileOption
 fn solve(
     spec: &SweepSpec,
     settings: &[(String, Setting)],
-    bundle: &Bundle,
+    source: &Source,
     options: &CompileOptions,
-) -> Result<Vec<Value>, String> {
-    let compiled = compile(bundle, &at(options, settings)).map_err(|error| brief(&error))?;
-    analyse(&compiled, &spec.analysis)
+    family: &Family<'_>,
+) -> Result<Found, String> {
+    let drawn = draw(source, &at(options, settings)).map_err(|error| brief(&error))?;
+    let said = |error: AnalysisError| error.to_string();
+    let request = match &spec.analysis {
+        SweepAnalysis::Static { voltages, .. } => Request::Static { voltages },
+        SweepAnalysis::Modes { count, voltages } => Request::Modes { count: *count, voltages },
+        SweepAnalysis::PullIn { port, max } => Request::PullIn { port: port.as_deref(), max: *max },
+        SweepAnalysis::Transient { .. } => return Err("a transient is no request for a mesh".to_owned()),
+    };
+    let shared = family.solve(&drawn, &request).map_err(said)?;
+    let (answer, estimated_error) = match shared {
+        Some(judged) => (judged.answer, judged.estimated_error),
+        None => {
+            let compiled = drawn.compile().map_err(|error| brief(&error))?;
+            if options.segments.is_some() {
+                let judged = judged(&compiled, &request).map_err(said)?;
+                (judged.answer, judged.estimated_error)
+            } else {
+                let own = mesh::fitted(&compiled, &request).map_err(said)?;
+                (answered(&own, &request).map_err(said)?, own.order.estimated_error)
+            }
+        }
+    };
+    let warning = mesh::beyond(options.tol, estimated_error).map(|message| format!("{}: {message}", mesh::WARNING));
+    let values = values(&answer, &spec.analysis)?;
+    Ok(Found { values, estimated_error, warning: warning.unwrap_or_default() })
 }
 
 /// A table has one line for an error: of a netlist's, the first with its place.
-fn brief(error: &CompileError) -> String {
+pub(super) fn brief(error: &CompileError) -> String {
     let CompileError::Netlist(diagnostics) = error else { return error.to_string() };
     let mut errors = diagnostics.items.iter().filter(|d| d.severity == Severity::Error);
     let Some(first) = errors.next() else { return "the netlist has errors".to_owned() };
@@ -127,34 +178,20 @@ fn brief(error: &CompileError) -> String {
     format!("{}:{}:{}: {} {}{more}", first.file, first.line, first.column, first.code, first.message)
 }
 
-fn analyse(compiled: &Compiled, analysis: &SweepAnalysis) -> Result<Vec<Value>, String> {
-    let request = match analysis {
-        SweepAnalysis::Static { voltages, .. } => Request::Static { voltages },
-        SweepAnalysis::Modes { count, voltages } => Request::Modes { count: *count, voltages },
-        SweepAnalysis::PullIn { port, max } => Request::PullIn { port: port.as_deref(), max: *max },
-    };
-    // a mesh of the user's own stays as it is, and a table has no column for its estimate
-    let compiled = match compiled.options.segments {
-        Some(_) => compiled,
-        None => &fitted(compiled, &request).map_err(|error| error.to_string())?,
-    };
-    match analysis {
-        SweepAnalysis::Static { outputs, voltages } => {
-            let result = statics::static_equilibrium(compiled, voltages).map_err(|error| error.to_string())?;
-            static_values(&result, outputs)
+fn values(answer: &Answer, analysis: &SweepAnalysis) -> Result<Vec<Value>, String> {
+    match answer {
+        Answer::Static(result) => {
+            let SweepAnalysis::Static { outputs, .. } = analysis else { return Ok(Vec::new()) };
+            static_values(result, outputs)
         }
-        SweepAnalysis::Modes { count, voltages } => {
-            let result = modes::modes(compiled, *count, voltages).map_err(|error| error.to_string())?;
+        Answer::Modes(result) => {
             let named = |(i, f): (usize, &f64)| value(format!("f{}", i + 1), "Hz", Some(*f));
             finite(result.frequencies_hz.iter().enumerate().map(named).collect())
         }
-        SweepAnalysis::PullIn { port, max } => {
-            let result = pull_in::pull_in(compiled, port.as_deref(), *max).map_err(|error| error.to_string())?;
-            finite(vec![
-                value("pull_in".into(), "V", Some(result.pull_in_v)),
-                value("release".into(), "V", result.release_v),
-            ])
-        }
+        Answer::PullIn(result) => finite(vec![
+            value("pull_in".into(), "V", Some(result.pull_in_v)),
+            value("release".into(), "V", result.release_v),
+        ]),
     }
 }
 

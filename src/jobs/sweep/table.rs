@@ -28,6 +28,10 @@ pub struct SweepRow {
     pub parameters: Vec<Setting>,
     /// One per result column, none where the quantity does not exist at this point; or why the point has no result.
     pub values: Result<Vec<Option<f64>>, String>,
+    /// Largest estimated relative error by the mesh [1]; none without an estimate, and for a point without a result.
+    pub estimated_error: Option<f64>,
+    /// Why the numbers may be further off than the tolerance: code and message; empty where they are not.
+    pub warning: String,
 }
 
 /// Puts the points into one table. A netlist whose nodes depend on a parameter has more columns than any one point.
@@ -37,7 +41,7 @@ pub(super) fn assemble(spec: &SweepSpec, outcomes: Vec<Outcome>) -> SweepTable {
         ..SweepTable::default()
     };
     let mut columns = BTreeMap::new();
-    for value in outcomes.iter().filter_map(|outcome| outcome.values.as_ref().ok()).flatten() {
+    for value in outcomes.iter().filter_map(|outcome| outcome.values.as_ref().ok()).flat_map(|found| &found.values) {
         if !columns.contains_key(&value.name) {
             columns.insert(value.name.clone(), table.results.len());
             table.results.push(value.name.clone());
@@ -45,16 +49,20 @@ pub(super) fn assemble(spec: &SweepSpec, outcomes: Vec<Outcome>) -> SweepTable {
         }
     }
     for outcome in outcomes {
-        let values = outcome.values.map(|values| {
-            let mut row = vec![None; table.results.len()];
-            for value in values {
-                if let Some(&column) = columns.get(&value.name) {
-                    row[column] = value.value;
+        let (values, estimated_error, warning) = match outcome.values {
+            Ok(found) => {
+                let mut row = vec![None; table.results.len()];
+                for value in found.values {
+                    if let Some(&column) = columns.get(&value.name) {
+                        row[column] = value.value;
+                    }
                 }
+                (Ok(row), found.estimated_error, found.warning)
             }
-            row
-        });
-        table.rows.push(SweepRow { point: outcome.number, parameters: outcome.parameters, values });
+            Err(error) => (Err(error), None, String::new()),
+        };
+        let Outcome { number: point, parameters, .. } = outcome;
+        table.rows.push(SweepRow { point, parameters, values, estimated_error, warning });
     }
     table
 }
@@ -65,8 +73,8 @@ impl SweepTable {
         self.rows.iter().filter(|row| row.values.is_err()).count()
     }
 
-    /// CSV (RFC 4180, LF): `point`, the parameters, the results as `name [unit]`, `error`. Numbers are the shortest
-    /// text that reads back to the same bits.
+    /// CSV (RFC 4180, LF): `point`, the parameters, the results as `name [unit]`, `estimated_error [1]`, `warning`, `error`.
+    /// Numbers are the shortest text that reads back to the same bits.
     pub fn to_csv(&self) -> String {
         let mut out = String::from("point");
         for name in &self.parameters {
@@ -75,7 +83,7 @@ impl SweepTable {
         for (name, unit) in self.results.iter().zip(&self.units) {
             field(&mut out, &format!("{name} [{unit}]"));
         }
-        out.push_str(",error\n");
+        out.push_str(",estimated_error [1],warning,error\n");
         for row in &self.rows {
             let _ = write!(out, "{}", row.point);
             for setting in &row.parameters {
@@ -89,10 +97,12 @@ impl SweepTable {
                     for value in values {
                         field(&mut out, &value.map(|x| format!("{x:e}")).unwrap_or_default());
                     }
+                    field(&mut out, &row.estimated_error.map(|x| format!("{x:e}")).unwrap_or_default());
+                    field(&mut out, &row.warning);
                     out.push(',');
                 }
                 Err(error) => {
-                    out.extend(std::iter::repeat_n(',', self.results.len()));
+                    out.extend(std::iter::repeat_n(',', self.results.len() + 2));
                     field(&mut out, error.trim_end());
                 }
             }
@@ -125,11 +135,24 @@ mod tests {
             results: vec!["b.x".into(), "release".into()],
             units: vec!["m".into(), "V".into()],
             rows: vec![
-                SweepRow { point: 0, parameters: vec![Setting::Number(2e-6)], values: Ok(vec![Some(1.5e-9), None]) },
-                SweepRow { point: 3, parameters: vec![Setting::Text("a,b".into())], values: Err("say \"no\"".into()) },
+                SweepRow {
+                    point: 0,
+                    parameters: vec![Setting::Number(2e-6)],
+                    values: Ok(vec![Some(1.5e-9), None]),
+                    estimated_error: Some(2e-3),
+                    warning: "W040: off".into(),
+                },
+                SweepRow {
+                    point: 3,
+                    parameters: vec![Setting::Text("a,b".into())],
+                    values: Err("say \"no\"".into()),
+                    estimated_error: None,
+                    warning: String::new(),
+                },
             ],
         };
-        let expected = "point,w,b.x [m],release [V],error\n0,2e-6,1.5e-9,,\n3,\"a,b\",,,\"say \"\"no\"\"\"\n";
+        let expected = "point,w,b.x [m],release [V],estimated_error [1],warning,error\n\
+                        0,2e-6,1.5e-9,,2e-3,W040: off,\n3,\"a,b\",,,,,\"say \"\"no\"\"\"\n";
         assert_eq!(table.to_csv(), expected);
         assert_eq!(table.failed(), 1);
     }

@@ -49,6 +49,7 @@ pub mod tree;
 
 pub use data::Reduction;
 pub use fast::Lanes;
+pub(crate) use fast::{across, has_lanes};
 pub use reduction::Task;
 pub use rotary::Counts;
 pub use scalar::Real;

@@ -159,23 +159,8 @@ impl<T: Scalar> JointMatrix<T> {
         self.bodies.diagonal[p] += own;
     }
 
-    /// Motions of the bodies with coordinates' motions `s`, at the configuration of the factor.
-    pub(crate) fn motions<'a>(&self, tree: &Tree, s: impl Fn(usize) -> &'a Vector3<T>, out: &mut [Vector3<T>])
-    where
-        T: 'a,
-    {
-        for (j, link) in tree.links.iter().enumerate().rev() {
-            let s = s(j);
-            out[j] = match link.parent {
-                Parent::Free => *s,
-                Parent::Ground => spread(&self.maps[j], link.sign, &Vector3::zeros(), s),
-                Parent::Body(p) => spread(&self.maps[j], link.sign, &out[p as usize], s),
-            };
-        }
-    }
-
-    /// [`JointMatrix::motions`] of two vectors in one sweep: along a beam each body waits for the one before it, and the
-    /// second fills the time.
+    /// Motions of the bodies with coordinates' motions `s` and `t`, at the configuration of the factor. In one sweep: along a
+    /// beam each body waits for the one before it, and the second fills the time.
     #[inline]
     pub(crate) fn both_motions(
         &self,

@@ -26,6 +26,7 @@ pub fn static_to_wire(result: &StaticResult) -> proto::StaticResponse {
         unknowns: result.unknowns as u64,
         iterations: result.iterations as u64,
         estimated_error: result.estimated_error,
+        warnings: result.warnings.clone(),
     }
 }
 
@@ -43,6 +44,7 @@ pub fn static_from_wire(wire: proto::StaticResponse) -> StaticResult {
         unknowns: size(wire.unknowns),
         iterations: size(wire.iterations),
         estimated_error: wire.estimated_error,
+        warnings: wire.warnings,
     }
 }
 
@@ -89,6 +91,7 @@ pub fn pull_in_to_wire(result: &PullInResult) -> proto::PullInResponse {
         release_v: result.release_v,
         unheld: !result.held,
         estimated_error: result.estimated_error,
+        warnings: result.warnings.clone(),
     }
 }
 
@@ -100,6 +103,7 @@ pub fn pull_in_from_wire(wire: proto::PullInResponse) -> PullInResult {
         release_v: wire.release_v,
         held: !wire.unheld,
         estimated_error: wire.estimated_error,
+        warnings: wire.warnings,
     }
 }
 
@@ -126,6 +130,7 @@ pub fn summary_to_wire(result: &TransientResult) -> proto::TransientSummary {
         events: events.collect(),
         estimated_error: result.estimated_error,
         warnings: result.warnings.clone(),
+        step_error: result.step_error,
     }
 }
 
@@ -148,6 +153,7 @@ pub fn transient_from_wire(
         events,
         estimated_error,
         warnings,
+        step_error,
     } = summary;
     let event = |e: proto::Crossing| Event {
         signal: e.signal,
@@ -163,6 +169,7 @@ pub fn transient_from_wire(
         counters: Counters { steps, rejected, factorizations, solves, forces, iterations },
         unknowns: size(unknowns),
         estimated_error,
+        step_error,
         events: events.into_iter().map(event).collect(),
         warnings,
     }

@@ -1,7 +1,7 @@
 //! Trials, replies and the errors of a device. Buffers are refilled in place: this runs once per Newton iteration.
 
 use crate::device::{
-    Description, DeviceError, Mode, PortInfo, SignalInfo, SmallSignal, Status, Token, Trial, TrialReply,
+    Description, DeviceError, Mode, PortInfo, PortKind, SignalInfo, SmallSignal, Status, Token, Trial, TrialReply,
 };
 use crate::service::proto;
 use proto::fault::Kind as FaultKind;
@@ -14,6 +14,7 @@ pub fn description_to_wire(description: &Description) -> proto::DeviceDescriptio
         ports: description.ports.iter().map(|port| port.name.clone()).collect(),
         signals: description.signals.iter().map(signal).collect(),
         unknowns: description.unknowns as u64,
+        port_kinds: description.ports.iter().map(|port| kind_to_wire(port.kind).into()).collect(),
     }
 }
 
@@ -21,10 +22,31 @@ pub fn description_to_wire(description: &Description) -> proto::DeviceDescriptio
 pub fn description_from_wire(description: proto::DeviceDescription) -> Description {
     let signal = |s: proto::Signal| SignalInfo { name: s.name, unit: s.unit };
     Description {
-        ports: description.ports.into_iter().map(|name| PortInfo { name }).collect(),
+        // a server from before there were kinds has electrical ports alone
+        ports: (description.ports.into_iter())
+            .zip(description.port_kinds.into_iter().map(kind_from_wire).chain(std::iter::repeat(PortKind::Electrical)))
+            .map(|(name, kind)| PortInfo { name, kind })
+            .collect(),
         signals: description.signals.into_iter().map(signal).collect(),
         unknowns: usize::try_from(description.unknowns).unwrap_or(usize::MAX),
     }
+}
+
+fn kind_to_wire(kind: PortKind) -> proto::PortKind {
+    match kind {
+        PortKind::Electrical => proto::PortKind::Electrical,
+        PortKind::Force => proto::PortKind::Force,
+        PortKind::Moment => proto::PortKind::Moment,
+        PortKind::ForceRate => proto::PortKind::ForceRate,
+        PortKind::MomentRate => proto::PortKind::MomentRate,
+        PortKind::Thermal => proto::PortKind::Thermal,
+        PortKind::Acceleration => proto::PortKind::Acceleration,
+        PortKind::Rate => proto::PortKind::Rate,
+    }
+}
+
+fn kind_from_wire(kind: i32) -> PortKind {
+    PortKind::ALL.into_iter().find(|&known| i32::from(kind_to_wire(known)) == kind).unwrap_or_default()
 }
 
 /// A trial as it travels.

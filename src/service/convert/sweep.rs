@@ -22,6 +22,10 @@ pub fn spec_to_wire(spec: &SweepSpec) -> proto::SweepSpec {
         SweepAnalysis::PullIn { port, max } => {
             Analysis::PullIn(proto::SweepPullIn { port: port.clone().unwrap_or_default(), max_v: *max })
         }
+        SweepAnalysis::Transient { stop, outputs, voltages } => {
+            let (outputs, voltages) = (outputs.clone(), named(voltages));
+            Analysis::Transient(proto::SweepTransient { stop_s: *stop, outputs, voltages })
+        }
     };
     let axis = |axis: &SweepParameter| proto::SweepParameter {
         name: axis.name.clone(),
@@ -69,6 +73,11 @@ pub fn spec_from_wire(spec: Option<proto::SweepSpec>) -> Result<SweepSpec, Viola
             port: (!p.port.is_empty()).then_some(p.port),
             max: number("spec.pull_in.max_v", p.max_v, true)?,
         },
+        Analysis::Transient(t) => SweepAnalysis::Transient {
+            stop: number("spec.transient.stop_s", t.stop_s, true)?,
+            outputs: t.outputs,
+            voltages: voltages("spec.transient.voltages", t.voltages)?,
+        },
     };
     let shard = Shard { index: spec.shard as usize, count: spec.shards.max(1) as usize };
     Ok(SweepSpec { parameters, analysis, shard, threads: None })
@@ -99,7 +108,8 @@ pub fn row_to_wire(row: &SweepRow) -> proto::SweepRow {
         Err(error) => (Vec::new(), error.clone()),
     };
     let parameters = row.parameters.iter().map(|value| setting_to_wire("", value)).collect();
-    proto::SweepRow { point: row.point as u64, parameters, results, error }
+    let (estimated_error, warning) = (row.estimated_error, row.warning.clone());
+    proto::SweepRow { point: row.point as u64, parameters, results, error, estimated_error, warning }
 }
 
 /// Adds a chunk to a table.
@@ -120,7 +130,9 @@ pub fn chunk_from_wire(chunk: proto::SweepChunk, table: &mut SweepTable) -> Resu
         } else {
             Err(row.error)
         };
-        table.rows.push(SweepRow { point: usize::try_from(row.point).unwrap_or(usize::MAX), parameters, values });
+        let point = usize::try_from(row.point).unwrap_or(usize::MAX);
+        let (estimated_error, warning) = (row.estimated_error, row.warning);
+        table.rows.push(SweepRow { point, parameters, values, estimated_error, warning });
     }
     Ok(())
 }
@@ -160,7 +172,8 @@ mod tests {
         };
         assert_eq!(spec_from_wire(Some(spec_to_wire(&spec))), Ok(spec));
         for values in [Ok(vec![Some(1.0), None]), Err("no equilibrium".to_owned())] {
-            let row = SweepRow { point: 5, parameters: vec![Setting::Number(1e-6)], values };
+            let (estimated_error, warning) = (values.is_ok().then_some(3e-4), "W040: off".to_owned());
+            let row = SweepRow { point: 5, parameters: vec![Setting::Number(1e-6)], values, estimated_error, warning };
             let mut table = SweepTable::default();
             let chunk = proto::SweepChunk { rows: vec![row_to_wire(&row)], ..Default::default() };
             chunk_from_wire(chunk, &mut table).expect("our own row");

@@ -49,6 +49,10 @@ impl LoadPath for SourcePath<'_> {
             drive.expansion[k] = h.heaters[k].expansion * rise;
         }
         drive.load = self.load[0] + s * (self.load[1] - self.load[0]);
+        for (k, value) in drive.inputs.iter_mut().enumerate() {
+            *value = self.source(e.voltages() + k, s);
+        }
+        drive.turning = 0.0;
     }
 
     fn slope(&self, s: f64, slope: &mut Drive) {
@@ -62,5 +66,9 @@ impl LoadPath for SourcePath<'_> {
             slope.expansion[k] = h.heaters[k].expansion * (b + 2.0 * s * c);
         }
         slope.load = self.load[1] - self.load[0];
+        for (k, value) in slope.inputs.iter_mut().enumerate() {
+            *value = self.to[e.voltages() + k] - self.from[e.voltages() + k];
+        }
+        slope.turning = 0.0;
     }
 }

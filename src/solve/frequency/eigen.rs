@@ -13,8 +13,8 @@
 //! Reference: T. Ericsson, A. Ruhe, "The spectral transformation Lanczos method", Math. Comp. 35 (1980).
 
 use super::inverse_iteration::{self, Block};
-use super::lanczos::{self, Pairs};
-use super::refined::Refined;
+use super::lanczos::{self, CLOSED, Pairs};
+use super::refined::{ROUNDING, Refined};
 use super::subspace;
 use crate::gaps::{Drive, System};
 use crate::multibody::planar::Pose;
@@ -23,7 +23,7 @@ use crate::solve::SolveError;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 /// Models of at most this many coordinates are solved densely.
-const DENSE: usize = 150;
+const DENSE: usize = 60;
 /// A factor whose solves are off by more than this share is corrected in every solve.
 const ROUGH: f64 = 1e-9;
 /// Residual at which an iteration stops [1].
@@ -64,7 +64,7 @@ impl Operator<'_, '_> {
         let weigh = |(k, r): (usize, &Pose)| Pose::new(r.x * y[3 * k], r.y * y[3 * k + 1], r.z * y[3 * k + 2]);
         let mut x: Vec<Pose> = self.root.iter().enumerate().map(weigh).collect();
         if self.corrected {
-            self.refined.solve(self.factor, self.shift, &mut x);
+            self.refined.solve(self.factor, self.shift, &mut x, ROUNDING);
         } else {
             self.model.project(&mut x);
             self.factor.solve(&self.model.pattern, &mut x);
@@ -99,7 +99,7 @@ pub fn lowest_modes(
     let mut refined = Refined::new(system, q, drive);
     let mut force: Vec<Pose> = (0..system.bodies()).map(|j| model.mass(j).map(f64::sqrt)).collect();
     let root = force.clone();
-    let first = refined.solve(&factor, shift, &mut force);
+    let first = refined.solve(&factor, shift, &mut force, ROUNDING);
     let rounding = first.first.max(first.left);
     let mut operator =
         Operator { refined: &mut refined, factor: &factor, shift, model, root: &root, corrected: rounding > ROUGH };
@@ -216,7 +216,8 @@ fn dense(operator: &mut Operator<'_, '_>, wanted: usize) -> Pairs {
     let eigen = SymmetricEigen::new((&a + a.transpose()) * 0.5);
     let mut order: Vec<usize> = (0..n).collect();
     order.sort_by(|&i, &j| eigen.eigenvalues[j].abs().total_cmp(&eigen.eigenvalues[i].abs()));
-    order.retain(|&i| eigen.eigenvalues[i] != 0.0 && eigen.eigenvalues[i].is_finite());
+    let largest = order.first().map_or(0.0, |&i| eigen.eigenvalues[i].abs());
+    order.retain(|&i| eigen.eigenvalues[i].abs() > CLOSED * largest);
     order.truncate(wanted);
     let theta: Vec<f64> = order.iter().map(|&i| eigen.eigenvalues[i]).collect();
     let settled = theta.len();

@@ -17,6 +17,8 @@ use crate::multibody::{BlockMatrix, Model};
 
 /// Rounds at most.
 const MOST: usize = 30;
+/// Error of a solve that only tells how large a residual is [1].
+const MEASURED: f64 = 1e-3;
 
 /// Modes with their residuals.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,7 +45,7 @@ pub fn settle(
     let mut best: Option<(f64, Block)> = None;
     let mut stalls = 0;
     for _ in 0..MOST {
-        let (next, loose) = improve(model, refined, (factor, shift), &x)?;
+        let (next, loose) = improve(model, refined, (factor, shift), &x, goal)?;
         x = next;
         let (lambda, mut residuals) = measure(model, refined, stiffness, shift.abs(), &x[..wanted]);
         residuals.iter_mut().for_each(|r| *r = r.max(loose));
@@ -67,12 +69,13 @@ fn improve(
     refined: &mut Refined<'_>,
     (factor, shift): (&BlockMatrix<f64, 3>, f64),
     x: &[Vec<Pose>],
+    goal: f64,
 ) -> Option<(Vec<Vec<Pose>>, f64)> {
     let weigh =
         |x: &Vec<Pose>| -> Vec<Pose> { x.iter().enumerate().map(|(j, x)| model.mass(j).component_mul(x)).collect() };
     let forces: Vec<Vec<Pose>> = x.iter().map(weigh).collect();
     let mut y = forces.clone();
-    let loose = y.iter_mut().map(|y| refined.solve(factor, shift, y).left).fold(0.0, f64::max);
+    let loose = y.iter_mut().map(|y| refined.solve(factor, shift, y, goal).left).fold(0.0, f64::max);
     let (flat, weighed) = (columns(&y), columns(&y.iter().map(weigh).collect::<Vec<_>>()));
     let (_, v) = ritz(&(flat.transpose() * columns(&forces)), &(flat.transpose() * weighed))?;
     let flat = flat * v;
@@ -105,7 +108,7 @@ fn measure(
         }
         let Some((_, factor)) = &known else { return (lambda, f64::NAN) };
         // what is solved for here may be rounding alone, which no correction makes smaller
-        let solved = refined.solve(factor, -size, &mut rest);
+        let solved = refined.solve(factor, -size, &mut rest, MEASURED);
         (lambda, mass_product(model, &rest, &rest).sqrt() * (1.0 + solved.left))
     };
     x.iter().map(one).unzip()

@@ -21,7 +21,7 @@ pub struct Pairs {
 }
 
 /// A step that leaves less than this share of the largest eigenvalue has closed a subspace.
-const CLOSED: f64 = 1e-14;
+pub(super) const CLOSED: f64 = 1e-14;
 
 /// The `wanted` largest eigenvalues in magnitude of `apply`, an operator on vectors of `n` numbers of rank `rank`, each
 /// settled when its residual is below `tolerance` of it. At most `most` vectors are built up. `direction(k)` is the k-th

@@ -10,9 +10,11 @@
 //! | [`subspace`] | many of them at once |
 //! | [`fastest`] | the highest natural frequency in joint coordinates |
 //! | [`harmonic`] | small-signal response at one frequency: the same factorization over complex numbers |
+//! | [`gyroscopic`] | the same in a frame that turns |
 
 pub mod eigen;
 pub mod fastest;
+pub mod gyroscopic;
 pub mod harmonic;
 pub mod inverse_iteration;
 pub mod lanczos;

@@ -15,8 +15,8 @@ use crate::multibody::{BlockMatrix, Model};
 
 /// Corrections of one solve at most.
 const MOST: usize = 40;
-/// A correction below this share of the solution is rounding.
-const ROUNDING: f64 = 1e-15;
+/// An error below this share of the solution is rounding.
+pub const ROUNDING: f64 = 1e-15;
 
 /// K of a system at one place, unsummed, and storage for products with it.
 #[derive(Debug, Clone)]
@@ -28,6 +28,8 @@ pub struct Refined<'a> {
     x: Vec<DoublePose>,
     product: Vec<DoublePose>,
     correction: Vec<Pose>,
+    /// About the relative error of a solve that is not corrected, as the first one showed [1].
+    rounding: f64,
 }
 
 /// How a solve went.
@@ -45,6 +47,7 @@ impl<'a> Refined<'a> {
         let model = &system.model;
         let mut added = BlockMatrix::<f64, 3>::new(&model.pattern);
         system.add_body_tangent(q, drive, &mut added);
+        system.add_levers(q, drive, &mut added);
         let mut bodies = Vec::new();
         for j in 0..model.bodies.len() {
             let below = model.pattern.column(j).map(|k| (model.pattern.row(k), j, added.below[k]));
@@ -59,6 +62,7 @@ impl<'a> Refined<'a> {
             x: zeros.clone(),
             product: zeros,
             correction: vec![Pose::zeros(); model.bodies.len()],
+            rounding: f64::INFINITY,
         }
     }
 
@@ -103,9 +107,16 @@ impl<'a> Refined<'a> {
         lambda
     }
 
-    /// Solves (K − σM)·x = b in place, with the factor of about that matrix.
-    pub fn solve(&mut self, factor: &BlockMatrix<f64, 3>, shift: f64, b: &mut [Pose]) -> Settled {
+    /// Solves (K − σM)·x = b in place to about the relative error `goal`, with the factor of about that matrix. Corrections are left
+    /// out where the first solve of all has shown that rounding is less than that.
+    pub fn solve(&mut self, factor: &BlockMatrix<f64, 3>, shift: f64, b: &mut [Pose], goal: f64) -> Settled {
         let (model, pattern) = (self.model, &self.model.pattern);
+        if self.rounding <= goal {
+            model.project(b);
+            factor.solve(pattern, b);
+            model.project(b);
+            return Settled { first: self.rounding, left: self.rounding };
+        }
         let right = b.to_vec();
         model.project(b);
         factor.solve(pattern, b);
@@ -143,12 +154,15 @@ impl<'a> Refined<'a> {
                     x[i] += c[i].into();
                 }
             }
-            if settled.left <= ROUNDING {
+            if settled.left <= goal {
                 break;
             }
         }
         for (b, x) in b.iter_mut().zip(&self.x) {
             *b = Pose::new(x[0].high, x[1].high, x[2].high);
+        }
+        if self.rounding.is_infinite() {
+            self.rounding = settled.first.max(settled.left);
         }
         settled
     }

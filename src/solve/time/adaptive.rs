@@ -17,9 +17,9 @@ use crate::solve::frequency::eigen::mass_product;
 use crate::solve::{SolveError, WhyFailed};
 
 /// Share of the length scale below which a displacement's relative error does not count.
-const FLOOR: f64 = 1e-4;
+pub(super) const FLOOR: f64 = 1e-4;
 /// Rejections in a row before giving up.
-const MAX_REJECTED: usize = 40;
+pub(super) const MAX_REJECTED: usize = 40;
 
 /// What sets the length of steps.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -201,21 +201,8 @@ impl<M: Method> Adaptive<M> {
         let reach = norm(&self.before.q).max(norm(&after.q)) + FLOOR * system.length_scale * self.mass.sqrt();
         let error = (eq * eq + h * h * ev * ev).sqrt() / (tol * reach);
         // a sum: the larger of the two would hide what is not a number
-        let error = error.hypot(self.contact_error(system, after, tol));
+        let error = error.hypot(contact_error(system, (&self.before, after), &self.error, tol));
         if error.is_nan() { f64::INFINITY } else { error }
-    }
-
-    /// Error of the energy over a step that begins or ends in contact; 0 elsewhere.
-    fn contact_error(&self, system: &System, after: &Motion, tol: f64) -> f64 {
-        let stored = system.contact_energy(&self.before.q).max(system.contact_energy(&after.q));
-        if stored == 0.0 {
-            return 0.0;
-        }
-        let model = &system.model;
-        let kinetic =
-            0.5 * mass_product(model, &after.v, &after.v).max(mass_product(model, &self.before.v, &self.before.v));
-        let work = system.contact_work(&after.q, &self.error.q);
-        (mass_product(model, &after.v, &self.error.v).abs() + work) / (tol * (kinetic + stored))
     }
 
     fn too_small(&self, system: &System, t: f64, dt: f64, rejected: usize) -> SolveError {
@@ -232,6 +219,18 @@ impl<M: Method> Adaptive<M> {
         let body = system.model.bodies[body].name.to_string();
         SolveError::StepTooSmall { t, dt, rejected, body, direction: crate::solve::DIRECTIONS[direction] }
     }
+}
+
+/// Error of the energy over a step that begins or ends in contact; 0 elsewhere.
+pub(super) fn contact_error(system: &System, (before, after): (&Motion, &Motion), error: &Motion, tol: f64) -> f64 {
+    let stored = system.contact_energy(&before.q).max(system.contact_energy(&after.q));
+    if stored == 0.0 {
+        return 0.0;
+    }
+    let model = &system.model;
+    let kinetic = 0.5 * mass_product(model, &after.v, &after.v).max(mass_product(model, &before.v, &before.v));
+    let work = system.contact_work(&after.q, &error.q);
+    (mass_product(model, &after.v, &error.v).abs() + work) / (tol * (kinetic + stored))
 }
 
 fn failed(system: &System, t: f64, dt: f64, failure: StepFailure) -> SolveError {

@@ -15,6 +15,7 @@
 
 use super::implicit::{Equation, Implicit, Sample};
 use super::method::{Method, Motion, StepFailure, Work};
+use super::tableau::Alpha;
 use crate::gaps::{Ramp, System};
 use crate::multibody::forces;
 use crate::multibody::planar::Pose;
@@ -24,10 +25,7 @@ use crate::solve::linear::{LinearSolver, Recursion};
 #[derive(Debug, Clone)]
 pub struct GeneralizedAlpha<S = Recursion> {
     implicit: Implicit<S>,
-    alpha_m: f64,
-    alpha_f: f64,
-    beta: f64,
-    gamma: f64,
+    alpha: Alpha,
     /// The acceleration, as the rates of a motion.
     acceleration: [Motion; 1],
     constant: Vec<Pose>,
@@ -50,22 +48,19 @@ impl GeneralizedAlpha {
 impl<S: LinearSolver> GeneralizedAlpha<S> {
     /// [`GeneralizedAlpha::new`] with another solver of its linear systems.
     pub fn with_solver(solver: S, system: &System, rho: f64) -> Self {
-        Self::with_parameters(solver, system, (2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0))
+        Self::with_parameters(solver, system, Alpha::damping(rho))
     }
 
     /// [`GeneralizedAlpha::newmark`] with another solver of its linear systems.
     pub fn newmark_with_solver(solver: S, system: &System) -> Self {
-        Self::with_parameters(solver, system, 0.0, 0.0)
+        Self::with_parameters(solver, system, Alpha::newmark())
     }
 
-    fn with_parameters(solver: S, system: &System, alpha_m: f64, alpha_f: f64) -> Self {
+    fn with_parameters(solver: S, system: &System, alpha: Alpha) -> Self {
         let zeros = vec![Pose::zeros(); system.bodies()];
         Self {
             implicit: Implicit::new(solver, system),
-            alpha_m,
-            alpha_f,
-            beta: 0.25 * (1.0 - alpha_m + alpha_f).powi(2),
-            gamma: 0.5 - alpha_m + alpha_f,
+            alpha,
             acceleration: [Motion::zeros(system.bodies())],
             constant: zeros.clone(),
             x: zeros.clone(),
@@ -104,12 +99,12 @@ impl<S: LinearSolver> Method for GeneralizedAlpha<S> {
         error.clear();
         let model = &system.model;
         let a = &mut self.acceleration[0].v;
-        let (bh2, gbh) = (1.0 / (self.beta * h * h), self.gamma / (self.beta * h));
-        let (am, af) = (self.alpha_m / (1.0 - self.alpha_f), self.alpha_f / (1.0 - self.alpha_f));
-        let am1 = (1.0 - self.alpha_m) / (1.0 - self.alpha_f);
+        let Alpha { m, f, beta, gamma } = self.alpha;
+        let (bh2, gbh) = (1.0 / (beta * h * h), gamma / (beta * h));
+        let (am, af, am1) = (m / (1.0 - f), f / (1.0 - f), (1.0 - m) / (1.0 - f));
         // a₁ = x/(βh²) + known_a,  v₁ = γ/(βh)·x + known_v
-        let known_a = |v: &Pose, a: &Pose| v * (-h * bh2) - a * (0.5 / self.beta - 1.0);
-        let known_v = |v: &Pose, a: &Pose| v + a * (h * (1.0 - self.gamma)) + known_a(v, a) * (h * self.gamma);
+        let known_a = |v: &Pose, a: &Pose| v * (-h * bh2) - a * (0.5 / beta - 1.0);
+        let known_v = |v: &Pose, a: &Pose| v + a * (h * (1.0 - gamma)) + known_a(v, a) * (h * gamma);
         self.constant.fill(Pose::zeros());
         if af != 0.0 {
             self.implicit.force(system, ramp, s, &motion.q, &mut self.constant);

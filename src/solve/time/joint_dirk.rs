@@ -7,49 +7,12 @@
 //! so that each stage is one equation for k_i, with γ = h·a_ii and β = γ² ([`super::joint_stage`]). A stage with a_ii = 0
 //! is an evaluation. Generalized-α and Newmark's rule come to the same equation.
 //!
-//! | name | order | stages | |
-//! |---|---|---|---|
-//! | midpoint | 2 | 1 | keeps quadratic invariants |
-//! | newmark | 2 | 1 + an evaluation | average acceleration |
-//! | tr-bdf2 | 2 | 2 + an evaluation | L-stable, embedded estimate |
-//! | generalized-alpha | 2 | 1 | damping of fast motions as chosen |
-//! | sdirk4 | 4 | 5 | L-stable, embedded estimate of order 3 |
-//!
-//! References: M. E. Hosea, L. F. Shampine, Appl. Numer. Math. 20 (1996) 21–37 (TR-BDF2); E. Hairer, G. Wanner, "Solving
-//! Ordinary Differential Equations II" (1996), table IV.6.5 (SDIRK4); M. Arnold, O. Brüls, Multibody System Dynamics 18
-//! (2007) 185–202 (generalized-α with an acceleration of its own).
+//! Coefficients, orders and sources are those of [`super::tableau`]; generalized-α is with an acceleration of its own (M. Arnold,
+//! O. Brüls, Multibody System Dynamics 18 (2007) 185–202).
 
 use super::dormand_prince::Pair;
 use super::joint_stage::{ImplicitMotion, Loads, Stage, StageError};
-use super::sdirk4;
-use std::f64::consts::SQRT_2;
-
-/// Coefficients of a method.
-#[derive(Debug)]
-struct Tableau {
-    /// Rows of a, the diagonal included.
-    a: &'static [&'static [f64]],
-    c: &'static [f64],
-    /// Weights of the end; none: the last stage is the end.
-    b: Option<&'static [f64]>,
-    /// Weights of the error; none: no estimate.
-    error: Option<&'static [f64]>,
-    /// Power of the step with which the (estimated) error falls.
-    order: f64,
-}
-
-const D: f64 = 1.0 - 0.5 * SQRT_2;
-const W: f64 = 0.25 * SQRT_2;
-const MIDPOINT: Tableau = Tableau { a: &[&[0.5]], c: &[0.5], b: Some(&[1.0]), error: None, order: 3.0 };
-const NEWMARK: Tableau = Tableau { a: &[&[0.0], &[0.5, 0.5]], c: &[0.0, 1.0], b: None, error: None, order: 3.0 };
-const TR_BDF2: Tableau = Tableau {
-    a: &[&[0.0], &[D, D], &[W, W, D]],
-    c: &[0.0, 2.0 * D, 1.0],
-    b: None,
-    error: Some(&[(1.0 - 4.0 * W) / 3.0, 1.0 / 3.0, -2.0 * D / 3.0]),
-    order: 3.0,
-};
-const SDIRK4: Tableau = Tableau { a: &sdirk4::A, c: &sdirk4::C, b: None, error: Some(&sdirk4::E), order: 4.0 };
+use super::tableau::{Alpha, MIDPOINT, NEWMARK, SDIRK4, TR_BDF2, Tableau};
 
 /// A method by name.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -80,15 +43,6 @@ pub struct JointMethod {
     pub carried: Pair,
 }
 
-/// Parameters of generalized-α.
-#[derive(Debug, Clone, Copy, Default)]
-struct Alpha {
-    m: f64,
-    f: f64,
-    beta: f64,
-    gamma: f64,
-}
-
 impl JointMethod {
     /// Storage for `n` coordinates.
     pub fn new(rule: Rule, n: usize) -> Self {
@@ -99,12 +53,10 @@ impl JointMethod {
             Rule::Sdirk4 => (Some(&SDIRK4), 0.0),
             Rule::GeneralizedAlpha { rho } => (None, rho),
         };
-        let (m, f) = ((2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0));
-        let alpha = Alpha { m, f, beta: 0.25 * (1.0 - m + f).powi(2), gamma: 0.5 - m + f };
         let count = tableau.map_or(0, |t| t.a.len());
         Self {
             tableau,
-            alpha,
+            alpha: Alpha::damping(rho),
             stages: vec![Pair::zeros(n); count],
             base: Pair::zeros(n),
             carried: Pair::zeros(if tableau.is_none() { n } else { 0 }),

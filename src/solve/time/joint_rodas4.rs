@@ -18,6 +18,7 @@
 
 mod ports;
 mod stages;
+mod tableau;
 
 use super::method::{Method, Motion, StepFailure, Work};
 use super::rodas4::{ALPHA, GAMMA, GAMMA_I};
@@ -47,7 +48,6 @@ pub struct JointRodas4 {
     ports: Ports,
     /// ∂(bodies' motion)/∂(final voltage of a source), one for each source given to [`JointRodas4::new`].
     pub sensitivity: Vec<Motion>,
-    damped: Vec<Pose>,
     poses: Vec<Pose>,
     force: Vec<Pose>,
     share: Vec<Pose>,
@@ -57,6 +57,8 @@ pub struct JointRodas4 {
     rate: Drive,
     /// Something drags on bodies or between them.
     drags: bool,
+    /// The bodies have been placed at the argument of the stages.
+    is_placed: bool,
     /// Accelerations are those of the motion to come.
     resumed: bool,
     /// About the shortest time in which something moves [s].
@@ -79,7 +81,6 @@ impl JointRodas4 {
             stages: Stages::new(count),
             ports: Ports::new(&joints, sources),
             sensitivity: vec![Motion::zeros(count); sources.len()],
-            damped: zeros.clone(),
             poses: zeros.clone(),
             force: zeros.clone(),
             share: zeros.clone(),
@@ -88,6 +89,7 @@ impl JointRodas4 {
             drive: electrics.drive(),
             rate: electrics.drive(),
             drags: model.bodies.iter().any(|b| b.drag.amount != 0.0) || !model.dampers.is_empty(),
+            is_placed: false,
             resumed: false,
             shortest,
             work: Work::default(),
@@ -113,13 +115,17 @@ impl JointRodas4 {
         self.carried[2..].iter_mut().chain(&mut self.sensitivity).for_each(Motion::clear);
     }
 
-    /// Places the bodies at the argument of the stage at hand and puts R into `share`. The first stage also begins W.
-    fn residual(&mut self, first: bool) {
-        let Self { joints, w, placed, stages, ports, poses, force, share, drive, .. } = self;
+    /// Places the bodies at the argument of the stage at hand, unless that is where they are, and puts R into `share`. The
+    /// first stage also begins W.
+    fn residual(&mut self, first: bool, stays: bool) {
+        let Self { joints, w, placed, is_placed, stages, ports, poses, force, share, drive, .. } = self;
         let Joints { tree, closures } = &**joints;
         let model = &closures.model;
         let argument = &stages.argument;
-        placed.place_at(tree, |j| &argument[j].q, |j| &argument[j].v, |j| &argument[j].z);
+        if !(stays && *is_placed) {
+            placed.place_at(tree, |j| &argument[j].q, |j| &argument[j].v, |j| &argument[j].z);
+            *is_placed = true;
+        }
         for (j, (poses, force)) in poses.iter_mut().zip(force.iter_mut()).enumerate() {
             *poses = placed.pose(j);
             let body = &model.bodies[j];
@@ -157,25 +163,22 @@ impl JointRodas4 {
         Ok(())
     }
 
-    /// Completes the right side of a stage: `share` holds R and becomes the joints' part, `wrench` the bodies'. `rate` is
-    /// γ_i·h.
-    fn inertia(&mut self, rate: f64) {
-        let Self { joints, w, stages, damped, wrench, forcing, share, drags, .. } = self;
+    /// Completes the right side of stage `i` of a step of length `h` [s]: `share` holds R and becomes the joints' part,
+    /// `wrench` the bodies'.
+    fn inertia(&mut self, i: usize, h: f64) {
+        let rate = GAMMA_I[i] * h;
+        let Self { joints, stages, wrench, forcing, share, drags, .. } = self;
         let Joints { tree, closures } = &**joints;
         let model = &closures.model;
-        if *drags {
-            w.both_motions(tree, (&stages.push, &stages.r1), (wrench, damped));
-        } else {
-            w.motions(tree, |j| &stages.push[j], wrench);
-        }
+        stages.move_bodies(i, h, *drags);
         for (j, body) in model.bodies.iter().enumerate() {
-            wrench[j] = body.mass_diagonal().component_mul(&wrench[j]) - forcing[j] * rate;
+            wrench[j] = body.mass_diagonal().component_mul(&stages.push[j]) - forcing[j] * rate;
             if *drags {
-                wrench[j] += body.drag.force(&damped[j]);
+                wrench[j] += body.drag.force(&stages.drift[j]);
             }
         }
         if !model.dampers.is_empty() {
-            forces::add_dampers(model, |k| damped[k], wrench);
+            forces::add_dampers(model, |k| stages.drift[k], wrench);
         }
         let rest = self.rate.rest();
         for (share, link) in share.iter_mut().zip(&tree.links) {
@@ -206,7 +209,7 @@ impl Method for JointRodas4 {
             *argument = STILL;
             (argument.q, argument.v) = (*q, *v);
         }
-        self.residual(true);
+        self.residual(true, false);
         let gh = CONSISTENT * self.shortest;
         self.factor(gh)?;
         let z = &mut self.carried[1].q;
@@ -234,33 +237,32 @@ impl Method for JointRodas4 {
             let (at, rate) = (s + ALPHA[i] * h, GAMMA_I[i] * h);
             ramp.at(at, &mut self.drive);
             self.drive.load = 1.0;
-            self.stages.begin(i, h, &self.carried[0], &self.carried[1]);
-            self.residual(i == 0);
+            let stays = self.stages.begin(i, h, &self.carried[0], &self.carried[1]);
+            self.residual(i == 0, stays);
             if i == 0 {
                 self.factor(gh)?;
+                self.stages.set_out(&self.joints.tree, &self.w, &self.carried[0], &self.carried[1]);
                 ramp.rate(s, &mut self.rate);
                 self.joints.closures.drive_force(&self.poses, &self.drive, &self.rate, &mut self.forcing);
                 self.ports.begin(&self.joints, ramp, s, &self.poses, (&self.drive, &self.rate));
             }
-            self.inertia(rate);
+            self.inertia(i, h);
             self.w.solve(&self.joints.tree, &mut self.wrench, &mut self.share);
             let stage = (&self.stages, self.poses.as_slice(), &self.drive);
             let solves = self.ports.stage(&self.joints, ramp, (i, at, h, rate), stage, &self.w, &self.carried[2..]);
-            self.stages.keep(i, gh, &self.share);
+            self.stages.keep(i, &self.share, &self.wrench);
             self.work.solves += 1 + solves;
         }
-        // stiffly accurate: the last argument plus its increment is the new value, the increment the error; the last solve
-        // left the bodies' share of the displacements
-        error.q.copy_from_slice(&self.wrench);
-        self.w.motions(&self.joints.tree, |j| &self.stages.r1[j], &mut error.v);
+        // stiffly accurate: the last argument plus its increment is the new value, the increment the error
+        self.stages.last(h, &mut error.q, &mut error.v);
         let (own, sensitivities) = self.carried.split_at_mut(2);
         if let [now, push] = own {
-            self.stages.finish(now, push);
+            self.stages.finish(h, now, push);
             self.placed.move_on(&self.joints.tree, &now.q, &now.v, &push.q);
         }
         self.placed.poses(&mut motion.q);
         self.placed.rates(&mut motion.v);
-        self.ports.finish(&self.joints.tree, &self.stages, sensitivities, &mut self.sensitivity);
+        self.ports.finish(&self.joints.tree, h, &self.stages, sensitivities, &mut self.sensitivity);
         Ok(())
     }
 

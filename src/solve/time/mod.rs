@@ -15,10 +15,11 @@
 //! | [`radau5`] | Radau IIA of order 5: one real and one complex block factorization a step |
 //! | `implicit` | the equation that a step with one unknown displacement comes to |
 //! | [`centred`] | steps that are symmetric about their middle: [`midpoint`], and [`avf`], which keeps the energy |
-//! | [`tr_bdf2`] | TR-BDF2: order 2, L-stable |
-//! | [`sdirk4`] | a diagonally implicit Runge–Kutta method of order 4, L-stable |
+//! | [`dirk`] | diagonally implicit Runge–Kutta methods by their tableau: TR-BDF2, SDIRK4 |
 //! | [`generalized_alpha`] | generalized-α with a chosen damping of fast motions, and Newmark's rule |
 //! | [`rk45`] | Dormand–Prince on bodies: explicit |
+//!
+//! For both: [`tableau`] has the coefficients of implicit methods.
 //!
 //! In joint coordinates, or on any flat slices:
 //!
@@ -37,11 +38,13 @@ pub mod adaptive;
 mod anderson;
 pub mod avf;
 pub mod centred;
+pub mod dirk;
 pub mod dormand_prince;
 pub mod doubling;
 pub mod event;
 pub mod formulated;
 pub mod generalized_alpha;
+pub mod gyration;
 mod implicit;
 pub mod interpolation;
 pub mod joint_adaptive;
@@ -55,6 +58,6 @@ pub mod midpoint;
 pub mod radau5;
 pub mod rk45;
 pub mod rodas4;
-pub mod sdirk4;
+pub mod side_by_side;
 mod step_size;
-pub mod tr_bdf2;
+pub mod tableau;

@@ -18,15 +18,18 @@
 //!
 //! Reference: E. Hairer, G. Wanner, "Solving Ordinary Differential Equations II" (1996), §IV.7 and table 7.1 (RODAS).
 
+pub mod lanes;
 mod ports;
 mod stages;
 
 pub use super::method::Motion;
 use super::method::{Method, StepFailure, Work};
 use crate::gaps::{Drive, Ramp, System};
+use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, forces};
 use crate::solve::linear::{LinearSolver, Recursion};
-use ports::Ports;
+use crate::solve::time::gyration::{Gyration, held_out, skew};
+use ports::{Ports, Turning};
 use stages::Stages;
 
 pub(super) const GAMMA: f64 = 0.25;
@@ -61,6 +64,8 @@ pub struct Rodas4<S = Recursion> {
     drive: Drive,
     rate: Drive,
     ports: Ports,
+    /// Terms of the series in a frame that turns; empty where no input turns it.
+    scratch: Vec<Pose>,
     /// ∂motion/∂(final voltage of a source), one for each source given to [`Rodas4::new`]; advanced with the motion.
     pub sensitivity: Vec<Motion>,
     work: Work,
@@ -83,6 +88,7 @@ impl<S: LinearSolver> Rodas4<S> {
             drive: system.electrics.drive(),
             rate: system.electrics.drive(),
             ports: Ports::new(system, sources),
+            scratch: vec![Pose::zeros(); if system.turns() { system.bodies() } else { 0 }],
             sensitivity: vec![Motion::zeros(system.bodies()); sources.len()],
             work: Work::default(),
         }
@@ -110,10 +116,24 @@ impl<S: LinearSolver> Method for Rodas4<S> {
         ramp.rate(s, &mut self.rate);
         system.drive_force(&motion.q, &self.drive, &self.rate, &mut self.stages.forcing);
         self.ports.begin(system, ramp, s, &motion.q, (&self.drive, &self.rate));
+        let mut turning = None;
+        if let Some(frame) = system.frame(&self.drive).filter(|_| system.turns()) {
+            let start = Gyration::new(frame);
+            turning = Some(Turning { start, now: start, terms: start.terms(gh)? });
+            let rate = system.frame(&self.rate).map(Gyration::new).unwrap_or_default();
+            for ((force, body), v) in self.stages.forcing.iter_mut().zip(&model.bodies).zip(&motion.v) {
+                *force += held_out(body, skew(body, rate.rate, v));
+            }
+            self.ports.begin_turning(system, ramp, s, (&motion.v, rate), &self.sensitivity);
+        }
         for (i, alpha) in ALPHA.into_iter().enumerate() {
             let at = s + alpha * h;
             ramp.at(at, &mut self.drive);
             self.stages.begin(model, i, h, motion);
+            if let Some(turning) = &mut turning {
+                turning.now = system.frame(&self.drive).map(Gyration::new).unwrap_or_default();
+                self.stages.add_gyration(model, (i, h), turning.now, turning.start);
+            }
             let (q, force) = self.stages.place(i, motion);
             if i == 0 {
                 system.add_tangent(q, &self.drive, &mut self.w, force);
@@ -129,9 +149,19 @@ impl<S: LinearSolver> Method for Rodas4<S> {
                 system.add_residual(q, &self.drive, force);
             }
             self.solver.solve(&model.pattern, &self.w, force);
+            let mut solves = 1;
+            if let Some(turning) = turning {
+                turning.start.complete(model, gh, turning.terms, &mut self.scratch, force, |x| {
+                    self.solver.solve(&model.pattern, &self.w, x);
+                });
+                solves += turning.terms as u64;
+            }
+            let q = self.stages.at(i, motion);
             let matrix = (&self.solver, &self.w);
-            let solves = self.ports.stage(system, ramp, (i, at, h), (q, &self.drive), matrix, &mut self.sensitivity);
-            self.work.solves += 1 + solves;
+            let turned = turning.map(|turning| (&self.stages, turning));
+            solves +=
+                self.ports.stage(system, ramp, (i, at, h), (q, &self.drive), matrix, turned, &mut self.sensitivity);
+            self.work.solves += solves;
         }
         self.stages.finish(model, h, motion, Some(error));
         self.ports.finish(model, h, &mut self.sensitivity);

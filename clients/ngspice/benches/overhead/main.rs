@@ -2,7 +2,9 @@
 
 mod host;
 
-use bimorph::device::{Description, Device, DeviceError, OpenRequest, PortInfo, SmallSignal, Token, Trial, TrialReply};
+use bimorph::device::{
+    Description, Device, DeviceError, OpenRequest, PortInfo, PortKind, SmallSignal, Token, Trial, TrialReply,
+};
 use bimorph_ngspice::model_card::ModelCard;
 use bimorph_ngspice::opener::OpenError;
 use criterion::{Criterion, criterion_group, criterion_main};
@@ -16,7 +18,7 @@ struct Nothing;
 
 impl Device for Nothing {
     fn open(&mut self, _: &OpenRequest) -> Result<Description, DeviceError> {
-        let ports = (0..PORTS).map(|n| PortInfo { name: n.to_string() }).collect();
+        let ports = (0..PORTS).map(|n| PortInfo { name: n.to_string(), kind: PortKind::Electrical }).collect();
         Ok(Description { ports, signals: Vec::new(), unknowns: 0 })
     }
     fn trial(&mut self, request: &Trial<'_>, reply: &mut TrialReply) -> Result<(), DeviceError> {

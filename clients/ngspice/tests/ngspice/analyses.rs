@@ -4,14 +4,25 @@ use crate::support::{deck, versions};
 use bimorph::cosim::{self, CosimError, CosimOptions};
 use std::path::Path;
 
-/// The plate under 2 V behind 10 kΩ, with these commands.
+/// The plate under 2 V behind 10 kΩ and with a second port for S-parameters, with these commands. ngspice has no `.sens` in any
+/// circuit with such ports: there they are left out.
 fn text(commands: &[&str]) -> String {
+    let (first, second) = if sensitive(commands) {
+        ("", "")
+    } else {
+        (" portnum 1 z0 50", "Vp p 0 dc 0 ac 0 portnum 2 z0 1meg\nRp p a 1meg\n")
+    };
     format!(
-        "* two analyses\nVd in 0 dc 2 ac 1 SIN(2 0.1 10k)\nRd in a 10k\nA1 %gd [a 0] %v [x] plate\n\
+        "* two analyses\nVd in 0 dc 2 ac 1 SIN(2 0.1 10k){first}\nRd in a 10k\n{second}A1 %gd [a 0] %v [x] plate\n\
          .model plate bimorph(file=\"damped_plate.net\" ports=[\"drive\"] monitors=[\"m.x:1e6\"])\n\
          .control\n{}\nquit\n.endc\n.end\n",
         commands.join("\n")
     )
+}
+
+/// Whether `.sens` is among the commands, if only as one that does nothing.
+fn sensitive(commands: &[&str]) -> bool {
+    commands.iter().any(|command| command.contains("sens"))
 }
 
 fn outcome(ngspice: &Path, commands: &[&str]) -> Result<String, String> {
@@ -29,7 +40,7 @@ fn outcome(ngspice: &Path, commands: &[&str]) -> Result<String, String> {
 }
 
 /// An analysis, what prints one number of it, and that number where the part is taken for what it is.
-const ANALYSES: [(&str, &str, &str); 8] = [
+const ANALYSES: [(&str, &str, &str); 10] = [
     ("op", "op", "print v(x)"),
     ("dc", "dc Vd 1.9 2 0.1", "print v(x)[1]"),
     ("tran", "tran 1u 20u", "print v(x)[0]"),
@@ -37,51 +48,111 @@ const ANALYSES: [(&str, &str, &str); 8] = [
     ("noise", "noise v(a) Vd lin 1 1k 1k", "print noise1.onoise_spectrum"),
     ("tf", "tf v(x) Vd", "print transfer_function"),
     ("sens", "sens v(x)", "print vd"),
+    ("sp", "sp lin 1 100k 100k", "print mag(s_2_1)"),
+    ("four", "tran 1u 200u\nfourier 10k v(x)", ""),
     ("pz", "pz in 0 a 0 vol pz", "print all"),
 ];
 
-/// The number behind the last equals sign of the output.
+/// The number behind the last equals sign of the output, or its last total harmonic distortion.
 fn number(output: &str) -> Option<f64> {
-    output.lines().filter_map(|l| l.split_once(" = ")).filter_map(|(_, v)| v.trim().parse().ok()).next_back()
+    let distortion = |l: &str| l.split_once("THD: ")?.1.split_whitespace().next()?.parse().ok();
+    let of = |l: &str| l.split_once(" = ").and_then(|(_, v)| v.trim().parse().ok()).or_else(|| distortion(l));
+    output.lines().filter_map(of).next_back()
 }
 
-/// Each analysis gives after each other what it gives alone, to 1e-6; `.pz` ends with a message that says what to do
+/// Where the table of docs/ngspice.md stands.
+const MARKS: [&str; 2] = ["<!-- analyses after each other -->\n", "<!-- end -->\n"];
+
+/// The table of the documentation from the cells of each version: what holds on all, or on which.
+fn documented(outcomes: &[(u32, Vec<Vec<char>>)]) -> String {
+    let names: Vec<&str> = ANALYSES.iter().map(|(name, ..)| *name).collect();
+    let mut table = format!("| first ↓ second → | {} |\n|---|{}\n", names.join(" | "), "---|".repeat(names.len()));
+    for (row, name) in names.iter().enumerate() {
+        table += &format!("| {name} |");
+        for column in 0..names.len() {
+            let of =
+                |c: char| outcomes.iter().filter(move |(_, cells)| cells[row][column] == c).map(|(v, _)| v.to_string());
+            let right: Vec<String> = of('r').collect();
+            table += &match (right.len(), of('m').count()) {
+                (n, _) if n == outcomes.len() => " right |".to_owned(),
+                (_, n) if n == outcomes.len() => " message |".to_owned(),
+                (0, _) => " – |".to_owned(),
+                _ => format!(" right on {} |", right.join(", ")),
+            };
+        }
+        table.push('\n');
+    }
+    table
+}
+
+/// Each analysis gives after each other what it gives alone, to 1e-6, and the table in docs/ngspice.md says so
+/// (`BIMORPH_WRITE=1` writes it); `.pz` ends with a message that says what to do
 /// instead. After `.sens`, ngspice 44 and 47 begin a transient at 0 V in any circuit, of a resistor and a capacitor, too:
 /// nothing is asked of them there.
 #[test]
 fn every_analysis_after_every_other() {
-    for (version, ngspice) in versions() {
-        let alone: Vec<Result<Option<f64>, String>> = (ANALYSES.iter())
-            .map(|(_, run, print)| outcome(&ngspice, &[run, print]).map(|text| number(&text)))
-            .collect();
+    let versions = versions();
+    let mut outcomes = Vec::new();
+    for (version, ngspice) in &versions {
+        let (version, ngspice) = (*version, ngspice.as_path());
+        let mut cells = Vec::new();
+        // in the circuit with two ports, and in the one without for what stands beside .sens
+        let [alone, beside_sens] = ["", "* sens"].map(|circuit| {
+            let of = |(_, run, print): &(&str, &str, &str)| {
+                outcome(ngspice, &[circuit, run, print]).map(|text| number(&text))
+            };
+            ANALYSES.iter().map(of).collect::<Vec<Result<Option<f64>, String>>>()
+        });
         let mut table = format!("ngspice {version}: first ↓ second →\n        alone");
         for ((name, ..), one) in ANALYSES.iter().zip(&alone) {
             table += &format!("\n{name:>6}: {one:?}");
         }
         let mut wrong = Vec::new();
         for (first, run, _) in &ANALYSES {
-            for ((second, run2, print), want) in ANALYSES.iter().zip(&alone) {
-                // A control section goes on after a refused analysis, but the run as a whole is refused.
-                if *first == "pz" || (*first == "sens" && version > 39) {
+            let mut row = Vec::new();
+            for (n, (second, run2, print)) in ANALYSES.iter().enumerate() {
+                let want = if sensitive(&[run, run2]) { &beside_sens[n] } else { &alone[n] };
+                if (*first == "sens" && *second == "sp") || (*first == "sp" && *second == "sens") {
+                    row.push('-');
                     continue;
                 }
-                let got = outcome(&ngspice, &[run, run2, print]).map(|text| number(&text));
+                // A control section goes on after a refused analysis, but the run as a whole is refused.
+                if *first == "pz" || (*first == "sens" && version > 39) {
+                    row.push(if *first == "pz" { 'm' } else { '-' });
+                    continue;
+                }
+                let got = outcome(ngspice, &[run, run2, print]).map(|text| number(&text));
                 let same = match (want, &got) {
                     (Ok(Some(a)), Ok(Some(b))) => (a / b - 1.0).abs() < 1e-6,
                     (Err(a), Err(b)) => a == b && a.contains(".pz"),
                     _ => false,
                 };
+                row.push(if want.is_ok() { 'r' } else { 'm' });
                 if !same {
                     wrong.push(format!("{first} then {second}: {got:?}, alone {want:?}"));
                 }
             }
+            cells.push(row);
         }
+        outcomes.push((version, cells));
         println!("{table}");
         assert!(wrong.is_empty(), "ngspice {version}:\n{}", wrong.join("\n"));
-        let refused = alone[7].as_ref().unwrap_err();
+        let refused = alone[ANALYSES.len() - 1].as_ref().unwrap_err();
         assert_eq!(
             refused,
             ".pz knows no electro-mechanical parts; use .ac, or `bimorph modes` for natural frequencies"
         );
     }
+    if outcomes.len() < 3 {
+        return;
+    }
+    let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/ngspice.md");
+    let text = std::fs::read_to_string(&docs).unwrap();
+    let (head, rest) = text.split_once(MARKS[0]).expect("the mark of the table");
+    let (table, tail) = rest.split_once(MARKS[1]).expect("the end of the table");
+    let now = documented(&outcomes);
+    if std::env::var_os("BIMORPH_WRITE").is_some() {
+        std::fs::write(&docs, format!("{head}{}{now}{}{tail}", MARKS[0], MARKS[1])).unwrap();
+    }
+    assert_eq!(table, now, "docs/ngspice.md is of another state; BIMORPH_WRITE=1 writes the table");
 }

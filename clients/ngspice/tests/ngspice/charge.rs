@@ -1,6 +1,7 @@
 //! Charge that a circuit delivers stays on a port, whatever ngspice's tolerance and steps.
 
-use crate::support::{real, run_text, versions};
+use crate::support::{deck as deck_file, real, run_text, versions};
+use std::path::Path;
 
 /// A current of 0.5646 nA for 1 ms onto a plate that nothing else holds. The gap's charge is a monitor [fC].
 fn deck(step: &str, reltol: f64) -> String {
@@ -27,6 +28,43 @@ fn charge_held_is_charge_delivered() {
             assert!((x / want - 1.0).abs() < 5e-4, "ngspice {version}, {step}: {x} um, expected {want}");
         }
     }
+}
+
+/// Charge on an island of two plates with a switch between them, over `cycles` in each of which it goes from one plate to the
+/// other: largest departure from what was there at the first points, over that.
+fn island(ngspice: &Path, cycles: u32) -> (f64, f64) {
+    let text = std::fs::read_to_string(deck_file("charge_ring.cir")).unwrap();
+    assert!(text.contains(".tran 5u 10m uic"));
+    let text = text.replace(".tran 5u 10m uic", &format!(".tran 5u {}u uic", 50 * cycles));
+    let run = run_text(&text, ngspice).unwrap();
+    let plot = run.plot("Transient");
+    let (first, second) = (real(plot, "v(q1)"), real(plot, "v(q2)"));
+    let start = first[10] + second[10];
+    let off = first[10..].iter().zip(&second[10..]).map(|(a, b)| ((a + b) / start - 1.0).abs()).fold(0.0, f64::max);
+    let swing = first[10..].iter().fold(f64::NEG_INFINITY, |m, q| m.max(*q))
+        - first[10..].iter().fold(0.0f64, |m, q| m.min(*q));
+    (off, swing / start)
+}
+
+/// Switches and plates keep an island's charge at ngspice's default tolerances: 1e-9 over 200 cycles in each of which more than
+/// all of it moves.
+#[test]
+fn an_island_keeps_its_charge() {
+    for (version, ngspice) in versions() {
+        let (off, swing) = island(&ngspice, 200);
+        println!("ngspice {version}: charge kept within {off:e}, of which {swing:.2} moves");
+        assert!(off < 1e-9 && swing > 1.0, "ngspice {version}: {off:e} {swing}");
+    }
+}
+
+/// The same over ten thousand cycles, 1e-8: takes minutes.
+#[test]
+#[ignore = "takes minutes"]
+fn an_island_keeps_its_charge_for_long() {
+    let (version, ngspice) = versions().swap_remove(0);
+    let (off, _) = island(&ngspice, 10_000);
+    println!("ngspice {version}: charge kept within {off:e} over 10,000 cycles");
+    assert!(off < 1e-8, "{off:e}");
 }
 
 /// A voltage that `.ic` gives with `uic` stands on the port from the first point on, and the plate begins in equilibrium

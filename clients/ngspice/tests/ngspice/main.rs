@@ -4,6 +4,7 @@ mod analyses;
 mod analytic;
 mod charge;
 mod models;
+mod ports;
 #[cfg(feature = "remote")]
 mod remote;
 mod steps;

@@ -1,6 +1,7 @@
 //! How long the circuit's steps are: as long as what ports and monitors show allows, not as short as what moves unseen.
 
-use crate::support::{real, run_text, versions};
+use crate::support::{deck, real, run, run_text, versions};
+use bimorph::cosim::CosimOptions;
 
 /// A bank of bimorphs heated by 0 to 2.2 V pulses at 20 kHz, and where its yoke is.
 fn pulses(options: &str) -> String {
@@ -33,5 +34,33 @@ fn pulse_width_modulation_takes_few_points() {
         println!("ngspice {version}: {points} points, mean {free} um against {fine} um");
         assert!(points <= 8000, "{points} points");
         assert!((free / fine - 1.0).abs() < 1e-4, "mean {free} um against {fine} um");
+    }
+}
+
+/// A comb resonator (k = 1 N/m, m = 1e-10 kg, Q = 50) that its own sense current keeps swinging: between the reversals of the
+/// drive it swings freely about the drive's place, so that it oscillates at ω₀·√(1 − 1/4Q²). At default options and at most 30
+/// points a cycle the frequency over 70 cycles is within 1e-4 of it.
+#[test]
+fn an_oscillator_keeps_its_frequency_at_few_points() {
+    let (omega, quality): (f64, f64) = (1e5, 50.0);
+    let exact = omega * (1.0 - 0.25 / (quality * quality)).sqrt() / std::f64::consts::TAU;
+    for (version, ngspice) in versions() {
+        let options =
+            CosimOptions { deck: deck("comb_oscillator.cir"), ngspice: Some(ngspice), ..CosimOptions::default() };
+        let run = run(options).unwrap_or_else(|e| panic!("ngspice {version}: {e}"));
+        let plot = run.plot("Transient");
+        let (t, x) = (real(plot, "time"), real(plot, "v(x)"));
+        // half of the sense comb's pull less the drive's
+        let middle = 0.5 * 8.854e-10 * (25.0 - 100.0) * 1e6;
+        let rises: Vec<(usize, f64)> = (1..t.len())
+            .filter(|&i| x[i - 1] < middle && x[i] >= middle)
+            .map(|i| (i, t[i - 1] + (t[i] - t[i - 1]) * (middle - x[i - 1]) / (x[i] - x[i - 1])))
+            .collect();
+        let (first, last) = (rises[100], rises[170]);
+        let frequency = 70.0 / (last.1 - first.1);
+        let points = (last.0 - first.0) as f64 / 70.0;
+        println!("ngspice {version}: {points:.1} points a cycle, frequency off by {:e}", frequency / exact - 1.0);
+        assert!(points <= 30.0, "ngspice {version}: {points} points a cycle");
+        assert!((frequency / exact - 1.0).abs() < 1e-4, "ngspice {version}: {frequency} Hz, {exact} Hz");
     }
 }

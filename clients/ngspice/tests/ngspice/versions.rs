@@ -89,6 +89,10 @@ fn difference(a: &Run, b: &Run) -> (f64, String) {
     worst
 }
 
+/// Decks of few points, or of a switch that opens within a step: ngspice's own integration differs between versions by more than what
+/// is compared here. They run here; tests of their own measure them on every version (`steps`, `charge`).
+const OF_THEIR_OWN: [&str; 2] = ["charge_ring.cir", "comb_oscillator.cir"];
+
 /// Every deck runs on every version, and the waveforms agree with those of the first.
 #[test]
 fn every_deck_on_every_version() {
@@ -107,6 +111,7 @@ fn every_deck_on_every_version() {
                     table += " | fails";
                     wrong.push(format!("{name} on {version}: {e}"));
                 }
+                (Ok(_), _) if OF_THEIR_OWN.contains(&name.as_str()) => table += " | runs",
                 (Ok(run), None) => {
                     table += " | runs";
                     first = Some(run);
@@ -156,22 +161,29 @@ fn klu_agrees_with_sparse() {
         })
         .collect();
     for (version, ngspice) in versions().into_iter().filter(|(v, _)| *v >= 42) {
-        for (name, text) in
-            [("comb", read("comb.cir")), ("ten plates", ten_plates()), ("ten plates, no monitors", silent.clone())]
-        {
+        for (name, text) in [
+            ("comb", read("comb.cir")),
+            ("ten plates", ten_plates()),
+            ("ten plates, no monitors", silent.clone()),
+            ("thermal port", read("thermal_port.cir")),
+            ("port dampers", read("port_dampers.cir")),
+        ] {
             let sparse = run_text(&text, &ngspice).unwrap();
             let with = text.replacen('\n', "\n.options klu\n", 1);
             let klu = run_text(&with, &ngspice).unwrap_or_else(|e| panic!("{name} on {version} with KLU: {e}"));
             assert_eq!(sparse.plots.len(), klu.plots.len());
             let mut worst = (0.0f64, String::new());
             for (p, q) in sparse.plots.iter().zip(&klu.plots) {
-                for column in p.columns().iter().filter(|c| c.name != "frequency") {
+                // by place: the branches of a part with several share a name
+                for (column, other) in p.columns().iter().zip(q.columns()).filter(|(c, _)| c.name != "frequency") {
                     let x = resolved(p, &column.samples.magnitudes());
-                    let y = resolved(q, &q.column(&column.name).unwrap().samples.magnitudes());
+                    let y = resolved(q, &other.samples.magnitudes());
+                    assert_eq!(column.name, other.name);
                     assert_eq!(x.len(), y.len(), "{name} on {version}: {} of {}", column.name, p.plot_name);
                     // At an operating point no current flows: what is solved there is rounding.
                     let everywhere = sparse.plots.iter().filter_map(|plot| plot.column(&column.name));
-                    let size = everywhere.flat_map(|c| c.samples.magnitudes()).fold(f64::MIN_POSITIVE, f64::max);
+                    let size =
+                        everywhere.flat_map(|c| c.samples.magnitudes()).fold(f64::MIN_POSITIVE, |m, x| m.max(x.abs()));
                     let off = x.iter().zip(&y).fold(0.0f64, |m, (x, y)| m.max((x - y).abs())) / size;
                     if off.is_nan() || off > worst.0 {
                         worst = (off, format!("{} of {}", column.name, p.plot_name));

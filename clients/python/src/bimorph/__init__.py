@@ -30,7 +30,7 @@ from .results import (
 )
 from .server import Server, serve
 from .session import Session, Snapshot
-from .sweep import Modes, PullIn, Row, Static, Table
+from .sweep import Modes, PullIn, Row, Static, Table, Transient
 
 __all__ = [
     "BimorphError",
@@ -57,6 +57,7 @@ __all__ = [
     "StaticResult",
     "StepFailed",
     "Table",
+    "Transient",
     "TransientResult",
     "TrialReply",
     "Unavailable",

@@ -164,6 +164,8 @@ class Model:
             unknowns=answer.unknowns,
             iterations=answer.iterations,
             estimated_error=_estimate(answer),
+            jumped=answer.jumped,
+            warnings=tuple(answer.warnings),
         )
 
     def modes(self, count: int = 6, voltages: Voltages | None = None) -> ModesResult:
@@ -189,7 +191,8 @@ class Model:
         request = analysis_pb2.PullInRequest(model=self.id, port=port, max_v=max_v)
         answer = self._call("PullIn", request)
         release = answer.release_v if answer.HasField("release_v") else None
-        return PullInResult(answer.port, answer.pull_in_v, release, _estimate(answer))
+        warnings = tuple(answer.warnings)
+        return PullInResult(answer.port, answer.pull_in_v, release, _estimate(answer), not answer.unheld, warnings)
 
     def transient(
         self,
@@ -234,7 +237,8 @@ class Model:
                 named = dict(zip(signals, columns))
                 units = dict(zip(signals, end.units))
                 work = (end.steps, end.rejected, end.unknowns)
-                return TransientResult(t, named, units, *work, _estimate(end), tuple(end.warnings))
+                step_error = end.step_error if end.HasField("step_error") else None
+                return TransientResult(t, named, units, *work, _estimate(end), tuple(end.warnings), step_error)
         raise Unavailable(f"server {self._channel.address}: the stream ended before the run did")
 
     def session(
@@ -242,7 +246,11 @@ class Model:
     ) -> Session:
         """Opens a device to be stepped; use it in a ``with`` block.
 
-        ``signals`` are read with every reply. ``ports`` chooses ports and their order; those left out are held at 0 V.
+        ``signals`` are read with every reply. ``ports`` chooses ports and their order: those of the netlist, ``NODE.x``, ``.y``
+        and ``.rz`` (a force or moment is given, the displacement answered), ``NODE.vx``, ``.vy`` and ``.vrz`` (answered with the
+        velocity), ``BEAM.T`` (heat), ``frame.ax``, ``.ay`` and ``.wz`` (acceleration and rate of the
+        frame). Those left out are held at 0 V, or
+        free.
         ``timeout`` [s] bounds each call.
         """
         self._describe()

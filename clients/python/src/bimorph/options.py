@@ -26,9 +26,9 @@ class Options(TypedDict, total=False):
     undamped: bool | None
     """Leave out gas damping."""
 
-    scheme: Literal["a0", "a2", "c1", "d1", "b", "e4", "es"] | None
-    """How beams are cut into bodies and joints (docs/theory.md has their errors). One of a0, a2, c1, d1, b, e4,
-    es; default: e4."""
+    scheme: Literal["a0", "a2", "c1", "d1", "b", "e4", "es", "auto"] | None
+    """How beams are cut into bodies and joints (docs/theory.md has their errors). auto: e4; es in joint
+    coordinates, where every body needs rotary inertia. One of a0, a2, c1, d1, b, e4, es, auto; default: auto."""
 
     segments: int | None
     """Segments of every beam, whatever band and tol say. Range: 1 to 100000; default: by band and tol."""

@@ -37,6 +37,10 @@ class StaticResult:
     """Newton iterations over all load steps."""
     estimated_error: float | None = None
     """Largest estimated relative error by the mesh [1]; None without an estimate."""
+    jumped: bool = False
+    """Whether it jumped on the way: it pulled in, snapped through or buckled."""
+    warnings: tuple[str, ...] = ()
+    """What the numbers do not say by themselves."""
 
 
 @dataclass(frozen=True)
@@ -71,6 +75,10 @@ class PullInResult:
     """Where the closed gap lets go [V]; None when it stays stuck."""
     estimated_error: float | None = None
     """Largest estimated relative error by the mesh [1]; None without an estimate."""
+    held: bool = True
+    """False where nothing holds the part beyond pull-in: no gap closes on contact."""
+    warnings: tuple[str, ...] = ()
+    """What the numbers do not say by themselves."""
 
 
 @dataclass(frozen=True)
@@ -93,6 +101,8 @@ class TransientResult:
     """Largest estimated relative error by the mesh [1]; None without an estimate."""
     warnings: tuple[str, ...] = ()
     """What may surprise about the run."""
+    step_error: float | None = None
+    """How far the steps in time may be off by the end, of the amplitude [1]; None where they were not compared."""
 
 
 @dataclass(frozen=True)

@@ -97,6 +97,10 @@ class Session:
         self._session = opened.session
         self.ports: tuple[str, ...] = tuple(opened.device.ports)
         """Ports, in order."""
+        kinds = [_kind(k) for k in opened.device.port_kinds] or ["electrical"] * len(self.ports)
+        self.port_kinds: dict[str, str] = dict(zip(self.ports, kinds))
+        """What is given to each port, and answered: "electrical" (V; A), "force" (N; m), "moment" (N·m; rad), "force_rate"
+        (N; m/s), "moment_rate" (N·m; rad/s), "thermal" (W; K above ambient), "acceleration" (m/s²; 0), "rate" (rad/s; 0)."""
         self.signals: dict[str, str] = {s.name: s.unit for s in opened.device.signals}
         """Opened signals and their units."""
         self.unknowns: int = opened.device.unknowns
@@ -106,7 +110,8 @@ class Session:
     def trial(
         self, voltages: Mapping[str, float], dt: float | None = None, *, parent: TrialReply | None = None
     ) -> TrialReply:
-        """What the device answers at these port voltages [V]; ports not named keep their accepted voltage.
+        """What the device answers at these port voltages [V], or what else is given to ports of other kinds; ports not named
+        keep what they have in the accepted state.
 
         With ``dt`` [s]: the state that much later, the voltages going linearly to these. Without: the static equilibrium.
         ``parent`` is the state to start from, by default the accepted one. A reply with ``need_dt`` asks for a shorter
@@ -305,6 +310,10 @@ class _Question(NamedTuple):
 
     request: Any
     replies: queue.SimpleQueue[Any] | None
+
+
+def _kind(number: int) -> str:
+    return str(device_pb2.PortKind.Name(number)).removeprefix("PORT_KIND_").lower()
 
 
 def _matrix(rows: tuple[str, ...], columns: tuple[str, ...], values: Any) -> dict[str, dict[str, Any]]:

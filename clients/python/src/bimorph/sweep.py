@@ -42,7 +42,19 @@ class PullIn:
     """Port or netlist source; empty: the first."""
 
 
-Analysis = Static | Modes | PullIn
+@dataclass(frozen=True)
+class Transient:
+    """Motion from rest at each point: signals at its end, in columns of their names."""
+
+    stop: float
+    """End time [s]."""
+    signals: Sequence[str]
+    """Signals wanted: ``NODE.x`` [m], ``NODE.vx`` [m/s], ``BEAM.T`` [K], ``GAP.gap`` [m], …"""
+    voltages: Mapping[str, float] = field(default_factory=dict)
+    """Port voltages held during the run [V]."""
+
+
+Analysis = Static | Modes | PullIn | Transient
 
 
 @dataclass(frozen=True)
@@ -57,6 +69,10 @@ class Row:
     """Results that exist at this point; empty when ``error`` is set."""
     error: str
     """Why the point has no result; empty when it has."""
+    estimated_error: float | None = None
+    """Largest estimated relative error of the results by the mesh; None without an estimate."""
+    warning: str = ""
+    """Why the results may be further off than the tolerance; empty when they are not."""
 
 
 @dataclass(frozen=True)
@@ -76,13 +92,15 @@ class Table:
         return [row.parameters.get(name, row.results.get(name)) for row in self.rows]
 
     def to_csv(self) -> str:
-        """CSV with the columns of ``bimorph sweep``: point, parameters, results with units, error."""
+        """CSV with the columns of ``bimorph sweep``: point, parameters, results with units, estimate, warning, error."""
         out = io.StringIO()
         writer = csv.writer(out, lineterminator="\n")
-        writer.writerow(["point", *self.parameters, *(f"{r} [{self.units[r]}]" for r in self.results), "error"])
+        results = (f"{name} [{self.units[name]}]" for name in self.results)
+        writer.writerow(["point", *self.parameters, *results, "estimated_error [1]", "warning", "error"])
         for row in self.rows:
             values = [row.results.get(name, "") for name in self.results]
-            writer.writerow([row.point, *row.parameters.values(), *values, row.error])
+            estimate = "" if row.estimated_error is None else row.estimated_error
+            writer.writerow([row.point, *row.parameters.values(), *values, estimate, row.warning, row.error])
         return out.getvalue()
 
 
@@ -108,6 +126,9 @@ def to_wire(parameters: Mapping[str, Sequence[float | str]], analysis: Analysis,
     voltages = [analysis_pb2.Named(name=name, value=value) for name, value in analysis.voltages.items()]
     if isinstance(analysis, Static):
         spec.static.CopyFrom(sweep_pb2.SweepStatic(outputs=analysis.outputs, voltages=voltages))
+    elif isinstance(analysis, Transient):
+        wire = sweep_pb2.SweepTransient(stop_s=analysis.stop, outputs=analysis.signals, voltages=voltages)
+        spec.transient.CopyFrom(wire)
     else:
         spec.modes.CopyFrom(sweep_pb2.SweepModes(count=analysis.count, voltages=voltages))
     return spec
@@ -142,5 +163,6 @@ def _fetch(channel: Channel, sweep: str) -> Table:
         for row in chunk.rows:
             values = [v.number if v.WhichOneof("value") == "number" else v.text for v in row.parameters]
             present = {name: x for name, x in zip(results, row.results) if x == x}
-            rows.append(Row(row.point, dict(zip(parameters, values)), present, row.error))
+            estimate = row.estimated_error if row.HasField("estimated_error") else None
+            rows.append(Row(row.point, dict(zip(parameters, values)), present, row.error, estimate, row.warning))
     return Table(parameters, results, units, rows)

@@ -61,14 +61,14 @@ pub(in crate::multibody::rcr) fn accelerate<T: Real>(reduction: &mut Reduction<T
 }
 
 /// Whether the processor has vector instructions. Without them eight lanes are eight times the work, and nothing is packed.
-pub(super) fn has_lanes() -> bool {
+pub(crate) fn has_lanes() -> bool {
     !matches!(Arch::new(), Arch::Scalar)
 }
 
 /// Runs `work` over lanes in the widest instructions. It is not compiled for a processor without any: that copy would be the
 /// largest, and never run.
 #[inline(always)]
-pub(super) fn across<W: WithSimd<Output: Default>>(work: W) -> W::Output {
+pub(crate) fn across<W: WithSimd<Output: Default>>(work: W) -> W::Output {
     match Arch::new() {
         #[cfg(target_arch = "x86_64")]
         Arch::V4(simd) => Simd::vectorize(simd, work),

@@ -15,6 +15,7 @@ mod packs;
 mod pins;
 
 pub(super) use dispatch::{accelerate, place, reduce};
+pub(crate) use dispatch::{across, has_lanes};
 pub(super) use kernels::Small;
 pub use lanes::Lanes;
 pub(super) use packs::Packs;

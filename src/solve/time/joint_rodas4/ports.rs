@@ -27,7 +27,6 @@ pub(super) struct Ports {
     placed: Placed<Dual>,
     share: Vec<Pose>,
     wrench: Vec<Pose>,
-    damped: Vec<Pose>,
     change: Drive,
 }
 
@@ -46,8 +45,7 @@ impl Ports {
             forcing: sources.iter().map(|_| (zeros.clone(), zeros.clone())).collect(),
             placed: Placed::new(tree),
             share: zeros.clone(),
-            wrench: zeros.clone(),
-            damped: zeros,
+            wrench: zeros,
             change: closures.electrics.drive(),
         }
     }
@@ -76,7 +74,7 @@ impl Ports {
             }
             // forces are quadratic in gap voltages: the voltage that rate acts on changes too
             ramp.sensitivity(s, source, &mut self.change);
-            self.change.expansion.fill(0.0);
+            self.change.keep_quadratic(&closures.electrics);
             closures.add_drive_force(poses, rate, &self.change, bodies);
         }
     }
@@ -95,9 +93,11 @@ impl Ports {
     ) -> u64 {
         let Joints { tree, closures } = joints;
         let model = &closures.model;
-        let gh = crate::solve::time::rodas4::GAMMA * h;
         for (p, &source) in self.sources.iter().enumerate() {
             let stages = &mut self.stages[p];
+            if i == 0 {
+                stages.set_out(tree, w, &start[2 * p], &start[2 * p + 1]);
+            }
             stages.begin(i, h, &start[2 * p], &start[2 * p + 1]);
             let own = &stages.argument;
             self.placed.place_with(
@@ -128,27 +128,27 @@ impl Ports {
                 *share = -(*share + link.stiffness * strain) - springs[j] * rate;
             }
             // inertia and damping at the start of the step
-            w.motions(tree, |j| &stages.r1[j], &mut self.damped);
-            w.motions(tree, |j| &stages.push[j], &mut self.wrench);
+            stages.move_bodies(i, h, true);
             for (j, body) in model.bodies.iter().enumerate() {
-                let wrench = &mut self.wrench[j];
-                *wrench =
-                    body.mass_diagonal().component_mul(wrench) + body.drag.force(&self.damped[j]) - forcing[j] * rate;
+                self.wrench[j] = body.mass_diagonal().component_mul(&stages.push[j])
+                    + body.drag.force(&stages.drift[j])
+                    - forcing[j] * rate;
             }
             if !model.dampers.is_empty() {
-                forces::add_dampers(model, |k| self.damped[k], &mut self.wrench);
+                forces::add_dampers(model, |k| stages.drift[k], &mut self.wrench);
             }
             w.solve(tree, &mut self.wrench, &mut self.share);
-            stages.keep(i, gh, &self.share);
+            stages.keep(i, &self.share, &self.wrench);
         }
         self.sources.len() as u64
     }
 
-    /// After the last stage: the new sensitivities, and those of the bodies, whose coordinates are at `at`.
-    pub(super) fn finish(&mut self, tree: &Tree, at: &Stages, carried: &mut [Motion], bodies: &mut [Motion]) {
-        for ((stages, carried), bodies) in self.stages.iter().zip(carried.chunks_exact_mut(2)).zip(bodies) {
+    /// After the last stage of a step of length `h` [s]: the new sensitivities, and those of the bodies, whose coordinates
+    /// are at `at`.
+    pub(super) fn finish(&mut self, tree: &Tree, h: f64, at: &Stages, carried: &mut [Motion], bodies: &mut [Motion]) {
+        for ((stages, carried), bodies) in self.stages.iter_mut().zip(carried.chunks_exact_mut(2)).zip(bodies) {
             let [now, push] = carried else { continue };
-            stages.finish(now, push);
+            stages.finish(h, now, push);
             let own = &stages.argument;
             self.placed.place_with(
                 tree,

@@ -1,11 +1,22 @@
 //! Sensitivities with respect to final source voltages: the same stages with the exact tangent of each.
 
+use super::GAMMA;
 use super::stages::Stages;
 use crate::gaps::{Drive, Ramp, System};
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, Model, Pattern};
 use crate::solve::linear::LinearSolver;
 use crate::solve::method::Motion;
+use crate::solve::time::gyration::{Gyration, held_out, skew};
+
+/// How the frame turns: at the start of a step, and in the stage at hand.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Turning {
+    pub(super) start: Gyration,
+    pub(super) now: Gyration,
+    /// Terms of the series that a solve takes.
+    pub(super) terms: usize,
+}
 
 /// Sources whose final voltages the motion is differentiated by, with the stages of each derivative.
 #[derive(Debug, Clone)]
@@ -15,6 +26,7 @@ pub(super) struct Ports {
     /// ∂r/∂q of the stage at hand; without sources on an empty pattern.
     tangent: BlockMatrix<f64, 3>,
     change: Drive,
+    scratch: Vec<Pose>,
 }
 
 impl Ports {
@@ -26,6 +38,7 @@ impl Ports {
             stages: sources.iter().map(|_| Stages::new(model)).collect(),
             tangent: BlockMatrix::new(if sources.is_empty() { &nothing } else { &model.pattern }),
             change: system.electrics.drive(),
+            scratch: vec![Pose::zeros(); if sources.is_empty() { 0 } else { model.bodies.len() }],
         }
     }
 
@@ -56,13 +69,34 @@ impl Ports {
             system.drive_force(q, drive, &self.change, &mut stages.forcing);
             // forces are quadratic in gap voltages: the voltage that rate acts on changes too
             ramp.sensitivity(s, source, &mut self.change);
-            self.change.expansion.fill(0.0);
+            self.change.keep_quadratic(&system.electrics);
             system.add_drive_force(q, rate, &self.change, &mut stages.forcing);
+        }
+    }
+
+    /// Adds to that how Coriolis' force changes with a frame whose rate changes at `rate`: at the start of a step with the
+    /// rates `v` of the motion and `start` of the sensitivities.
+    pub(super) fn begin_turning(
+        &mut self,
+        system: &System,
+        ramp: &Ramp<'_>,
+        s: f64,
+        (v, rate): (&[Pose], Gyration),
+        start: &[Motion],
+    ) {
+        for ((stages, &source), start) in self.stages.iter_mut().zip(&self.sources).zip(start) {
+            ramp.rate_sensitivity(s, source, &mut self.change);
+            let change = system.frame(&self.change).map(Gyration::new).unwrap_or_default();
+            for (k, body) in system.model.bodies.iter().enumerate() {
+                let force = skew(body, change.rate, &v[k]) + skew(body, rate.rate, &start.v[k]);
+                stages.forcing[k] += held_out(body, force);
+            }
         }
     }
 
     /// Stage `i` at time `s` [s] of the ramp, of a step of length `h` [s] from the sensitivities `start`, where the motion
     /// is at `q` under `drive`. Returns the number of solves.
+    #[allow(clippy::too_many_arguments)]
     pub(super) fn stage<S: LinearSolver>(
         &mut self,
         system: &System,
@@ -70,18 +104,38 @@ impl Ports {
         (i, s, h): (usize, f64, f64),
         (q, drive): (&[Pose], &Drive),
         (solver, w): (&S, &BlockMatrix<f64, 3>),
+        turning: Option<(&Stages, Turning)>,
         start: &mut [Motion],
     ) -> u64 {
         let model = &system.model;
+        let mut solves = self.sources.len();
         for ((stages, &source), start) in self.stages.iter_mut().zip(&self.sources).zip(start) {
             stages.begin(model, i, h, start);
+            if let Some((_, turning)) = turning {
+                stages.add_gyration(model, (i, h), turning.now, turning.start);
+            }
             let (at, force) = stages.place(i, start);
             self.tangent.multiply_add(&model.pattern, at, force);
             ramp.sensitivity(s, source, &mut self.change);
+            if let Some((motion, turning)) = turning {
+                let change = system.frame(&self.change).map(Gyration::new).unwrap_or_default();
+                for (k, body) in model.bodies.iter().enumerate() {
+                    // the stage's matrix holds Euler's share and changes with it, times minus the increment
+                    force[k] += skew(body, turning.now.turning, &at[k])
+                        + skew(body, change.rate, &motion.speed(i, h, k))
+                        - skew(body, change.turning, &motion.force[k]);
+                }
+            }
             system.add_drive_force(q, drive, &self.change, force);
             solver.solve(&model.pattern, w, force);
+            if let Some((_, turning)) = turning {
+                turning.start.complete(model, GAMMA * h, turning.terms, &mut self.scratch, force, |x| {
+                    solver.solve(&model.pattern, w, x);
+                });
+                solves += turning.terms;
+            }
         }
-        self.sources.len() as u64
+        solves as u64
     }
 
     /// After the last stage: the new sensitivities.

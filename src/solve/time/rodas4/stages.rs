@@ -10,6 +10,7 @@ use super::{A, C, GAMMA, GAMMA_I};
 use crate::multibody::planar::Pose;
 use crate::multibody::{Body, Model, forces};
 use crate::solve::method::Motion;
+use crate::solve::time::gyration::{Gyration, skew};
 
 /// Bodies of a tile.
 const TILE: usize = 16;
@@ -60,6 +61,11 @@ impl Stages {
     /// Displacements where stage `i` evaluates the forces.
     pub(super) fn place<'a>(&'a mut self, i: usize, motion: &'a Motion) -> (&'a [Pose], &'a mut [Pose]) {
         (if i < IN_PLACE { &self.at } else { &motion.q }, &mut self.force)
+    }
+
+    /// The same places alone.
+    pub(super) fn at<'a>(&'a self, i: usize, motion: &'a Motion) -> &'a [Pose] {
+        if i < IN_PLACE { &self.at } else { &motion.q }
     }
 
     /// Begins stage `i` of a step of length `h` [s] from `motion`; the stage before it has been solved.
@@ -120,6 +126,21 @@ impl Stages {
                 (0..I).fold(Pose::zeros(), |lag, j| lag - tile[j][k % TILE].q * c[j])
             };
             forces::add_dampers(model, lag, &mut self.force);
+        }
+    }
+
+    /// Rate of body `k` where stage `i` of a step of length `h` [s] takes the forces, which has begun.
+    pub(super) fn speed(&self, i: usize, h: f64, k: usize) -> Pose {
+        let tile = &self.tiles[k / TILE];
+        (0..i).fold(self.r1[k], |speed, j| speed - tile[j][k % TILE].q * (C[i][j] / h))
+    }
+
+    /// Adds Coriolis' force to that of stage `i`, with the frame's motion of `now` and, in the matrix, of the `start` of the
+    /// step.
+    pub(super) fn add_gyration(&mut self, model: &Model, (i, h): (usize, f64), now: Gyration, start: Gyration) {
+        for (k, body) in model.bodies.iter().enumerate() {
+            let force = skew(body, now.rate, &self.speed(i, h, k)) - skew(body, start.rate, &self.r1[k]);
+            self.force[k] += force;
         }
     }
 

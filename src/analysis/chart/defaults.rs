@@ -1,0 +1,186 @@
+//! What is asked for and what comes out: default analyses by their tolerance alone, each against one of a tenth of the tightest.
+//!
+//! Every point is the analysis as a command makes it: from the drawing, with the mesh that it chooses, and with what it tells of its
+//! own error. The static equilibrium is that under the loads and voltages of the run, and the modes are those about where the run
+//! goes to. Errors are those of the worst node relative to its own displacement (or a thirtieth of the largest), of the worst mode, and of
+//! runs as elsewhere ([`relative_error`]).
+
+use super::error::relative_error;
+use super::runs::Progress;
+use super::variant::Variant;
+use super::{Chart, ChartError, ChartPoint, ChartSpec, Formulation, Measured, Part};
+use crate::analysis::integrator::Integrator;
+use crate::analysis::mesh::fitted_in_time;
+use crate::analysis::modes::modes_fitted;
+use crate::analysis::statics::{NodeMotion, static_fitted};
+use crate::analysis::step_error::with_step_error;
+use crate::analysis::transient::{TransientOptions, TransientResult, transient};
+use crate::analysis::{AnalysisError, Watch};
+use crate::compile::CompileOptions;
+use crate::netlist::Bundle;
+use crate::solve::baseline::SolverKind;
+use std::time::Instant;
+
+/// Modes that are compared.
+const COUNT: usize = 5;
+/// How much tighter than the tightest tolerance of the list a reference is.
+const TIGHTER: f64 = 0.1;
+/// Share of the largest displacement below which errors are relative to that.
+const SMALL: f64 = 1.0 / 30.0;
+/// Analyses.
+pub(super) const ANALYSES: [&str; 3] = ["static", "modes", "tran"];
+
+/// What an analysis gives.
+enum Found {
+    Nodes(Vec<(String, NodeMotion)>),
+    Frequencies(Vec<f64>),
+    Run(Box<TransientResult>),
+}
+
+/// One analysis: what it gives, what it tells of its error, and its work.
+struct Done {
+    found: Found,
+    told: Option<f64>,
+    unknowns: usize,
+    measured: Measured,
+}
+
+/// The points of every analysis and tolerance.
+///
+/// # Errors
+/// Those of a reference; a point that fails says so.
+pub(super) fn defaults(
+    (bundle, options): (&Bundle, &CompileOptions),
+    (spec, stop): (&ChartSpec, f64),
+    chart: &mut Chart,
+    progress: &mut Progress<'_>,
+) -> Result<(), ChartError> {
+    let tight = TIGHTER * spec.tols.iter().copied().fold(f64::INFINITY, f64::min);
+    for analysis in ANALYSES {
+        let mut at = |tol: f64| {
+            let done = analyse((bundle, options), (spec, stop), analysis, tol, &mut |f| progress.run(f));
+            progress.done += 1.0;
+            if progress.run(0.0) { done } else { Err(AnalysisError::Cancelled.into()) }
+        };
+        let reference = match at(tight) {
+            Ok(reference) if still(&reference.found) => continue,
+            Err(error @ ChartError::Analysis(AnalysisError::Cancelled)) => return Err(error),
+            reference => reference,
+        };
+        for &tol in &spec.tols {
+            let point = ChartPoint {
+                part: Part::Defaults,
+                formulation: Formulation::Compliant,
+                method: analysis,
+                solver: SolverKind::Recursion.name(),
+                tol,
+                band_hz: options.band,
+                unknowns: 0,
+                measured: None,
+                failed: None,
+            };
+            let compared = match (&reference, at(tol)) {
+                (_, Err(error @ ChartError::Analysis(AnalysisError::Cancelled))) => return Err(error),
+                (Err(error), _) => Err(format!("the reference: {error}")),
+                (_, Err(error)) => Err(error.to_string()),
+                (Ok(reference), Ok(done)) => Ok(Done {
+                    measured: Measured {
+                        error: Some(apart(&reference.found, &done.found)),
+                        told: done.told,
+                        ..done.measured
+                    },
+                    ..done
+                }),
+            };
+            chart.points.push(match compared {
+                Ok(done) => ChartPoint { unknowns: done.unknowns, measured: Some(done.measured), ..point },
+                Err(reason) => ChartPoint { failed: Some(reason), ..point },
+            });
+        }
+    }
+    Ok(())
+}
+
+/// One analysis from the drawing at one tolerance.
+fn analyse(
+    (bundle, options): (&Bundle, &CompileOptions),
+    (spec, stop): (&ChartSpec, f64),
+    analysis: &str,
+    tol: f64,
+    watch: Watch<'_>,
+) -> Result<Done, ChartError> {
+    let begun = Instant::now();
+    let options = CompileOptions { tol, ..options.clone() };
+    let drawn = Variant::new(bundle, &options, options.band, spec.release.as_deref())?;
+    let mut measured = Measured::default();
+    let (found, told, unknowns) = match analysis {
+        "static" => {
+            let (fitted, result, _) = static_fitted(drawn.held().unwrap_or(drawn.moving()), &spec.voltages)?;
+            (Found::Nodes(result.nodes), fitted.order.estimated_error, result.unknowns)
+        }
+        "modes" => {
+            let (fitted, result, _) = modes_fitted(drawn.moving(), COUNT, &spec.voltages)?;
+            (Found::Frequencies(result.frequencies_hz), fitted.order.estimated_error, result.unknowns)
+        }
+        _ => {
+            let asked = TransientOptions {
+                stop,
+                signals: spec.signals.clone(),
+                points: spec.points,
+                tol,
+                voltages: spec.voltages.clone(),
+                release: drawn.held(),
+                method: Integrator::default(),
+                ..TransientOptions::default()
+            };
+            let (moving, start) = fitted_in_time(drawn.moving(), &asked)?;
+            let asked = TransientOptions { release: start.as_ref(), ..asked };
+            let mut run = |options: &TransientOptions<'_>, sample: &mut dyn FnMut(f64, &[f64]), watch: Watch<'_>| {
+                transient(&moving, options, sample, watch).map(|r| (r, ()))
+            };
+            let (result, ()) = with_step_error(&asked, moving.unknowns(), &mut run, &mut |_, _| (), watch)?;
+            let c = result.counters;
+            measured = Measured {
+                steps: c.steps,
+                rejected: c.rejected,
+                factorizations: c.factorizations,
+                solves: c.solves,
+                forces: c.forces,
+                ..measured
+            };
+            let told = result.estimated_error.map(|mesh| mesh.max(result.step_error.unwrap_or(0.0)));
+            let unknowns = result.unknowns;
+            (Found::Run(Box::new(result)), told, unknowns)
+        }
+    };
+    measured.seconds = begun.elapsed().as_secs_f64();
+    Ok(Done { found, told, unknowns, measured })
+}
+
+/// Nothing moves: nothing to compare.
+fn still(found: &Found) -> bool {
+    match found {
+        Found::Nodes(nodes) => nodes.iter().all(|(_, m)| m.x == 0.0 && m.y == 0.0),
+        Found::Frequencies(frequencies) => frequencies.is_empty(),
+        Found::Run(run) => run.signals.iter().all(|(_, _, values)| values.iter().all(|v| *v == values[0])),
+    }
+}
+
+/// The relative error of one result against another.
+fn apart(reference: &Found, found: &Found) -> f64 {
+    match (reference, found) {
+        (Found::Nodes(want), Found::Nodes(got)) => {
+            let size = |m: &NodeMotion| m.x.hypot(m.y);
+            let largest = want.iter().map(|(_, m)| size(m)).fold(0.0, f64::max);
+            let one = |((_, w), (_, g)): (&(String, NodeMotion), &(String, NodeMotion))| {
+                (w.x - g.x).hypot(w.y - g.y) / size(w).max(SMALL * largest)
+            };
+            want.iter().zip(got).map(one).fold(0.0, f64::max)
+        }
+        (Found::Frequencies(want), Found::Frequencies(got)) if want.len() == got.len() => {
+            want.iter().zip(got).map(|(w, g)| (g / w - 1.0).abs()).fold(0.0, f64::max)
+        }
+        (Found::Run(want), Found::Run(got)) => relative_error(want, got),
+        _ => f64::INFINITY,
+    }
+}

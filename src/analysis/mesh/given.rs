@@ -1,0 +1,120 @@
+//! An analysis on a mesh that was chosen for another variant of the same drawing: its result, with the estimate of its error,
+//! and whether a search of this variant's own would have been content with it.
+//!
+//! The estimate is that of the search: for statics and pull-in the difference to twice the segments, for modes what the next
+//! term of the beams' stiffness says. The result of the coarser mesh is that of the analysis, so that nothing is computed
+//! twice.
+
+use super::super::modes::{ModesResult, modes};
+use super::super::pull_in::{PullInResult, pull_in};
+use super::super::statics::{StaticResult, result_at, static_equilibrium};
+use super::super::{AnalysisError, PortVoltages};
+use super::{Request, equilibrium, frequency_outputs, loaded, meshed, pull_in_outputs, worst};
+use crate::compile::Compiled;
+use crate::refine::counted;
+use crate::refine::doubling::{self, Output};
+
+/// What an analysis found.
+#[derive(Debug, Clone)]
+pub(crate) enum Answer {
+    /// Of [`Request::Static`].
+    Static(StaticResult),
+    /// Of [`Request::Modes`].
+    Modes(ModesResult),
+    /// Of [`Request::PullIn`].
+    PullIn(PullInResult),
+}
+
+/// The result on a given mesh.
+#[derive(Debug, Clone)]
+pub(crate) struct Judged {
+    /// The result.
+    pub(crate) answer: Answer,
+    /// Largest estimated relative error by the mesh [1]; none without an estimate.
+    pub(crate) estimated_error: Option<f64>,
+    /// A search for this variant's own mesh would have stopped here.
+    pub(crate) holds: bool,
+}
+
+/// The result of a request on the mesh of `compiled`.
+///
+/// # Errors
+/// What the analysis has against the model.
+pub(crate) fn judged(compiled: &Compiled, request: &Request<'_>) -> Result<Judged, AnalysisError> {
+    match *request {
+        Request::Static { voltages } => still(compiled, voltages),
+        Request::Modes { count, voltages } => swinging(compiled, count, voltages),
+        Request::PullIn { port, max } => closing(compiled, port, max),
+    }
+}
+
+/// The result of a request on the mesh of `compiled`, whose estimate is known.
+///
+/// # Errors
+/// What the analysis has against the model.
+pub(crate) fn answered(compiled: &Compiled, request: &Request<'_>) -> Result<Answer, AnalysisError> {
+    Ok(match *request {
+        Request::Static { voltages } => Answer::Static(static_equilibrium(compiled, voltages)?),
+        Request::Modes { count, voltages } => Answer::Modes(modes(compiled, count, voltages)?),
+        Request::PullIn { port, max } => Answer::PullIn(pull_in(compiled, port, max)?),
+    })
+}
+
+/// Within the share of the tolerance that a comparison with twice the segments may use.
+fn within(compiled: &Compiled, error: Option<f64>) -> bool {
+    error.is_some_and(|error| error <= doubling::SAFETY * compiled.options.tol)
+}
+
+fn still(compiled: &Compiled, voltages: &PortVoltages) -> Result<Judged, AnalysisError> {
+    let (point, estimated_error) = equilibrium::judged(compiled, voltages)?;
+    let answer = Answer::Static(result_at(compiled, &point));
+    Ok(Judged { answer, estimated_error, holds: within(compiled, estimated_error) })
+}
+
+fn swinging(compiled: &Compiled, count: usize, voltages: &PortVoltages) -> Result<Judged, AnalysisError> {
+    let found = modes(compiled, count, voltages)?;
+    // a mesh without so many modes says nothing about those that it lacks
+    let all = found.frequencies_hz.len() == count;
+    let own = worst(found.errors.iter().copied());
+    let sure = own.is_some_and(|error| error <= counted::SAFETY * compiled.options.tol);
+    let loaded = loaded(compiled, voltages);
+    let (own, sure) = match own {
+        Some(_) if sure || !loaded => (own, sure),
+        _ => doubled(compiled, &found, count, voltages)?,
+    };
+    let moved = if loaded { equilibrium::judged(compiled, voltages)?.1 } else { Some(0.0) };
+    let estimated_error = moved.zip(own).map(|(a, b)| a.max(b));
+    let holds = all && sure && within(compiled, moved);
+    Ok(Judged { answer: Answer::Modes(found), estimated_error, holds })
+}
+
+/// Frequencies compared with those of twice the segments.
+fn doubled(
+    compiled: &Compiled,
+    found: &ModesResult,
+    count: usize,
+    voltages: &PortVoltages,
+) -> Result<(Option<f64>, bool), AnalysisError> {
+    let mut first = Some(frequency_outputs(found, count));
+    let order = doubling::estimate(&compiled.options, compiled.order.segments.clone(), &mut |segments| {
+        if let Some(known) = first.take() {
+            return Ok(known);
+        }
+        let model = meshed(compiled, segments)?;
+        Ok::<_, AnalysisError>(frequency_outputs(&modes(&model, count, voltages)?, count))
+    })?;
+    Ok((order.estimated_error, within(compiled, order.estimated_error)))
+}
+
+fn closing(compiled: &Compiled, port: Option<&str>, max: f64) -> Result<Judged, AnalysisError> {
+    let found = pull_in(compiled, port, max)?;
+    let mut first: Option<Vec<Output>> = Some(pull_in_outputs(&found));
+    let order = doubling::estimate(&compiled.options, compiled.order.segments.clone(), &mut |segments| {
+        if let Some(known) = first.take() {
+            return Ok(known);
+        }
+        Ok::<_, AnalysisError>(pull_in_outputs(&pull_in(&*meshed(compiled, segments)?, port, max)?))
+    })?;
+    let estimated_error = order.estimated_error;
+    Ok(Judged { answer: Answer::PullIn(found), estimated_error, holds: within(compiled, estimated_error) })
+}

@@ -1,0 +1,81 @@
+//! What fitting a model to a request warns of.
+
+use super::super::gap_pieces;
+use super::super::statics::OperatingPoint;
+use crate::compile::Compiled;
+use crate::netlist::{Diagnostic, Severity};
+
+/// Code of the warning that a mesh does not hold the tolerance.
+pub(crate) const WARNING: &str = "W040";
+/// Code of the warning that a gap along beams has too few pieces.
+const PIECES: &str = "W042";
+/// Code of the warning that a linear model leaves out what its stress does.
+const STRESS: &str = "W041";
+
+/// What fitting a model to a request warns of, as sentences for who has no other way to see them.
+pub fn warnings(fitted: &Compiled) -> impl Iterator<Item = String> {
+    fitted
+        .warnings
+        .items
+        .iter()
+        .filter(|d| [WARNING, STRESS, PIECES].contains(&d.code.as_str()))
+        .map(|d| d.message.clone())
+}
+
+/// What to say of an estimate that is beyond the tolerance, or missing.
+pub(crate) fn beyond(tol: f64, estimated_error: Option<f64>) -> Option<String> {
+    match estimated_error {
+        Some(error) if error <= 1.05 * tol => None,
+        Some(error) => Some(format!("the mesh may be off by {error:.1e}, more than the tolerance {tol:e}")),
+        None => Some(format!("nothing tells how far the mesh is off: the tolerance {tol:e} is not confirmed")),
+    }
+}
+
+/// Says so where a linear model leaves out more than the tolerance.
+pub(super) fn warn_of_stress(compiled: &mut Compiled, share: Option<f64>) {
+    let tol = compiled.options.tol;
+    let Some(share) = share.filter(|share| *share > tol) else { return };
+    let message = if share.is_finite() {
+        format!(
+            "the linear model leaves out what stress does to stiffness: it would change the deflection by {share:.1e}"
+        )
+    } else {
+        "the linear model leaves out what stress does to stiffness: the part would buckle".into()
+    };
+    let help = "leave --linear away; modes have the stiffness of stress with it too";
+    compiled.warnings.items.push(warning(STRESS, message, help));
+}
+
+/// Says so where a gap along beams has too few pieces at one of these equilibria, whose results are off by so many times the share of
+/// its distance that is left out.
+pub(super) fn warn_of_pieces(compiled: &mut Compiled, points: &[(OperatingPoint, f64)]) {
+    let tol = compiled.options.tol;
+    let one = |(point, times): &(OperatingPoint, f64)| {
+        let (name, share) = gap_pieces::left_out(compiled, &point.q, &point.volts)?;
+        Some((name.to_owned(), times * share))
+    };
+    let worst = points.iter().filter_map(one).max_by(|a, b| a.1.total_cmp(&b.1));
+    let Some((name, error)) = worst.filter(|(_, error)| *error > tol) else { return };
+    let message = format!(
+        "`{name}` acts on the ends of its beams, which would bend between them too: it may be off by {error:.1e}, more than the \
+         tolerance {tol:e}"
+    );
+    compiled.warnings.items.push(warning(
+        PIECES,
+        message,
+        "divide the beams: draw several gaps in a row between further nodes",
+    ));
+}
+
+pub(super) fn warning(code: &str, message: String, help: &str) -> Diagnostic {
+    Diagnostic {
+        code: code.into(),
+        severity: Severity::Warning,
+        file: String::new(),
+        line: 0,
+        column: 0,
+        width: 0,
+        message,
+        help: help.into(),
+    }
+}

@@ -1,0 +1,230 @@
+//! What ports are: electrical ones of the netlist, and those that any node, heated beam or the frame offers by name.
+//!
+//! | name | kind | given | answered |
+//! |---|---|---|---|
+//! | of a `port` element | electrical | voltage [V] | current [A] and charge [C] |
+//! | `NODE.x`, `.y`, `.rz` | mechanical | force [N], moment [N·m] | displacement [m, rad] |
+//! | `NODE.vx`, `.vy`, `.vrz` | mechanical | force [N], moment [N·m] | velocity [m/s, rad/s] |
+//! | `BEAM.T` | thermal | heat into the beam [W] | its mean rise above ambient [K] |
+//! | `frame.ax`, `.ay`, `.wz` | inertial | acceleration [m/s²], rate [rad/s] of the frame | nothing |
+//!
+//! The frame's rate needs the compliant formulation.
+//!
+//! A mechanical port is given the force and answers with the motion, not the other way round, so that one which nothing is
+//! connected to is free, and the mechanism's own integrator moves it whatever steps the circuit takes.
+
+use super::DeviceError;
+use crate::analysis::signal::Signal;
+use crate::compile::Compiled;
+use crate::equations::Joints;
+use crate::gaps::inputs::Input;
+use crate::gaps::{Point, System};
+use crate::multibody::BodyId;
+use serde::{Deserialize, Serialize};
+use std::collections::HashMap;
+use std::sync::Arc;
+
+/// Kind of a port, with what is given to it and what it answers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum PortKind {
+    /// Voltage; current and charge.
+    #[default]
+    Electrical,
+    /// Force; displacement.
+    Force,
+    /// Moment; rotation.
+    Moment,
+    /// Force; velocity.
+    ForceRate,
+    /// Moment; rate of rotation.
+    MomentRate,
+    /// Heat; rise above ambient.
+    Thermal,
+    /// Acceleration of the frame; nothing.
+    Acceleration,
+    /// Rate of the frame; nothing.
+    Rate,
+}
+
+impl PortKind {
+    /// Every kind, in the order of its number on the wire.
+    pub const ALL: [Self; 8] = [
+        Self::Electrical,
+        Self::Force,
+        Self::Moment,
+        Self::ForceRate,
+        Self::MomentRate,
+        Self::Thermal,
+        Self::Acceleration,
+        Self::Rate,
+    ];
+
+    /// What is given, and its unit.
+    pub fn given(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Electrical => ("voltage", "V"),
+            Self::Force | Self::ForceRate => ("force", "N"),
+            Self::Moment | Self::MomentRate => ("moment", "N·m"),
+            Self::Thermal => ("heat", "W"),
+            Self::Acceleration => ("acceleration", "m/s²"),
+            Self::Rate => ("rate", "rad/s"),
+        }
+    }
+
+    /// What is answered, and its unit; for an inertial port nothing.
+    pub fn answered(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Electrical => ("current", "A"),
+            Self::Force => ("displacement", "m"),
+            Self::Moment => ("rotation", "rad"),
+            Self::ForceRate => ("velocity", "m/s"),
+            Self::MomentRate => ("rate of rotation", "rad/s"),
+            Self::Thermal => ("rise", "K"),
+            Self::Acceleration | Self::Rate => ("nothing", ""),
+        }
+    }
+
+    /// Whether the flow is given and the answer is what lies across the port: mechanical and thermal ports.
+    pub fn given_flow(self) -> bool {
+        !matches!(self, Self::Electrical | Self::Acceleration | Self::Rate)
+    }
+}
+
+/// How a port answers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Answer {
+    /// With the current and charge of this source.
+    Current,
+    /// With a motion.
+    Motion(Signal),
+    /// With the rise of this heater.
+    Rise(usize),
+    /// Not at all.
+    Nothing,
+}
+
+/// The ports that a session was opened with.
+#[derive(Debug)]
+pub(super) struct Ports {
+    /// Index of each in the source vector.
+    pub(super) sources: Vec<usize>,
+    pub(super) kinds: Vec<PortKind>,
+    pub(super) answers: Vec<Answer>,
+    /// The model with the inputs among them; none where there are none.
+    pub(super) system: Option<Arc<System>>,
+}
+
+impl Ports {
+    /// Finds ports by name; no names: every electrical one.
+    ///
+    /// # Errors
+    /// [`DeviceError::UnknownPort`], [`DeviceError::BadRequest`] for a port that cannot be.
+    pub(super) fn find(compiled: &Compiled, names: &[String]) -> Result<Self, DeviceError> {
+        let system = &compiled.parts.system;
+        let electrics = &system.electrics;
+        let known: HashMap<&str, usize> =
+            electrics.names[..electrics.ports].iter().enumerate().map(|(k, name)| (name.as_str(), k)).collect();
+        let mut found = Self { sources: Vec::new(), kinds: Vec::new(), answers: Vec::new(), system: None };
+        if names.is_empty() {
+            found.sources = (0..electrics.ports).collect();
+            found.kinds = vec![PortKind::Electrical; electrics.ports];
+            found.answers = vec![Answer::Current; electrics.ports];
+            return Ok(found);
+        }
+        let mut inputs = Vec::new();
+        for name in names {
+            crate::budget::check();
+            let (source, kind, answer) = match known.get(name.as_str()) {
+                Some(&source) => (source, PortKind::Electrical, Answer::Current),
+                None => {
+                    let (input, kind, answer) = offered(compiled, name)?;
+                    inputs.push(input);
+                    (electrics.voltages() + inputs.len() - 1, kind, answer)
+                }
+            };
+            found.sources.push(source);
+            found.kinds.push(kind);
+            found.answers.push(answer);
+        }
+        if !inputs.is_empty() {
+            found.system = Some(Arc::new(System { electrics: electrics.with_inputs(inputs), ..system.clone() }));
+        }
+        Ok(found)
+    }
+
+    /// How many they are.
+    pub(super) fn len(&self) -> usize {
+        self.sources.len()
+    }
+
+    /// Joint coordinates of the model with the inputs.
+    pub(super) fn joints(&self, joints: &Arc<Joints>) -> Arc<Joints> {
+        match &self.system {
+            None => Arc::clone(joints),
+            Some(system) => {
+                let closures = System { electrics: system.electrics.clone(), ..joints.closures.clone() };
+                Arc::new(Joints { tree: joints.tree.clone(), closures })
+            }
+        }
+    }
+}
+
+/// The port that a node, a beam or the frame offers under this name.
+fn offered(compiled: &Compiled, name: &str) -> Result<(Input, PortKind, Answer), DeviceError> {
+    let inertial = |input, kind| Ok((input, kind, Answer::Nothing));
+    match name {
+        "frame.ax" => return inertial(Input::Acceleration { axis: 0 }, PortKind::Acceleration),
+        "frame.ay" => return inertial(Input::Acceleration { axis: 1 }, PortKind::Acceleration),
+        "frame.wz" if compiled.joints.is_some() => {
+            return Err(DeviceError::BadRequest {
+                what: "ports",
+                expected: "formulation=compliant, in which a frame may turn".into(),
+                got: format!("\"{name}\" with formulation={}", compiled.options.formulation.name()),
+            });
+        }
+        "frame.wz" => return inertial(Input::Rate, PortKind::Rate),
+        _ => {}
+    }
+    let refused = |expected: &str, got: &str| {
+        Err(DeviceError::BadRequest { what: "ports", expected: expected.into(), got: format!("\"{name}\", {got}") })
+    };
+    match Signal::find(compiled, name) {
+        Ok(signal @ (Signal::Displacement(point, direction) | Signal::Rate(point, direction))) => {
+            if !movable(&compiled.parts.system, point, direction) {
+                return refused("a node and a direction that can move", "which is held");
+            }
+            let kind = match (signal, direction) {
+                (Signal::Displacement(..), 2) => PortKind::Moment,
+                (Signal::Displacement(..), _) => PortKind::Force,
+                (_, 2) => PortKind::MomentRate,
+                _ => PortKind::ForceRate,
+            };
+            Ok((Input::Force { point, direction }, kind, Answer::Motion(signal)))
+        }
+        Ok(Signal::Temperature(heater)) => Ok((Input::Heat { heater }, PortKind::Thermal, Answer::Rise(heater))),
+        Ok(Signal::Prescribed(_)) => refused(
+            "a beam that knows heat",
+            "whose temperature is prescribed; draw it as beam2det to give it a thermal port",
+        ),
+        Ok(Signal::Charge(_) | Signal::Distance(_)) => {
+            refused("NODE.x|y|rz|vx|vy|vrz, BEAM.T or frame.ax|ay|wz", "which can be monitored but not driven")
+        }
+        Err(_) => {
+            let electrics = &compiled.parts.system.electrics;
+            let available = electrics.names[..electrics.ports].to_vec();
+            Err(DeviceError::UnknownPort { name: name.into(), available })
+        }
+    }
+}
+
+/// Whether a force in that direction does anything.
+fn movable(system: &System, point: Point, direction: usize) -> bool {
+    let BodyId::Free(k) = point.body else { return false };
+    let Some(free) = &system.model.bodies[k].free else { return true };
+    let mut wrench = nalgebra::Vector3::zeros();
+    wrench[direction] = 1.0;
+    if direction < 2 {
+        wrench.z = if direction == 0 { -point.arm.y } else { point.arm.x };
+    }
+    (**free * wrench).amax() > 0.0
+}

@@ -1,0 +1,86 @@
+//! The meshes that the points of a sweep share.
+//!
+//! To search a mesh costs some ten times what the analysis costs, and variants of one drawing need much the same. So meshes
+//! are searched at one point of the grid, the middle one, for a share of the tolerance that leaves room for the others; each
+//! point then takes the first of these meshes on which the estimate of its own error holds, and where none does (or where
+//! the drawing has other beams) searches its own, as a point alone does. Which mesh a point gets depends on the
+//! grid and on the point alone, not on other points, on shards or on threads.
+
+use super::SweepSpec;
+use crate::analysis::AnalysisError;
+use crate::analysis::mesh::given::{Judged, judged};
+use crate::analysis::mesh::{self, Request};
+use crate::compile::{CompileOptions, Compiled, Drawn, draw};
+use crate::discretize::DiscretizeError;
+use crate::netlist::Source;
+use crate::refine::model_order::ModelOrder;
+use crate::structure::Beam;
+use std::sync::OnceLock;
+
+/// Shares of the tolerance for which meshes are searched, from coarse to fine.
+const SHARES: [f64; 3] = [0.6, 0.2, 0.06];
+
+/// See the module.
+pub(super) struct Family<'a> {
+    spec: &'a SweepSpec,
+    source: &'a Source,
+    options: &'a CompileOptions,
+    first: OnceLock<Option<Compiled>>,
+    meshes: [OnceLock<Option<Vec<usize>>>; SHARES.len()],
+}
+
+impl<'a> Family<'a> {
+    pub(super) fn new(spec: &'a SweepSpec, source: &'a Source, options: &'a CompileOptions) -> Self {
+        Self { spec, source, options, first: OnceLock::new(), meshes: Default::default() }
+    }
+
+    /// The result of a point on the first shared mesh that holds for it; none where it needs its own.
+    pub(super) fn solve(&self, drawn: &Drawn, request: &Request<'_>) -> Result<Option<Judged>, AnalysisError> {
+        let Some(first) = self.like(drawn) else { return Ok(None) };
+        for (mesh, share) in self.meshes.iter().zip(SHARES) {
+            let Some(segments) = mesh.get_or_init(|| search(first, share, request)) else { continue };
+            let order = ModelOrder { segments: segments.clone(), estimated_error: None, modes_in_band: 0, passes: 0 };
+            let refused = |error: DiscretizeError| AnalysisError::NotConverged { detail: error.to_string() };
+            let judged = judged(&drawn.clone().on(order).map_err(refused)?, request)?;
+            if judged.holds {
+                return Ok(Some(judged));
+            }
+        }
+        Ok(None)
+    }
+
+    /// The variant that meshes are searched for, where they fit this one.
+    fn like(&self, drawn: &Drawn) -> Option<&Compiled> {
+        let own = self.options.segments.is_some() || self.options.band.is_some();
+        if own || drawn.structure.beams.is_empty() || self.spec.grid_points().ok()? < 2 {
+            return None;
+        }
+        let first = self.first.get_or_init(|| self.middle()).as_ref()?;
+        alike(&first.structure.beams, &drawn.structure.beams).then_some(first)
+    }
+
+    /// The middle of the grid.
+    fn middle(&self) -> Option<Compiled> {
+        let options = super::point::at(self.options, &self.spec.settings(middle(self.spec)));
+        draw(self.source, &options).ok()?.compile().ok()
+    }
+}
+
+/// The mesh that holds a share of the tolerance for one variant.
+fn search(first: &Compiled, share: f64, request: &Request<'_>) -> Option<Vec<usize>> {
+    let mut sharper = first.clone();
+    sharper.options.tol *= share;
+    let order = mesh::order(&sharper, request).ok()?;
+    order.estimated_error.is_some_and(|error| error <= sharper.options.tol).then_some(order.segments)
+}
+
+/// Number of the middle of a grid.
+pub(super) fn middle(spec: &SweepSpec) -> usize {
+    spec.parameters.iter().fold(0, |number, axis| number * axis.values.len() + axis.values.len() / 2)
+}
+
+/// True for beams of the same names between the same nodes.
+pub(super) fn alike(a: &[Beam], b: &[Beam]) -> bool {
+    let same = |(a, b): (&Beam, &Beam)| (a.a, a.b) == (b.a, b.b) && a.name == b.name;
+    a.len() == b.len() && a.iter().zip(b).all(same)
+}

@@ -1,0 +1,206 @@
+//! The points of a sweep of transients: some dozens at a time, side by side.
+//!
+//! To find the mesh of a transient costs more than to run it. So meshes are found at the corners of the grid and in its middle
+//! (`probes`); all points take what is the finest of them beam by beam, and are told the largest of their estimates. A
+//! point whose drawing has other beams finds its own.
+
+use super::family::{alike, middle};
+use super::point::{Found, Outcome, Value, at, brief};
+use super::{SweepAnalysis, SweepSpec};
+use crate::analysis::AnalysisError;
+use crate::analysis::mesh;
+use crate::analysis::side_by_side::{self, RunEnd};
+use crate::analysis::signal::Signal;
+use crate::analysis::transient::{TransientOptions, transient};
+use crate::budget::{self, Budget};
+use crate::compile::{CompileOptions, Compiled, draw};
+use crate::netlist::{Setting, Source};
+use crate::refine::model_order::ModelOrder;
+use crate::structure::Beam;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::OnceLock;
+
+/// Points that are laid out at once.
+pub(super) const CHUNK: usize = 64;
+/// Axes whose corners are all looked at; of more, the ends of each with the others in the middle.
+const MOST_CORNERS: usize = 3;
+
+/// The mesh of a sweep.
+struct Shared {
+    beams: Vec<Beam>,
+    order: ModelOrder,
+}
+
+/// What all points have in common.
+pub(super) struct Transients<'a> {
+    spec: &'a SweepSpec,
+    source: &'a Source,
+    options: &'a CompileOptions,
+    mesh: OnceLock<Option<Shared>>,
+}
+
+impl<'a> Transients<'a> {
+    pub(super) fn new(spec: &'a SweepSpec, source: &'a Source, options: &'a CompileOptions) -> Self {
+        Self { spec, source, options, mesh: OnceLock::new() }
+    }
+
+    /// Runs some points; `finished` is told of each, whether it has a result, and says whether to go on. None where it said no.
+    pub(super) fn run(
+        &self,
+        numbers: &[usize],
+        budget: Option<&Budget>,
+        finished: &(dyn Fn(Option<&Outcome>) -> bool + Sync),
+    ) -> Option<Vec<Outcome>> {
+        let options = self.transient();
+        let within = |job: &mut dyn FnMut() -> Result<Found, String>| guarded(budget, job);
+        let prepared: Vec<Result<Compiled, String>> =
+            numbers.iter().map(|&number| guarded(budget, &mut || self.prepare(&self.spec.settings(number)))).collect();
+        let variants: Vec<(usize, &Compiled)> =
+            prepared.iter().enumerate().filter_map(|(k, p)| Some((k, p.as_ref().ok()?))).collect();
+        let compiled: Vec<&Compiled> = variants.iter().map(|(_, compiled)| *compiled).collect();
+        let side_by_side = guarded(budget, &mut || {
+            side_by_side::ends(&compiled, &options, &mut || finished(None)).map_err(|error| error.to_string())
+        });
+        let mut ends: Vec<Option<RunEnd>> = vec![None; numbers.len()];
+        if let Ok((found, _)) = side_by_side {
+            for ((k, _), end) in variants.iter().zip(found) {
+                ends[*k] = end;
+            }
+        }
+        let mut outcomes = Vec::with_capacity(numbers.len());
+        for ((&number, prepared), end) in numbers.iter().zip(&prepared).zip(ends) {
+            let values = match (prepared, end) {
+                (Err(error), _) => Err(error.clone()),
+                (Ok(compiled), Some(end)) => self.found(compiled, end),
+                (Ok(compiled), None) => within(&mut || self.found(compiled, alone(compiled, &options)?)),
+            };
+            let parameters = self.spec.settings(number).into_iter().map(|(_, value)| value).collect();
+            let outcome = Outcome { number, parameters, values };
+            if !finished(Some(&outcome)) {
+                return None;
+            }
+            outcomes.push(outcome);
+        }
+        Some(outcomes)
+    }
+
+    fn transient(&self) -> TransientOptions<'static> {
+        let SweepAnalysis::Transient { stop, outputs, voltages } = &self.spec.analysis else {
+            return TransientOptions::default();
+        };
+        TransientOptions {
+            stop: *stop,
+            signals: outputs.clone(),
+            points: 2,
+            tol: self.options.tol,
+            voltages: voltages.clone(),
+            ..TransientOptions::default()
+        }
+    }
+
+    /// A point on its mesh.
+    fn prepare(&self, settings: &[(String, Setting)]) -> Result<Compiled, String> {
+        let drawn = draw(self.source, &at(self.options, settings)).map_err(|error| brief(&error))?;
+        let shared = if self.spec.grid_points().is_ok_and(|n| n > 1) {
+            self.mesh.get_or_init(|| self.search()).as_ref()
+        } else {
+            None
+        };
+        match shared.filter(|shared| alike(&shared.beams, &drawn.structure.beams)) {
+            Some(shared) => drawn.on(shared.order.clone()).map_err(|error| error.to_string()),
+            None => {
+                let compiled = drawn.compile().map_err(|error| brief(&error))?;
+                let fitted = mesh::fitted_in_time(&compiled, &self.transient());
+                fitted.map(|(moving, _)| moving).map_err(|error| error.to_string())
+            }
+        }
+    }
+
+    /// The mesh that is fine enough at every probe.
+    fn search(&self) -> Option<Shared> {
+        let options = self.transient();
+        let mut shared: Option<Shared> = None;
+        for number in probes(self.spec) {
+            let drawn = draw(self.source, &at(self.options, &self.spec.settings(number)));
+            let Some(compiled) = drawn.ok().and_then(|drawn| drawn.compile().ok()) else { continue };
+            let Ok(order) = mesh::order_in_time(&compiled, &options) else { continue };
+            match &mut shared {
+                None => shared = Some(Shared { beams: compiled.structure.beams, order }),
+                Some(shared) if alike(&shared.beams, &compiled.structure.beams) => {
+                    for (most, n) in shared.order.segments.iter_mut().zip(order.segments) {
+                        *most = (*most).max(n);
+                    }
+                    let both = shared.order.estimated_error.zip(order.estimated_error);
+                    shared.order.estimated_error = both.map(|(a, b)| a.max(b));
+                }
+                Some(_) => {}
+            }
+        }
+        shared
+    }
+
+    fn found(&self, compiled: &Compiled, end: RunEnd) -> Result<Found, String> {
+        let options = self.transient();
+        let mut values = Vec::with_capacity(end.values.len());
+        for (name, value) in options.signals.iter().zip(end.values) {
+            if !value.is_finite() {
+                return Err(format!("{name} is not finite"));
+            }
+            let unit = Signal::find(compiled, name).map_err(|error| error.to_string())?.unit();
+            values.push(Value { name: name.clone(), unit, value: Some(value) });
+        }
+        let estimated_error = compiled.order.estimated_error;
+        let beyond = mesh::beyond(self.options.tol, estimated_error);
+        let beyond = beyond.map(|message| format!("{}: {message}", mesh::WARNING));
+        let warnings: Vec<String> = beyond.into_iter().chain(end.warnings).collect();
+        Ok(Found { values, estimated_error, warning: warnings.join("; ") })
+    }
+}
+
+/// A run of its own.
+fn alone(compiled: &Compiled, options: &TransientOptions<'_>) -> Result<RunEnd, String> {
+    let result = transient(compiled, options, &mut |_, _| (), &mut |_| true);
+    let result = result.map_err(|error: AnalysisError| error.to_string())?;
+    let last = |(_, _, values): &(String, String, Vec<f64>)| values.last().copied().unwrap_or(f64::NAN);
+    let values = result.signals.iter().map(last).collect();
+    Ok(RunEnd { values, steps: result.counters.steps, warnings: result.warnings })
+}
+
+/// Runs a job under a part of the budget. A fault inside is the error of that job.
+fn guarded<T>(budget: Option<&Budget>, job: &mut dyn FnMut() -> Result<T, String>) -> Result<T, String> {
+    let outcome = catch_unwind(AssertUnwindSafe(|| match budget.map(Budget::part) {
+        Some(part) => budget::within(&part, job).unwrap_or_else(|why| Err(why.to_string())),
+        None => job(),
+    }));
+    outcome.unwrap_or_else(|_| Err("internal fault at this point".to_owned()))
+}
+
+/// The middle of the grid and its corners: of each axis of numbers the least and the largest, else the first and the last.
+fn probes(spec: &SweepSpec) -> Vec<usize> {
+    let ends = |values: &[Setting]| {
+        let number = |k: &usize| if let Setting::Number(x) = values[*k] { x } else { *k as f64 };
+        let by = |a: &usize, b: &usize| number(a).total_cmp(&number(b));
+        let all = 0..values.len();
+        [all.clone().min_by(by).unwrap_or(0), all.max_by(by).unwrap_or(0)]
+    };
+    let axes = &spec.parameters;
+    let number = |at: &[usize]| axes.iter().zip(at).fold(0, |n, (axis, k)| n * axis.values.len() + k);
+    let centre: Vec<usize> = axes.iter().map(|axis| axis.values.len() / 2).collect();
+    let mut probes = vec![middle(spec)];
+    if axes.len() <= MOST_CORNERS {
+        for corner in 0..1usize << axes.len() {
+            let at: Vec<usize> = axes.iter().enumerate().map(|(i, axis)| ends(&axis.values)[corner >> i & 1]).collect();
+            probes.push(number(&at));
+        }
+    } else {
+        for (i, axis) in axes.iter().enumerate() {
+            for end in ends(&axis.values) {
+                let mut at = centre.clone();
+                at[i] = end;
+                probes.push(number(&at));
+            }
+        }
+    }
+    probes.dedup();
+    probes
+}

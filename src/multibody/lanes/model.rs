@@ -1,0 +1,199 @@
+//! Bodies and joints of variants side by side.
+
+use super::joint::{LaneSection, Pair};
+use super::{LaneBlock, LanePose, Lanes, Real};
+use crate::multibody::planar::Block;
+use crate::multibody::section::{LaidJoint, Place, Section};
+use crate::multibody::{Body, BodyId, Model, Pattern};
+use nalgebra::Matrix3;
+
+/// A body in each variant.
+#[derive(Debug, Clone, Copy)]
+pub struct LaneBody<const N: usize> {
+    /// Mass [kg] and moment of inertia [kg·m²], as the mass matrix' diagonal.
+    pub mass: LanePose<N>,
+    /// Drag on translation [N·s/m].
+    pub drag: Lanes<N>,
+    /// Its first moment [N·s].
+    pub first: Pair<N>,
+    /// Its second moment [N·m·s].
+    pub second: Lanes<N>,
+}
+
+/// A joint in each variant.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct LaneJoint<const N: usize> {
+    pub(crate) place: Place,
+    pub(crate) section: u32,
+    pub(crate) arm_a: Pair<N>,
+    pub(crate) arm_b: Pair<N>,
+    pub(crate) rest: Lanes<N>,
+}
+
+/// What joints share, and what lengthens them.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Shared<const N: usize> {
+    pub(crate) section: LaneSection<N>,
+    pub(crate) expansion: Option<(usize, Lanes<N>)>,
+}
+
+/// Two joints whose moments depend on both rotations.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct LaneCoupling<const N: usize> {
+    pub(crate) first: (BodyId, BodyId),
+    pub(crate) second: (BodyId, BodyId),
+    pub(crate) stiffness: Lanes<N>,
+}
+
+/// A damper.
+#[derive(Debug, Clone)]
+pub(crate) struct LaneDamper<const N: usize> {
+    pub(crate) bodies: (BodyId, BodyId),
+    pub(crate) place: Place,
+    /// Rows.
+    pub(crate) matrix: [[Lanes<N>; 6]; 6],
+}
+
+/// A projector onto what a support leaves free, and the rest of the identity.
+pub(crate) type Held<const N: usize> = Option<(LaneBlock<N>, LaneBlock<N>)>;
+
+/// Models of as many variants as there are lanes.
+#[derive(Debug, Clone)]
+pub struct LaneModel<const N: usize> {
+    /// Pattern of the tangent.
+    pub pattern: Pattern,
+    /// Bodies in elimination order.
+    pub bodies: Vec<LaneBody<N>>,
+    pub(crate) joints: Vec<LaneJoint<N>>,
+    pub(crate) sections: Vec<Shared<N>>,
+    pub(crate) couplings: Vec<LaneCoupling<N>>,
+    pub(crate) dampers: Vec<LaneDamper<N>>,
+    pub(crate) held: Vec<Held<N>>,
+    pub(crate) holds: bool,
+}
+
+impl<const N: usize> LaneModel<N> {
+    /// Every lane holds `model`; none for a linear one, which has no lanes.
+    pub fn new(model: &Model) -> Option<Self> {
+        if model.linear {
+            return None;
+        }
+        let lanes = Lanes::splat;
+        let zero = [[Lanes::ZERO; 3]; 3];
+        let body = LaneBody { mass: [Lanes::ZERO; 3], drag: Lanes::ZERO, first: [Lanes::ZERO; 2], second: Lanes::ZERO };
+        let section = LaneSection { axis: [lanes(0.0); 2], stiffness: [lanes(0.0); 6], second: [lanes(0.0); 3] };
+        let joint = |j: &LaidJoint| LaneJoint {
+            place: j.place,
+            section: j.section() as u32,
+            arm_a: [lanes(0.0); 2],
+            arm_b: [lanes(0.0); 2],
+            rest: lanes(0.0),
+        };
+        let expansion = |s: &Section| s.expansion.map(|(group, _)| (group, lanes(0.0)));
+        let mut laid = Self {
+            pattern: model.pattern.clone(),
+            bodies: vec![body; model.bodies.len()],
+            joints: model.joints.iter().map(joint).collect(),
+            sections: model.sections.iter().map(|s| Shared { section, expansion: expansion(s) }).collect(),
+            couplings: (model.couplings.iter())
+                .map(|c| LaneCoupling { first: c.first, second: c.second, stiffness: lanes(0.0) })
+                .collect(),
+            dampers: (model.dampers.iter().zip(&model.damper_place))
+                .map(|(d, place)| LaneDamper { bodies: (d.a, d.b), place: *place, matrix: [[lanes(0.0); 6]; 6] })
+                .collect(),
+            held: model.bodies.iter().map(|b| b.free.as_ref().map(|_| (zero, zero))).collect(),
+            holds: model.bodies.iter().any(|b| b.free.is_some()),
+        };
+        for lane in 0..N {
+            laid.put(lane, model);
+        }
+        Some(laid)
+    }
+
+    /// True for a model that differs from those laid here in numbers alone.
+    pub fn fits(&self, model: &Model) -> bool {
+        let bodies = |(held, body): (&Held<N>, &Body)| held.is_some() == body.free.is_some();
+        // joints of one section here must be alike in the other model too
+        let mut others = vec![u32::MAX; self.sections.len()];
+        let joints = |(own, other): (&LaneJoint<N>, &LaidJoint)| {
+            let known = &mut others[own.section as usize];
+            let section = other.section() as u32;
+            let alike = *known == section || *known == u32::MAX;
+            *known = section;
+            let group = |e: Option<usize>| e.unwrap_or(usize::MAX);
+            let own_group = self.sections[own.section as usize].expansion.map(|(g, _)| g);
+            let other_group = model.section(other).expansion.map(|(g, _)| g);
+            alike && own.place == other.place && group(own_group) == group(other_group)
+        };
+        !model.linear
+            && self.bodies.len() == model.bodies.len()
+            && self.joints.len() == model.joints.len()
+            && self.dampers.len() == model.dampers.len()
+            && self.couplings.len() == model.couplings.len()
+            && self.pattern == model.pattern
+            && self.held.iter().zip(&model.bodies).all(bodies)
+            && self.joints.iter().zip(&model.joints).all(joints)
+            && self.dampers.iter().zip(&model.dampers).all(|(a, b)| a.bodies == (b.a, b.b))
+            && self.couplings.iter().zip(&model.couplings).all(|(a, b)| (a.first, a.second) == (b.first, b.second))
+    }
+
+    /// Puts the numbers of a model that fits into one lane.
+    pub fn put(&mut self, lane: usize, model: &Model) {
+        for (to, from) in self.bodies.iter_mut().zip(&model.bodies) {
+            set(lane, &mut to.mass, from.mass_diagonal().as_slice());
+            to.drag.set_lane(lane, from.drag.amount);
+            set(lane, &mut to.first, from.drag.first.as_slice());
+            to.second.set_lane(lane, from.drag.second);
+        }
+        for (to, from) in self.joints.iter_mut().zip(&model.joints) {
+            set(lane, &mut to.arm_a, from.arm_a.as_slice());
+            set(lane, &mut to.arm_b, from.arm_b.as_slice());
+            to.rest.set_lane(lane, from.rest);
+            let section = model.section(from);
+            let shared = &mut self.sections[to.section as usize];
+            set(lane, &mut shared.section.axis, section.axis.as_slice());
+            set(lane, &mut shared.section.stiffness, &section.stiffness.0);
+            set(lane, &mut shared.section.second, &section.second);
+            if let (Some((_, to)), Some((_, length))) = (&mut shared.expansion, section.expansion) {
+                to.set_lane(lane, length);
+            }
+        }
+        for (to, from) in self.couplings.iter_mut().zip(&model.couplings) {
+            to.stiffness.set_lane(lane, from.stiffness);
+        }
+        for (to, from) in self.dampers.iter_mut().zip(&model.damper_matrix) {
+            for (i, row) in to.matrix.iter_mut().enumerate() {
+                for (j, to) in row.iter_mut().enumerate() {
+                    to.set_lane(lane, from[(i, j)]);
+                }
+            }
+        }
+        for (to, from) in self.held.iter_mut().zip(&model.bodies) {
+            if let (Some((p, rest)), Some(free)) = (to, &from.free) {
+                put_block(lane, p, free);
+                put_block(lane, rest, &(Matrix3::identity() - **free));
+            }
+        }
+    }
+}
+
+fn set<const N: usize>(lane: usize, to: &mut [Lanes<N>], from: &[f64]) {
+    for (to, from) in to.iter_mut().zip(from) {
+        to.set_lane(lane, *from);
+    }
+}
+
+fn put_block<const N: usize>(lane: usize, to: &mut LaneBlock<N>, from: &Block) {
+    for (j, column) in to.iter_mut().enumerate() {
+        set(lane, column, from.column(j).as_slice());
+    }
+}
+
+impl<const N: usize> LaneBody<N> {
+    /// Force of the drag at a rate.
+    #[inline(always)]
+    pub fn drag_force(&self, v: &LanePose<N>) -> LanePose<N> {
+        let (c, [sx, sy]) = (self.drag, self.first);
+        [c * v[0] - sy * v[2], c * v[1] + sx * v[2], -sy * v[0] + sx * v[1] + self.second * v[2]]
+    }
+}

@@ -1,0 +1,201 @@
+//! Drives runs of many variants side by side with Rodas4, each with its own steps.
+//!
+//! A step of all lanes is taken at once, of the length that each lane's own error control wants; a lane that rejects its step
+//! goes back alone. Whoever is done leaves its lane to the next of the queue. So what a variant computes is what it
+//! would alone ([`super::adaptive`], the same bits), whoever its neighbours are. What the lanes do not settle (a matrix that
+//! cannot be factored until the end, steps that vanish, an observer that says stop) is left to a run alone, which finds the same
+//! and says why.
+
+use super::adaptive::{FLOOR, MAX_REJECTED, contact_error};
+use super::method::Motion;
+use super::rodas4::lanes::{Lane, LaneRodas4};
+use super::step_size;
+use crate::gaps::{Course, Ramp, System};
+
+/// Exponent of the step-size rule: the estimated error falls with the fourth power of the step.
+const EXPONENT: f64 = -1.0 / 4.0;
+
+/// A run of one variant.
+pub struct Variant<'a> {
+    /// The mechanism.
+    pub system: &'a System,
+    /// Its sources, which hold their voltages, and heat.
+    pub ramp: Ramp<'a>,
+    /// Where it begins.
+    pub motion: Motion,
+    /// First step to try [s].
+    pub h: f64,
+    /// Relative error that a step may make [1].
+    pub tol: f64,
+    /// Sees each accepted step.
+    pub watcher: &'a mut dyn Watcher,
+}
+
+/// Sees the accepted steps of one run.
+pub trait Watcher {
+    /// True where the motions before and after the step from `s` to `s` + `h` [s] are to be seen.
+    fn wants(&self, s: f64, h: f64) -> bool;
+    /// A step that was wanted; answers whether to go on.
+    fn see(&mut self, s: f64, h: f64, before: &Motion, after: &Motion) -> bool;
+}
+
+/// How a run ended.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Ended {
+    /// At the end of the ramp, with this motion after so many steps.
+    Done(Motion, u64),
+    /// It differs from the first variant in more than numbers, and was not begun.
+    Unlike,
+    /// It has to be done alone.
+    Alone,
+}
+
+/// A lane at work.
+struct Running<'a> {
+    number: usize,
+    tol: f64,
+    watcher: &'a mut dyn Watcher,
+    mass: f64,
+    contacts: bool,
+    s: f64,
+    h: f64,
+    rejected: usize,
+    steps: u64,
+}
+
+/// Counted work of the lanes.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct LaneWork {
+    /// Steps of all lanes at once.
+    pub together: u64,
+    /// Steps of single lanes that were accepted.
+    pub accepted: u64,
+    /// Steps of single lanes that were rejected.
+    pub rejected: u64,
+}
+
+/// Advances every variant that `next` gives with its number, and tells `done` how it ended. The lanes are laid out for the
+/// mechanism of `first`; variants that differ from it in more than numbers end as [`Ended::Unlike`] at once.
+pub fn advance<'a, const N: usize>(
+    first: &System,
+    next: &mut dyn FnMut() -> Option<(usize, Variant<'a>)>,
+    done: &mut dyn FnMut(usize, Ended),
+) -> LaneWork {
+    let mut work = LaneWork::default();
+    let Some(mut method) = LaneRodas4::<N>::new(first) else {
+        while let Some((number, _)) = next() {
+            done(number, Ended::Alone);
+        }
+        return work;
+    };
+    let mut lanes: [Option<Lane<'a>>; N] = [const { None }; N];
+    let mut running: [Option<Running<'a>>; N] = [const { None }; N];
+    let (mut s, mut step) = ([0.0; N], [1.0; N]);
+    let (mut before, mut after) = (Motion::zeros(first.bodies()), Motion::zeros(first.bodies()));
+    let mut error_motion = before.clone();
+    loop {
+        for k in 0..N {
+            while running[k].is_none() {
+                let Some((number, variant)) = next() else { break };
+                if !method.fits(variant.system) {
+                    done(number, Ended::Unlike);
+                    continue;
+                }
+                method.put(k, variant.system, &variant.ramp, &variant.motion);
+                lanes[k] = Some(Lane { system: variant.system, course: Course::new(variant.ramp) });
+                let system = variant.system;
+                running[k] = Some(Running {
+                    number,
+                    tol: variant.tol,
+                    watcher: variant.watcher,
+                    mass: system.model.bodies.iter().map(|b| b.mass).sum(),
+                    contacts: (0..system.gaps.len()).any(|g| system.touching(g).is_some()),
+                    s: 0.0,
+                    h: variant.h,
+                    rejected: 0,
+                    steps: 0,
+                });
+            }
+        }
+        if running.iter().all(Option::is_none) {
+            return work;
+        }
+        crate::budget::check();
+        for k in 0..N {
+            if let (Some(run), Some(lane)) = (&running[k], &lanes[k]) {
+                (s[k], step[k]) = (run.s, step_size::fitted(run.h, lane.course.ramp.dt - run.s));
+            }
+        }
+        let vanished = method.step(&lanes, &s, &step);
+        work.together += 1;
+        for k in 0..N {
+            let (Some(run), Some(lane)) = (&mut running[k], &lanes[k]) else {
+                method.go_back(k);
+                continue;
+            };
+            let (system, dt, h) = (lane.system, lane.course.ramp.dt, step[k]);
+            let wanted = run.watcher.wants(s[k], h);
+            if wanted || run.contacts {
+                method.before.take(k, &mut before);
+                method.motion.take(k, &mut after);
+            }
+            let error = if vanished[k] {
+                f64::INFINITY
+            } else {
+                let contact = if run.contacts {
+                    method.error.take(k, &mut error_motion);
+                    contact_error(system, (&before, &after), &error_motion, run.tol)
+                } else {
+                    0.0
+                };
+                relative_error(&method, k, system, run, h, contact)
+            };
+            let mut ended = None;
+            if error <= 1.0 {
+                let last = run.s + h >= dt * (1.0 - 1e-14);
+                run.s = if last { dt } else { run.s + h };
+                (run.rejected, run.steps) = (0, run.steps + 1);
+                work.accepted += 1;
+                run.h = step_size::accepted(run.h, h, error, EXPONENT);
+                if wanted && !run.watcher.see(run.s - h, h, &before, &after) {
+                    ended = Some(Ended::Alone);
+                } else if run.s >= dt {
+                    method.motion.take(k, &mut after);
+                    ended = Some(Ended::Done(after.clone(), run.steps));
+                }
+            } else {
+                method.go_back(k);
+                work.rejected += 1;
+                run.rejected += 1;
+                run.h = step_size::rejected(h, error, EXPONENT, 0.1);
+                if run.rejected > MAX_REJECTED || run.s + run.h <= run.s {
+                    ended = Some(Ended::Alone);
+                }
+            }
+            if let Some(ended) = ended {
+                done(run.number, ended);
+                (running[k], lanes[k]) = (None, None);
+            }
+        }
+    }
+}
+
+/// The error of a step over what it may be, as [`super::adaptive`] has it.
+fn relative_error<const N: usize>(
+    method: &LaneRodas4<N>,
+    k: usize,
+    system: &System,
+    run: &Running<'_>,
+    h: f64,
+    contact: f64,
+) -> f64 {
+    if run.mass == 0.0 {
+        return 0.0;
+    }
+    let norms = &method.norms;
+    let (eq, ev) = (norms.error_q[k], norms.error_v[k]);
+    let reach = norms.before[k].max(norms.after[k]) + FLOOR * system.length_scale * run.mass.sqrt();
+    let error = (eq * eq + h * h * ev * ev).sqrt() / (run.tol * reach);
+    let error = error.hypot(contact);
+    if error.is_nan() { f64::INFINITY } else { error }
+}

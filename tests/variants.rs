@@ -1,0 +1,310 @@
+//! Sweeps of variants: what they share (a mesh, the reading of the netlist, the steps of a run) changes no promise about any
+//! one of them.
+
+use bimorph::analysis::transient::{TransientOptions, first_step, transient};
+use bimorph::compile::{CompileOptions, Compiled, compile};
+use bimorph::gaps::Ramp;
+use bimorph::jobs::sweep::{self, Shard, SweepAnalysis, SweepSpec, SweepTable};
+use bimorph::netlist::{Bundle, Setting};
+use bimorph::solve::time::adaptive::{Adaptive, Control};
+use bimorph::solve::time::method::Motion;
+use bimorph::solve::time::rodas4::Rodas4;
+use bimorph::solve::time::side_by_side::{self, Ended, Variant, Watcher};
+
+/// A beam between anchors under a force at its middle, beside a cantilever: the first stiffens as it bends.
+const BEAMS: &str = "param F=100u, w=2u, l=100u
+process p = [Youngsmodulus=165e9 density=2300 h=2u]
+anchor p [a] []
+left beam2d p [a m] [l=l w=w]
+right beam2d p [m b] [l=l w=w]
+anchor p [b] []
+arm beam2d p [m t] [l=60u w=1.5u oz=deg(90)]
+f2d * [m] [F=F oz=deg(90)]
+f2d * [t] [F=F/20 oz=0]
+";
+
+fn swept(text: &str, axes: &[&str], analysis: SweepAnalysis, options: &CompileOptions, shard: Shard) -> SweepTable {
+    let parameters = axes.iter().map(|axis| axis.parse().expect("an axis")).collect();
+    let spec = SweepSpec { parameters, analysis, shard, threads: Some(2) };
+    sweep::run(&spec, &Bundle::from_text("beams.net", text), options, &|_| true).expect("a table")
+}
+
+fn statics() -> SweepAnalysis {
+    SweepAnalysis::Static { outputs: vec!["m.y".into(), "t.x".into(), "t.y".into()], voltages: Vec::new() }
+}
+
+/// Every row of a sweep is within the tolerance of the beams; W040 says where its estimate is beyond the tolerance, and with
+/// segments that are given too coarse it is. The reference is extrapolated from
+/// 64 and 128 segments a beam.
+#[test]
+fn rows_are_within_the_tolerance_of_a_finer_mesh() {
+    let axes = ["F=20u:400u:4", "w=1.6u:2.4u:3"];
+    for tol in [1e-2, 1e-3, 1e-4] {
+        let options = CompileOptions { tol, ..CompileOptions::default() };
+        let table = swept(BEAMS, &axes, statics(), &options, Shard::default());
+        let with = |n: usize| CompileOptions { segments: Some(n), ..options.clone() };
+        let (fine, finer) = (64, 128);
+        let fine = swept(BEAMS, &axes, statics(), &with(fine), Shard::default());
+        let finer = swept(BEAMS, &axes, statics(), &with(finer), Shard::default());
+        for ((row, reference), finest) in table.rows.iter().zip(&fine.rows).zip(&finer.rows) {
+            let numbers = |row: &sweep::SweepRow| -> Vec<f64> {
+                row.values.as_ref().expect("a result").iter().map(|x| x.expect("a number")).collect()
+            };
+            let finest = numbers(finest);
+            // an error is relative to the displacement of its node
+            let scales = [finest[0].abs(), finest[1].hypot(finest[2]), finest[1].hypot(finest[2])];
+            for (k, (x, r)) in numbers(row).iter().zip(numbers(reference)).enumerate() {
+                let (last, scale) = (finest[k], scales[k]);
+                // Richardson: what is left falls with the second order
+                let f = last + (last - r) / 3.0;
+                assert!((f - last).abs() < 0.5 * tol * scale, "the reference is not converged: {r} {last}");
+                assert!((x - f).abs() <= tol * scale, "{tol}: {x} {f} {:?}", row.parameters);
+            }
+            let told = row.estimated_error.expect("an estimate");
+            assert_eq!(row.warning.is_empty(), told <= 1.05 * tol, "{told} {}", row.warning);
+        }
+    }
+    let coarse = CompileOptions { tol: 1e-4, segments: Some(2), ..CompileOptions::default() };
+    let table = swept(BEAMS, &axes, statics(), &coarse, Shard::default());
+    let beyond = table.rows.iter().filter(|row| row.estimated_error > Some(1e-4));
+    assert!(
+        beyond.clone().count() > 6 && beyond.clone().all(|row| row.warning.starts_with("W040")),
+        "{}",
+        table.to_csv()
+    );
+}
+
+/// Which mesh a point takes does not depend on who else is in its shard: shards put together are the whole table, also where
+/// a part of the grid needs a finer mesh (forces up to F·l²/EI = 40) or has other beams.
+#[test]
+fn shards_are_the_whole() {
+    let text = format!("param more=0\n{BEAMS}if more\n[ tail beam2d p [t e] [l=20u w=1.5u oz=0] ]\n");
+    let axes = ["F=1u,5u,2000u", "more=0,1", "w=2u,2.2u"];
+    let options = CompileOptions::default();
+    let whole = swept(&text, &axes, statics(), &options, Shard::default());
+    assert_eq!(whole.failed(), 0, "{}", whole.to_csv());
+    let mut rows: Vec<_> =
+        (0..5).flat_map(|index| swept(&text, &axes, statics(), &options, Shard { index, count: 5 }).rows).collect();
+    rows.sort_by_key(|row| row.point);
+    assert_eq!(rows, whole.rows);
+}
+
+/// Modes of variants that share a mesh: within the tolerance of 64 segments a beam, with their estimates.
+#[test]
+fn frequencies_hold_their_tolerance() {
+    let text = BEAMS.replace("F=100u", "F=0");
+    let axes = ["l=80u:120u:3", "w=1.6u:2.4u:3"];
+    let modes = SweepAnalysis::Modes { count: 4, voltages: Vec::new() };
+    let options = CompileOptions::default();
+    let table = swept(&text, &axes, modes.clone(), &options, Shard::default());
+    let fine = CompileOptions { segments: Some(64), ..options.clone() };
+    let fine = swept(&text, &axes, modes, &fine, Shard::default());
+    for (row, reference) in table.rows.iter().zip(&fine.rows) {
+        let (found, expected) = (row.values.as_ref().expect("modes"), reference.values.as_ref().expect("modes"));
+        for (f, r) in found.iter().zip(expected) {
+            let (f, r) = (f.expect("a frequency"), r.expect("a frequency"));
+            assert!((f / r - 1.0).abs() <= options.tol, "{f} {r} {:?}", row.parameters);
+        }
+        assert!(row.estimated_error.is_some_and(|told| told <= options.tol), "{row:?}");
+    }
+}
+
+/// A netlist that was read once draws each set of parameters as one that is read anew, warnings and errors included.
+#[test]
+fn reading_once_is_reading_anew() {
+    let source = bimorph::netlist::Source::new(&Bundle::from_text("beams.net", BEAMS));
+    for (name, value) in [("w", 1e-6), ("w", 3e-6), ("w", -1e-6), ("nosuch", 1.0), ("l", 5e-5)] {
+        let set = vec![(name.to_owned(), Setting::Number(value))];
+        let options = CompileOptions { set, ..CompileOptions::default() };
+        let anew = compile(&Bundle::from_text("beams.net", BEAMS), &options);
+        let once = bimorph::compile::draw(&source, &options).and_then(bimorph::compile::Drawn::compile);
+        assert_eq!(format!("{once:?}"), format!("{anew:?}"));
+    }
+}
+
+/// The final motion and the accepted steps of a run.
+type Ran = (Vec<(f64, f64)>, Motion);
+
+/// Notes every step.
+#[derive(Default)]
+struct Notes(Vec<(f64, f64)>);
+
+impl Watcher for Notes {
+    fn wants(&self, _: f64, _: f64) -> bool {
+        true
+    }
+    fn see(&mut self, s: f64, h: f64, _: &Motion, _: &Motion) -> bool {
+        self.0.push((s, h));
+        true
+    }
+}
+
+/// A run alone.
+fn alone(compiled: &Compiled, volts: &[f64], stop: f64, tol: f64) -> Option<Ran> {
+    let system = &compiled.parts.system;
+    let mut sources = vec![0.0; system.electrics.sources()];
+    system.electrics.fill_sources(&volts[..system.electrics.ports], &mut sources);
+    let rise = vec![0.0; system.electrics.heating.heaters.len()];
+    let ramp = Ramp { electrics: &system.electrics, from: &sources, to: &sources, rise: &rise, dt: stop };
+    let mut motion = Motion::zeros(system.bodies());
+    let (mut steps, mut h) = (Vec::new(), first_step(system, stop));
+    let mut driver = Adaptive::new(system, Rodas4::new(system, &[]));
+    let control = Control::Tolerance(tol);
+    let ended = driver.advance(system, &ramp, &mut motion, &mut h, control, usize::MAX, &mut |s, h, _, _| {
+        steps.push((s, h));
+        true
+    });
+    ended.ok().map(|_| (steps, motion))
+}
+
+/// The same runs side by side.
+fn together<const N: usize>(variants: &[Compiled], volts: &[f64], stop: f64, tol: f64) -> Vec<Option<Ran>> {
+    let electrics: Vec<_> = variants.iter().map(|v| &v.parts.system.electrics).collect();
+    let sources: Vec<Vec<f64>> = (electrics.iter())
+        .map(|e| {
+            let mut sources = vec![0.0; e.sources()];
+            e.fill_sources(&volts[..e.ports], &mut sources);
+            sources
+        })
+        .collect();
+    let rises: Vec<Vec<f64>> = electrics.iter().map(|e| vec![0.0; e.heating.heaters.len()]).collect();
+    let mut notes: Vec<Notes> = variants.iter().map(|_| Notes::default()).collect();
+    let mut ends: Vec<Option<Motion>> = variants.iter().map(|_| None).collect();
+    {
+        let mut queue = variants.iter().zip(&mut notes).enumerate();
+        let mut next = || {
+            let (number, (variant, notes)) = queue.next()?;
+            let system = &variant.parts.system;
+            let (volts, rise) = (&sources[number], &rises[number]);
+            let ramp = Ramp { electrics: &system.electrics, from: volts, to: volts, rise, dt: stop };
+            let motion = Motion::zeros(system.bodies());
+            Some((number, Variant { system, ramp, motion, h: first_step(system, stop), tol, watcher: notes }))
+        };
+        let mut done = |number: usize, ended: Ended| {
+            if let Ended::Done(motion, _) = ended {
+                ends[number] = Some(motion);
+            }
+        };
+        let work = side_by_side::advance::<N>(&variants[0].parts.system, &mut next, &mut done);
+        assert!(work.together < work.accepted + work.rejected, "nothing was side by side: {work:?}");
+    }
+    notes.into_iter().zip(ends).map(|(notes, end)| Some((notes.0, end?))).collect()
+}
+
+fn bits(ran: &Ran) -> Vec<u64> {
+    let (steps, Motion { q, v }) = ran;
+    let motion = q.iter().chain(v).flat_map(|p| [p.x, p.y, p.z]);
+    steps.iter().flat_map(|&(s, h)| [s, h]).chain(motion).map(f64::to_bits).collect()
+}
+
+/// Side by side a run has the steps and the bits that it has alone, whatever its neighbours are: variants that take many steps
+/// beside some that take few, contact, dampers, supports, heat, a comb, loads, one that cannot be stepped at all (a mass of
+/// 1e-300 kg), and one of another topology, which is left to a run alone. Eleven variants in lanes of 4 and 8.
+#[test]
+fn a_lane_has_the_bits_of_its_variant_alone() {
+    let bank = std::fs::read_to_string("examples/bank/bank.net").expect("the bank");
+    let bundle = |text: &str| {
+        let mut bundle = Bundle::read(std::path::Path::new("examples/bank/bank.net"), &[]).expect("the bank");
+        let root = bundle.root.clone();
+        *bundle.files.get_mut(&root).expect("its root") = text.to_owned();
+        bundle
+    };
+    let bank = bundle(&bank.replace("pitch = 49.5u", "param pitch = 49.5u"));
+    let plate = "param m=1e-10, k=1, c=2e-6, F=1u
+process p = [Youngsmodulus=165e9 density=2300 h=2u viscosity=1.8e-5 fluid=2u]
+anchor * [f] [l=1u w=1u h=1u]
+mass2d * [m] [m=m]
+guide2d * [m] []
+spring2d * [f m] [kx=k]
+damper2d * [f m] [bx=c]
+anchor * [e] [l=1u w=1u h=1u]
+plategap2d * [m e] [A=1e-8 gap=2u]
+eground * [e] []
+anchor p [a] []
+arm beam2d p [a t] [l=100u w=2u oz=deg(20)]
+tip beam2d p [t u] [l=50u w=2u oz=deg(70)]
+f2d * [t] [F=F oz=deg(60)]
+drive port * [m e] []
+";
+    let plate = Bundle::from_text("plate.net", plate);
+    let grid = |bundle: &Bundle, names: [&str; 2], values: &dyn Fn(usize) -> [f64; 2]| -> Vec<Compiled> {
+        let options = |k: usize| {
+            let pairs = names.iter().zip(values(k));
+            let set = pairs.map(|(name, value)| ((*name).to_owned(), Setting::Number(value))).collect();
+            CompileOptions { set, ..CompileOptions::default() }
+        };
+        (0..11).map(|k| compile(bundle, &options(k)).expect("a variant")).collect()
+    };
+    let arms = |k: usize| [1.8e-6 + 0.04e-6 * k as f64, 48e-6 + 0.3e-6 * k as f64];
+    let mut banks = grid(&bank, ["wh", "pitch"], &arms);
+    let other = CompileOptions { set: vec![("comb".into(), Setting::Number(0.0))], ..CompileOptions::default() };
+    banks[5] = compile(&bank, &other).expect("without its comb");
+    // the last of these closes its gap, and one hardly has a mass
+    let masses = |k: usize| [if k == 3 { 1e-300 } else { 0.5e-10 + 0.3e-10 * k as f64 }, 1e-6 * k as f64];
+    let plates = grid(&plate, ["m", "F"], &masses);
+    for (name, variants, volts, stop, odd) in
+        [("bank", &banks, [2.2, 1.0], 4e-6, vec![5]), ("plate", &plates, [5.5, 0.0], 6e-5, vec![])]
+    {
+        let volts = &volts;
+        let one: Vec<_> = variants.iter().map(|v| alone(v, volts, stop, 1e-5)).collect();
+        let runs = [together::<4>(variants, volts, stop, 1e-5), together::<8>(variants, volts, stop, 1e-5)];
+        let steps: Vec<usize> = one.iter().flatten().map(|ran| ran.0.len()).collect();
+        assert!(steps.iter().max() > steps.iter().min(), "{name}: all alike {steps:?}");
+        for run in &runs {
+            for (number, (lane, alone)) in run.iter().zip(&one).enumerate() {
+                match (lane, alone) {
+                    (Some(lane), Some(alone)) => {
+                        assert_eq!(lane.0.len(), alone.0.len(), "{name} {number}");
+                        assert!(bits(lane) == bits(alone), "{name} {number}");
+                        assert!(!odd.contains(&number));
+                    }
+                    (None, _) => assert!(odd.contains(&number) || alone.is_none(), "{name} {number} has no lane"),
+                    (Some(_), None) => panic!("{name} {number} ends in a lane and not alone"),
+                }
+            }
+        }
+    }
+}
+
+/// A sweep of transients gives the numbers of each run alone, to the bit, on any number of threads and in shards; the point
+/// that cannot be drawn has its reason, and those of another topology their lanes.
+#[test]
+fn sweeps_of_transients_are_runs_alone() {
+    let text = format!("param more=0\n{BEAMS}if more\n[ tail beam2d p [t e] [l=20u w=1.5u oz=0] ]\n");
+    let transients =
+        SweepAnalysis::Transient { stop: 20e-6, outputs: vec!["m.y".into(), "t.vx".into()], voltages: Vec::new() };
+    let axes = ["more=0,1", "w=1.6u:2.4u:5", "F=1u,50u,200u"];
+    let options = CompileOptions { segments: Some(3), ..CompileOptions::default() };
+    let whole = swept(&text, &axes, transients.clone(), &options, Shard::default());
+    assert_eq!((whole.rows.len(), whole.failed()), (30, 0), "{}", whole.to_csv());
+    assert_eq!(whole.units, ["m", "m/s"]);
+    let spec = SweepSpec {
+        parameters: axes.iter().map(|axis| axis.parse().expect("an axis")).collect(),
+        analysis: transients.clone(),
+        shard: Shard::default(),
+        threads: None,
+    };
+    for row in whole.rows.iter().step_by(7) {
+        let set = spec.settings(row.point);
+        let compiled = compile(&Bundle::from_text("beams.net", &text), &CompileOptions { set, ..options.clone() });
+        let run = TransientOptions {
+            stop: 20e-6,
+            signals: vec!["m.y".into(), "t.vx".into()],
+            points: 2,
+            tol: options.tol,
+            ..TransientOptions::default()
+        };
+        let alone = transient(&compiled.expect("a variant"), &run, &mut |_, _| (), &mut |_| true).expect("a run");
+        let last: Vec<_> = alone.signals.iter().map(|s| s.2.last().copied()).collect();
+        assert_eq!(row.values.as_ref(), Ok(&last), "{:?}", row.parameters);
+        assert!(row.estimated_error.is_some());
+    }
+    let mut rows: Vec<_> = (0..3)
+        .flat_map(|index| swept(&text, &axes, transients.clone(), &options, Shard { index, count: 3 }).rows)
+        .collect();
+    rows.sort_by_key(|row| row.point);
+    assert_eq!(rows, whole.rows);
+    // a width that is none: its own error, and nobody else's
+    let broken = swept(&text, &["w=-1u,2u", "F=1u,2u"], transients, &options, Shard::default());
+    assert_eq!(broken.failed(), 2, "{}", broken.to_csv());
+}
