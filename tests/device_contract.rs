@@ -7,25 +7,7 @@ use bimorph::netlist::Bundle;
 use std::sync::Arc;
 
 /// A heated chevron that pushes a shuttle with a comb ahead of it and a plate beside it.
-const SHUTTLE: &str = "
-process p1 = [ Poisson=0.3 Youngsmodulus=160e9 density=2300 viscosity=1.8e-5 fluid=2e-6 permittivity=8.854e-12
-  sheetresistance=20 stress=0 straingradient=0 thermalexpansion=2.5e-6 ambienttemperature=300 thermcond=32 h=2u ]
-anchor p1 [a] [l=10u w=10u h=2u oz=pi]
-left  beam2det p1 [a c] [l=120u w=2u oz=0.1 tau=20u]
-right beam2det p1 [c b] [l=120u w=2u oz=-0.1]
-anchor p1 [b] [l=10u w=10u h=2u]
-rod beam2d p1 [c s] [l=40u w=4u oz=pi/2]
-mass2d * [s] [m=2e-11 J=1e-20]
-drive comb2de p1 [s k] [N=40 gap=2u l=10u L=30u h=2u oz=pi/2]
-anchor p1 [k] [l=5u w=5u h=2u]
-squeeze plategap2d p1 [s e] [A=4e-10 gap=1.5u oz=0]
-anchor p1 [e] [l=5u w=5u h=2u]
-eground * [b] []
-eground * [k] []
-eground * [e] []
-heat port * [a] []
-shake port * [s] []
-";
+const SHUTTLE: &str = include_str!("netlists/shuttle.net");
 
 /// The formulations that a device steps in; the contract is the same in each.
 const FORMULATIONS: [Formulation; 2] = [Formulation::Compliant, Formulation::Rcr];

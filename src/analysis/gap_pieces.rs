@@ -9,14 +9,19 @@ use crate::compile::Compiled;
 use crate::gaps::Gap;
 use crate::multibody::planar::Pose;
 use crate::structure::NodeId;
+use std::collections::HashMap;
 
 /// The gap that leaves out most at `q` with these voltages across the gaps, and that share of its distance [1].
 pub(super) fn left_out<'a>(compiled: &'a Compiled, q: &[Pose], volts: &[f64]) -> Option<(&'a str, f64)> {
     let (structure, system) = (&compiled.structure, &compiled.parts.system);
+    if structure.beam_gaps.is_empty() {
+        return None;
+    }
+    let between = |a: NodeId, b: NodeId| (a.min(b), a.max(b));
+    let beams: HashMap<_, _> = structure.beams.iter().rev().map(|beam| (between(beam.a, beam.b), beam)).collect();
     let facing = (0..system.gaps.len()).filter(|&g| matches!(system.gaps[g], Gap::Facing { .. }));
     let yields = |a: NodeId, b: NodeId| -> f64 {
-        let beam = structure.beams.iter().find(|beam| (beam.a, beam.b) == (a, b) || (beam.a, beam.b) == (b, a));
-        beam.map_or(0.0, |beam| {
+        beams.get(&between(a, b)).map_or(0.0, |beam| {
             let stiffness = beam.material.youngs_modulus * beam.thickness * beam.width.powi(3) / 12.0;
             beam.length.powi(4) / (384.0 * stiffness)
         })

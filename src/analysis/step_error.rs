@@ -2,15 +2,16 @@
 //!
 //! Control of each step bounds what a step adds, not what becomes of it: phases add up, and parts that swing far exchange
 //! energy. So the run has a companion at ten times the tolerance (or in steps of twice the length), and the difference of the two
-//! is measured as charts measure errors ([`relative_error`]). Were the error proportional to the tolerance, a ninth of the difference would be the
+//! is measured as charts measure errors ([`relative_error_above`]). Were the error proportional to the tolerance, a ninth of the difference would be the
 //! error of the finer run; found are ratios of the two errors from 1 (the single bimorph let go from 7 µm) to 12, so half of it is told.
 //!
 //! A companion has a third to a half of the steps. One that would take long is given up after 3e6 unknowns times steps, and its difference
 //! is continued in proportion to time, as phases go.
 
-use super::chart::error::relative_error;
+use super::chart::error::relative_error_above;
 use super::transient::{TransientOptions, TransientResult};
 use super::{AnalysisError, Watch};
+use crate::compile::Compiled;
 
 /// How much looser a companion is.
 const LOOSER: f64 = 10.0;
@@ -24,6 +25,8 @@ const MOST_WORK: f64 = 3e6;
 const FEWEST: usize = 16;
 /// Output times that are compared, at most about twice as many: evenly spaced ones of a run that has more.
 const ENOUGH: usize = 1000;
+/// What swings by less than this share of the scene is rounding: a symmetric part moves so across its axis [1].
+const STILL: f64 = 1e-9;
 
 /// Makes a run: with its options, told of each sample and of its progress.
 pub type Run<'r, T> = &'r mut dyn FnMut(
@@ -33,18 +36,18 @@ pub type Run<'r, T> = &'r mut dyn FnMut(
 ) -> Result<(TransientResult, T), AnalysisError>;
 
 /// Makes the run that `options` ask for, with [`TransientResult::step_error`], and a warning where that is beyond the tolerance.
-/// `unknowns` are those of the model; `sample` and `watch` are told of the run, not of its companion.
+/// `model` is what moves; `sample` and `watch` are told of the run, not of its companion.
 ///
 /// # Errors
 /// Those of the run; a companion that fails is none, and leaves the run without the estimate.
 pub fn with_step_error<T>(
     options: &TransientOptions<'_>,
-    unknowns: usize,
+    model: &Compiled,
     run: Run<'_, T>,
     sample: &mut dyn FnMut(f64, &[f64]),
     watch: Watch<'_>,
 ) -> Result<(TransientResult, T), AnalysisError> {
-    let companion = companion(options, unknowns, run, watch)?;
+    let (companion, whole) = companion(options, model.unknowns(), run, watch)?;
     let reached = companion.as_ref().map_or(0, |c| c.signals.first().map_or(0, |s| s.2.len()));
     let mut picked = Picked::new(options, reached);
     let mut both = |t: f64, values: &[f64]| {
@@ -52,10 +55,10 @@ pub fn with_step_error<T>(
         sample(t, values);
     };
     let (mut result, more) = run(options, &mut both, watch)?;
-    let Some(companion) = companion.filter(|_| reached >= FEWEST) else { return Ok((result, more)) };
+    let Some(companion) = companion.filter(|_| whole || reached >= FEWEST) else { return Ok((result, more)) };
     let signals = picked.signals(&result.signals);
     let found = TransientResult { signals, ..companion.clone() };
-    let apart = relative_error(&found, &companion);
+    let apart = relative_error_above(&found, &companion, &|unit| least(unit, options, model));
     let share = ((reached - 1) * stride(options)) as f64 / (options.points - 1) as f64;
     let error = if share < 1.0 { SHARE * apart / share } else { SHARE * apart };
     result.step_error = Some(error);
@@ -65,7 +68,19 @@ pub fn with_step_error<T>(
     Ok((result, more))
 }
 
-/// The companion of a run as far as it came; none where it failed.
+/// The amplitude below which a signal of this unit stands still.
+fn least(unit: &str, options: &TransientOptions<'_>, model: &Compiled) -> f64 {
+    let length = model.parts.system.length_scale;
+    match unit {
+        "m" => STILL * length,
+        "rad" | "K" => STILL,
+        "m/s" => STILL * length / options.stop,
+        "rad/s" => STILL / options.stop,
+        _ => 0.0,
+    }
+}
+
+/// The companion of a run as far as it came, none where it failed; and whether it came to the end.
 ///
 /// # Errors
 /// [`AnalysisError::Cancelled`].
@@ -74,11 +89,11 @@ fn companion<T>(
     unknowns: usize,
     run: Run<'_, T>,
     watch: Watch<'_>,
-) -> Result<Option<TransientResult>, AnalysisError> {
+) -> Result<(Option<TransientResult>, bool), AnalysisError> {
     let tol = (LOOSER * options.tol).min(LOOSEST);
     let looser = options.step.is_some() || tol >= 2.0 * options.tol;
-    if options.signals.is_empty() || options.points < FEWEST || !looser {
-        return Ok(None);
+    if options.signals.is_empty() || options.points < 2 || !looser {
+        return Ok((None, false));
     }
     let looser = TransientOptions {
         tol,
@@ -99,12 +114,13 @@ fn companion<T>(
     if stopped {
         return Err(AnalysisError::Cancelled);
     }
+    let whole = ended.is_ok();
     match ended {
         Ok(_) | Err(AnalysisError::Cancelled) => {
             let names: Vec<_> = options.signals.iter().map(|name| (name.clone(), String::new(), Vec::new())).collect();
-            Ok(Some(TransientResult { signals: picked.signals(&names), ..TransientResult::default() }))
+            Ok((Some(TransientResult { signals: picked.signals(&names), ..TransientResult::default() }), whole))
         }
-        Err(_) => Ok(None),
+        Err(_) => Ok((None, false)),
     }
 }
 

@@ -209,7 +209,7 @@ impl Tran {
                             transient(compiled, options, sample, watch).map(|r| (r, None))
                         }
                     };
-                with_step_error(&options, compiled.unknowns(), &mut run, &mut |_, _| (), watch)
+                with_step_error(&options, compiled, &mut run, &mut |_, _| (), watch)
             }
         };
         bar.finish_and_clear();
@@ -350,7 +350,7 @@ fn text(compiled: &Compiled, result: &TransientResult, joints: Option<&JointRepo
             j.accelerations, j.singular_evaluations, j.coordinates, j.constraints, j.largest_gap_m
         ),
     };
-    let off = result.step_error.map_or_else(String::new, |e| format!(", off by {e:.1e} at most"));
+    let off = result.step_error.map_or_else(|| ", not compared".to_owned(), |e| format!(", off by {e:.1e} at most"));
     format!(
         "{}\n{events}{} samples, {} steps ({} rejected){off}, {work}; {}",
         report::columns(&["signal", "lowest", "highest", "at the end"], &rows),

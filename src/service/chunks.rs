@@ -134,7 +134,7 @@ pub(super) fn send_transient(
         let options = TransientOptions { release: start.as_ref(), ..options.clone() };
         let run: step_error::Run<'_, ()> =
             &mut |options, sample, watch| transient(&moving, options, sample, watch).map(|r| (r, ()));
-        let (mut result, ()) = with_step_error(&options, moving.unknowns(), run, &mut sample, &mut watch)?;
+        let (mut result, ()) = with_step_error(&options, &moving, run, &mut sample, &mut watch)?;
         result.warnings.extend(mesh::warnings(&moving));
         Ok(result)
     });

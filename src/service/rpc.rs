@@ -9,7 +9,7 @@ use super::models::{Model, Models, check_size};
 use super::server::MakeDevice;
 use super::sessions::{Question, Sessions};
 use super::shutdown::Shutdown;
-use super::stream::TrialStream;
+use super::stream::{TrialStream, answerable};
 use super::sweeps::Sweeps;
 use super::work::{Results, Work, guarded};
 use super::{proto, status};
@@ -137,8 +137,7 @@ impl proto::bimorph_server::Bimorph for Calls {
     async fn open(&self, request: Request<proto::OpenRequest>) -> Reply<proto::OpenResponse> {
         let (shared, request) = (Arc::clone(&self.0), request.into_inner());
         let model = shared.models.get(&request.model)?;
-        count("ports", request.ports.len(), &shared.limits)?;
-        count("signals", request.signals.len(), &shared.limits)?;
+        answerable(&request, model.compiled.parts.system.electrics.ports, &shared.limits)?;
         let job = move |budget: &Budget| {
             let session = shared.sessions.create(&model, shared.make, &shared.limits)?;
             match session.answer(&Question::Open(request), budget) {

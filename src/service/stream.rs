@@ -5,6 +5,7 @@
 //! is stopped there and asked again on a blocking thread, as are models above
 //! [`Limits::inline_unknowns`](super::limits::Limits::inline_unknowns), one at a time, which keeps replies in order.
 
+use super::limits::Limits;
 use super::rpc::Shared;
 use super::sessions::{Question, Session, refused};
 use super::turns::{CLIENT, client};
@@ -74,16 +75,16 @@ impl TrialStream {
 
     /// Makes sure there is a session for this model: a second open of the same model is only a new epoch.
     fn enter(&mut self, open: &proto::OpenRequest) -> Result<(), Status> {
+        let shared = Arc::clone(&self.shared);
+        let limits = &shared.limits;
+        answerable(open, 0, limits)?;
         let alive = |session: &Arc<Session>| session.model() == open.model && !session.is_closed();
         if self.session.as_ref().is_some_and(alive) {
             return Ok(());
         }
         self.leave();
-        let (limits, asked) = (&self.shared.limits, open.ports.len().max(open.signals.len()));
-        if asked > limits.signals {
-            return Err(status::limit("signals", limits.signals, asked));
-        }
-        let model = self.shared.models.get(&open.model)?;
+        let model = shared.models.get(&open.model)?;
+        answerable(open, model.compiled.parts.system.electrics.ports, limits)?;
         let session = self.shared.sessions.create(&model, self.shared.make, &self.shared.limits)?;
         session.hold();
         self.session = Some(session);
@@ -113,6 +114,27 @@ impl TrialStream {
         }
         self.owned = false;
     }
+}
+
+/// Checks that the answers of a device with these ports (none: the model's `own`) and signals are messages that may be sent:
+/// derivatives are as many as the square of the ports.
+///
+/// # Errors
+/// RESOURCE_EXHAUSTED.
+pub(super) fn answerable(open: &proto::OpenRequest, own: usize, limits: &Limits) -> Result<(), Status> {
+    let signals = open.signals.len();
+    for (what, got) in [("ports", open.ports.len()), ("signals", signals)] {
+        if got > limits.signals {
+            return Err(status::limit(what, limits.signals, got));
+        }
+    }
+    let ports = if open.ports.is_empty() { own } else { open.ports.len() };
+    let bytes = size_of::<f64>().saturating_mul(ports).saturating_mul(2 * ports + signals);
+    if bytes > limits.message_bytes {
+        let got = format!("{bytes} for the derivatives of {ports} ports and {signals} signals");
+        return Err(status::limit("message_bytes", limits.message_bytes, got));
+    }
+    Ok(())
 }
 
 /// Answers on a thread, in the session's turn. Dropped, it stops the computation.

@@ -35,7 +35,7 @@ fn told(model: &Compiled, start: &Compiled, options: &TransientOptions<'_>) -> T
         |options: &TransientOptions<'_>, sample: &mut dyn FnMut(f64, &[f64]), watch: &mut dyn FnMut(f64) -> bool| {
             transient(model, options, sample, watch).map(|r| (r, ()))
         };
-    with_step_error(&options, model.unknowns(), &mut run, &mut |_, _| (), &mut |_| true).unwrap().0
+    with_step_error(&options, model, &mut run, &mut |_, _| (), &mut |_| true).unwrap().0
 }
 
 /// The single bimorph let go from 7 µm swings so far that its modes exchange energy, and control of each step does not hold the

@@ -319,6 +319,32 @@ fn long_trials() {
     });
 }
 
+/// Ten thousand ports are a hundred million derivatives in each answer: refused as a session opens, alone and on a stream
+/// that has one already.
+#[test]
+fn many_ports() {
+    Victim::attacked("10 000 ports", async |wire| {
+        let model = compiled(wire, chain(40)).await;
+        let many =
+            proto::OpenRequest { model: model.clone(), ports: vec!["n9.y".into(); 10_000], ..Default::default() };
+        let status = wire.open(many.clone()).await.expect_err("too many");
+        assert_eq!(status.code(), Code::ResourceExhausted);
+        assert!(status.message().starts_with("message_bytes"), "{}", status.message());
+
+        let few = proto::OpenRequest { model, ..Default::default() };
+        let asked = [few, many].map(|open| proto::DeviceRequest { kind: Some(Ask::Open(open)) });
+        let mut replies = wire.trial(tokio_stream::iter(asked)).await.expect("a stream").into_inner();
+        let mut kinds = Vec::new();
+        while let Some(reply) = replies.next().await {
+            kinds.push(reply.expect("a reply").kind.expect("a kind"));
+        }
+        let [proto::device_reply::Kind::Opened(_), proto::device_reply::Kind::Fault(fault)] = &kinds[..] else {
+            panic!("{kinds:?}")
+        };
+        assert!(fault.message.starts_with("message_bytes"), "{}", fault.message);
+    });
+}
+
 /// A log that nobody reads, or whose reader is gone, stops nothing.
 #[test]
 fn unread_logs() {

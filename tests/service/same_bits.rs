@@ -151,8 +151,7 @@ fn analyses_have_the_same_bits() {
         |options: &TransientOptions<'_>, sample: &mut dyn FnMut(f64, &[f64]), watch: &mut dyn FnMut(f64) -> bool| {
             transient(&moving, options, sample, watch).map(|r| (r, ()))
         };
-    let (local, ()) =
-        with_step_error(&options, moving.unknowns(), &mut run, &mut |_, _| {}, &mut |_| true).expect("runs");
+    let (local, ()) = with_step_error(&options, &moving, &mut run, &mut |_, _| {}, &mut |_| true).expect("runs");
     assert!(local.step_error.is_some());
     let remote = RemoteTransient {
         stop: options.stop,

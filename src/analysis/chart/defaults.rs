@@ -62,23 +62,28 @@ pub(super) fn defaults(
             progress.done += 1.0;
             if progress.run(0.0) { done } else { Err(AnalysisError::Cancelled.into()) }
         };
+        let point = |tol: f64| ChartPoint {
+            part: Part::Defaults,
+            formulation: Formulation::Compliant,
+            method: analysis,
+            solver: SolverKind::Recursion.name(),
+            tol,
+            band_hz: options.band,
+            unknowns: 0,
+            measured: None,
+            failed: None,
+        };
         let reference = match at(tight) {
-            Ok(reference) if still(&reference.found) => continue,
+            Ok(reference) if still(&reference.found) => {
+                let still = |&tol| ChartPoint { failed: Some("nothing moves".to_owned()), ..point(tol) };
+                chart.points.extend(spec.tols.iter().map(still));
+                progress.done += spec.tols.len() as f64;
+                continue;
+            }
             Err(error @ ChartError::Analysis(AnalysisError::Cancelled)) => return Err(error),
             reference => reference,
         };
         for &tol in &spec.tols {
-            let point = ChartPoint {
-                part: Part::Defaults,
-                formulation: Formulation::Compliant,
-                method: analysis,
-                solver: SolverKind::Recursion.name(),
-                tol,
-                band_hz: options.band,
-                unknowns: 0,
-                measured: None,
-                failed: None,
-            };
             let compared = match (&reference, at(tol)) {
                 (_, Err(error @ ChartError::Analysis(AnalysisError::Cancelled))) => return Err(error),
                 (Err(error), _) => Err(format!("the reference: {error}")),
@@ -93,8 +98,8 @@ pub(super) fn defaults(
                 }),
             };
             chart.points.push(match compared {
-                Ok(done) => ChartPoint { unknowns: done.unknowns, measured: Some(done.measured), ..point },
-                Err(reason) => ChartPoint { failed: Some(reason), ..point },
+                Ok(done) => ChartPoint { unknowns: done.unknowns, measured: Some(done.measured), ..point(tol) },
+                Err(reason) => ChartPoint { failed: Some(reason), ..point(tol) },
             });
         }
     }
@@ -138,7 +143,7 @@ fn analyse(
             let mut run = |options: &TransientOptions<'_>, sample: &mut dyn FnMut(f64, &[f64]), watch: Watch<'_>| {
                 transient(&moving, options, sample, watch).map(|r| (r, ()))
             };
-            let (result, ()) = with_step_error(&asked, moving.unknowns(), &mut run, &mut |_, _| (), watch)?;
+            let (result, ()) = with_step_error(&asked, &moving, &mut run, &mut |_, _| (), watch)?;
             let c = result.counters;
             measured = Measured {
                 steps: c.steps,

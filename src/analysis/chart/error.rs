@@ -8,12 +8,17 @@ use crate::analysis::transient::TransientResult;
 /// The error of `found` relative to the amplitude of `reference`; infinite where a motion stands against none, or is not
 /// finite. Both have the same signals at the same times.
 pub fn relative_error(reference: &TransientResult, found: &TransientResult) -> f64 {
+    relative_error_above(reference, found, &|_| 0.0)
+}
+
+/// [`relative_error`] with amplitudes of at least `least` of their unit: what swings less than that is measured by it.
+pub fn relative_error_above(reference: &TransientResult, found: &TransientResult, least: &dyn Fn(&str) -> f64) -> f64 {
     let mut units: Vec<&str> = reference.signals.iter().map(|s| s.1.as_str()).collect();
     units.sort_unstable();
     units.dedup();
     let mut worst: f64 = 0.0;
     for unit in units {
-        let (mut sum, mut count, mut amplitude) = (0.0, 0usize, 0.0f64);
+        let (mut sum, mut count, mut amplitude) = (0.0, 0usize, least(unit));
         for (want, got) in reference.signals.iter().zip(&found.signals).filter(|(want, _)| want.1 == unit) {
             let low = want.2.iter().copied().fold(f64::INFINITY, f64::min);
             let high = want.2.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -48,6 +53,16 @@ mod tests {
         let found = run(&[("m", &[1.1, 3.0]), ("m", &[0.1, 0.0]), ("rad", &[0.0, 0.2])]);
         assert!((relative_error(&reference, &found) - (0.02f64 / 4.0).sqrt()).abs() < 1e-15);
         assert_eq!(relative_error(&reference, &reference), 0.0);
+    }
+
+    /// What stands still but for rounding is measured by what counts as motion.
+    #[test]
+    fn rounding_is_no_motion() {
+        let reference = run(&[("m", &[1e-23, -1e-23]), ("K", &[0.0, 1.0])]);
+        let found = run(&[("m", &[-1e-23, 1e-23]), ("K", &[0.0, 1.0])]);
+        let least = |unit: &str| if unit == "m" { 1e-15 } else { 0.0 };
+        assert!(relative_error_above(&reference, &found, &least) < 1e-7);
+        assert!(relative_error(&reference, &found) > 1.0);
     }
 
     /// Nothing that is not a number passes for a small error.

@@ -292,6 +292,9 @@ pub(crate) fn pull_in_fitted(
         Some((_, result)) => PullInResult { estimated_error: fitted.order.estimated_error, ..result },
         None => pull_in(&fitted, port, max)?,
     };
+    if fitted.structure.beam_gaps.is_empty() {
+        return Ok((fitted, result));
+    }
     // next to the fold; and closed, where as much is left out as at release, but for V²
     let release = result.release_v.map_or(0.0, |volts| (volts / result.pull_in_v).powi(2));
     let points = [(0.98, OF_PULL_IN), (1.02, OF_DEFLECTION * release)];
