@@ -19,7 +19,8 @@ fn compiled(formulation: Formulation) -> Arc<Compiled> {
 
 fn opened(compiled: &Arc<Compiled>) -> LocalDevice {
     let mut device = LocalDevice::new(Arc::clone(compiled));
-    let signals = ["s.y", "s.x", "s.vy", "left.T", "right.T", "drive.q", "squeeze.gap"];
+    let signals =
+        ["s.y", "s.x", "s.vy", "left.T", "right.T", "drive.q", "squeeze.gap", "squeeze.C", "squeeze.F", "drive.F"];
     let request = OpenRequest { ports: Vec::new(), signals: signals.map(String::from).to_vec() };
     device.open(&request).unwrap();
     device
@@ -50,6 +51,32 @@ fn trials_are_pure() {
         let mut fresh = opened(&compiled);
         let rest = ask(&mut fresh, Mode::Static, None, 0.0, &[1.0, 5.0]);
         assert_eq!(ask(&mut fresh, Mode::Transient, rest.token, 2e-7, &[1.4, 5.5]), first);
+    }
+}
+
+/// Looking at a state gives the values that its trial answered, for opened signals and for all others, and leaves no trace; a name
+/// that is none is an error.
+#[test]
+fn a_look_is_what_the_trial_answered() {
+    for formulation in FORMULATIONS {
+        let compiled = compiled(formulation);
+        let mut device = opened(&compiled);
+        let rest = ask(&mut device, Mode::Static, None, 0.0, &[1.0, 5.0]);
+        let moved = ask(&mut device, Mode::Transient, rest.token, 2e-7, &[1.4, 5.5]);
+        let names: Vec<String> = device.names();
+        for reply in [&rest, &moved] {
+            for (name, value) in ["s.y", "s.x", "s.vy", "left.T", "right.T", "drive.q"].iter().zip(&reply.outputs) {
+                assert!(names.iter().any(|n| n == name), "{name}");
+                let seen = device.look(reply.token.unwrap(), name).unwrap();
+                assert!((seen - value).abs() <= 1e-14 * value.abs(), "{name}: {seen} for {value}");
+            }
+            for name in &names {
+                assert!(device.look(reply.token.unwrap(), name).unwrap().is_finite(), "{name}");
+            }
+        }
+        let unknown = device.look(moved.token.unwrap(), "nothing.x");
+        assert!(matches!(unknown, Err(DeviceError::UnknownSignal { .. })), "{unknown:?}");
+        assert_eq!(ask(&mut device, Mode::Transient, rest.token, 2e-7, &[1.4, 5.5]), moved);
     }
 }
 

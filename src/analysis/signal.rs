@@ -3,8 +3,8 @@
 use super::AnalysisError;
 use crate::compile::Compiled;
 use crate::gaps::Point;
-use crate::multibody::Model;
 use crate::multibody::planar::{self, Pose};
+use crate::multibody::{BodyId, Model};
 
 /// A quantity of a state.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -21,6 +21,10 @@ pub enum Signal {
     Charge(usize),
     /// Distance left in gap g [m].
     Distance(usize),
+    /// Capacitance of gap g [F].
+    Capacitance(usize),
+    /// Force with which the voltage closes gap g [N].
+    Pull(usize),
 }
 
 /// What signals are read from: a state, or a change of one.
@@ -37,7 +41,8 @@ pub struct View<'a> {
 }
 
 impl Signal {
-    /// Finds a signal by name: `NODE.x|y|rz|vx|vy|vrz`, the same of `BEAM[k]`, the k-th point along a beam from 0, `BEAM.T`, `GAP.q`, `GAP.gap`.
+    /// Finds a signal by name: `NODE.x|y|rz|vx|vy|vrz`, the same of `BEAM[k]`, the k-th point along a beam from 0, `BEAM.T`, `GAP.q`, `GAP.gap`, `GAP.C`,
+    /// `GAP.F`.
     ///
     /// # Errors
     /// [`AnalysisError::BadRequest`] with what would be understood.
@@ -61,6 +66,8 @@ impl Signal {
         match quantity {
             "q" => gap().map(Self::Charge),
             "gap" => gap().map(Self::Distance),
+            "C" => gap().map(Self::Capacitance),
+            "F" => gap().map(Self::Pull),
             "T" => {
                 let beam = compiled.structure.beams.iter().position(|b| b.name == part)?;
                 match compiled.parts.heaters.iter().position(|&b| b == beam) {
@@ -84,6 +91,8 @@ impl Signal {
             Self::Rate(..) => "m/s",
             Self::Temperature(_) | Self::Prescribed(_) => "K",
             Self::Charge(_) => "C",
+            Self::Capacitance(_) => "F",
+            Self::Pull(_) => "N",
         }
     }
 
@@ -100,6 +109,8 @@ impl Signal {
             Self::Prescribed(t) => t,
             Self::Charge(g) => system.capacitance(g, state.q) * state.volts[g],
             Self::Distance(g) => system.distance(g, state.q),
+            Self::Capacitance(g) => system.capacitance(g, state.q),
+            Self::Pull(g) => system.pull(g, state.q, state.volts[g]),
         }
     }
 
@@ -124,14 +135,29 @@ impl Signal {
                     + system.capacitance_slope(g, state.q, change.q) * state.volts[g]
             }
             Self::Distance(g) => system.distance_slope(g, state.q, change.q),
+            Self::Capacitance(g) => system.capacitance_slope(g, state.q, change.q),
+            Self::Pull(g) => system.pull_slope(g, state.q, state.volts[g], change.q, change.volts[g]),
         }
     }
 }
 
+/// Every signal of a model by name, in the order of the drawing: of nodes that can move, beams and gaps.
+pub fn names(compiled: &Compiled) -> Vec<String> {
+    let moves = |i: usize| compiled.parts.nodes[i].is_some_and(|p| matches!(p.body, BodyId::Free(_)));
+    let nodes = compiled.structure.nodes.iter().enumerate().filter(|(i, _)| moves(*i));
+    let motions = nodes.flat_map(|(_, n)| DIRECTIONS.map(|quantity| format!("{}.{quantity}", n.name)));
+    let temperatures = compiled.structure.beams.iter().map(|b| format!("{}.T", b.name));
+    let gaps = compiled.parts.gap_names.iter();
+    let of_gaps = gaps.flat_map(|gap| ["gap", "q", "C", "F"].map(|quantity| format!("{gap}.{quantity}")));
+    motions.chain(temperatures).chain(of_gaps).collect()
+}
+
+/// What the motion of a node consists of: displacements, then rates.
+const DIRECTIONS: [&str; 6] = ["x", "y", "rz", "vx", "vy", "vrz"];
+
 /// Direction and kind (true: rate) of the motion that `x`, `y`, `rz`, `vx`, `vy` and `vrz` stand for.
 fn direction(quantity: &str) -> Option<(usize, bool)> {
-    let names = ["x", "y", "rz", "vx", "vy", "vrz"];
-    names.iter().position(|n| *n == quantity).map(|k| (k % 3, k >= 3))
+    DIRECTIONS.iter().position(|n| *n == quantity).map(|k| (k % 3, k >= 3))
 }
 
 /// Node, direction and kind (true: rate) of a signal of a node.
@@ -169,7 +195,7 @@ fn hint(compiled: &Compiled, name: &str) -> String {
     let close: Vec<&str> = close.collect();
     let shown = if close.is_empty() { known.into_iter().take(8).collect::<Vec<_>>() } else { close };
     format!(
-        "no node, beam or gap of that name (expected NODE.x|y|rz|vx|vy|vrz, BEAM.T, GAP.q|gap; there is {})",
+        "no node, beam or gap of that name (expected NODE.x|y|rz|vx|vy|vrz, BEAM.T, GAP.q|gap|C|F; there is {})",
         shown.join(", ")
     )
 }

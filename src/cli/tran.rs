@@ -28,7 +28,7 @@ use std::path::PathBuf;
 
 /// Motion in time, from rest or from a released equilibrium.
 ///
-/// Signals: NODE.x, NODE.y [m], NODE.rz [rad], NODE.vx, NODE.vy [m/s], NODE.vrz [rad/s], BEAM.T [K], GAP.q [C].
+/// Signals: NODE.x, NODE.y [m], NODE.rz [rad], NODE.vx, NODE.vy [m/s], NODE.vrz [rad/s], BEAM.T [K], GAP.q [C], GAP.gap [m], GAP.C [F], GAP.F [N].
 /// JSON: "t" [s]; "signals": samples by name in SI; "units" by name; "method"; "counters": the work done; "events":
 /// crossings of --event levels and contacts of gaps, each with its time "t" [s] and "direction" up or down; "formulation",
 /// "estimated_error" by the mesh, "step_error" by the steps, of the amplitude; and for rcr "joint_coordinates": n, m, evaluations near singular configurations, largest gap of a loop [m].

@@ -4,6 +4,7 @@
 //! copy, and stores the result under a token that is a hash of the request: the same request always gives the same token
 //! and the same bits, whatever was asked in between.
 
+use super::look;
 use super::ports::Ports;
 use super::saved;
 use super::states::{Snapshot, States};
@@ -117,6 +118,16 @@ impl Device for LocalDevice {
         }
         let state = session.states.get(token).ok_or(DeviceError::UnknownToken(token))?;
         session.respond(&self.compiled, token, &state, omega, reply)
+    }
+
+    fn names(&self) -> Vec<String> {
+        look::names(&self.compiled)
+    }
+
+    fn look(&mut self, token: Token, name: &str) -> Result<f64, DeviceError> {
+        let session = self.session.as_mut().ok_or(DeviceError::NotOpen)?;
+        let state = session.states.get(token).ok_or(DeviceError::UnknownToken(token))?;
+        session.look(&self.compiled, &state, name)
     }
 
     fn save(&self, only: Option<Token>) -> Result<Vec<u8>, DeviceError> {

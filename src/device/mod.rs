@@ -15,6 +15,7 @@
 //! voltages and currents here holds for what is given and answered.
 
 pub mod local;
+pub mod look;
 pub mod ports;
 mod saved;
 pub mod shown;
@@ -113,9 +114,10 @@ pub struct PortInfo {
 /// A quantity that can be read from a state.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SignalInfo {
-    /// Name: `NODE.x`, `NODE.y`, `NODE.rz`, `NODE.vx`, `NODE.vy`, `NODE.vrz`, `BEAM.T`, `GAP.q`, `GAP.gap`, …
+    /// Name: `NODE.x`, `NODE.y`, `NODE.rz`, `NODE.vx`, `NODE.vy`, `NODE.vrz`, `BEAM.T`, `GAP.q`, `GAP.gap`,
+    /// `GAP.C`, `GAP.F`, …
     pub name: String,
-    /// Unit: "m", "rad", "m/s", "rad/s", "K", "C".
+    /// Unit: "m", "rad", "m/s", "rad/s", "K", "C", "F", "N".
     pub unit: String,
 }
 
@@ -211,6 +213,21 @@ pub trait Device: Send {
     /// # Errors
     /// [`DeviceError::UnknownToken`], [`DeviceError::Remote`].
     fn linearize(&mut self, token: Token, omega: f64, reply: &mut SmallSignal) -> Result<(), DeviceError>;
+
+    /// Names that [`Device::look`] knows: those of [`look::WHOLE`] and every signal. None where a device cannot be looked at.
+    fn names(&self) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// Value of a signal in a state, whether it was opened or not, or of the state as a whole ([`look::WHOLE`]), in its own unit.
+    ///
+    /// # Errors
+    /// [`DeviceError::UnknownToken`], [`DeviceError::UnknownSignal`].
+    fn look(&mut self, token: Token, name: &str) -> Result<f64, DeviceError> {
+        let _ = token;
+        let hint = "this device shows what was opened alone".to_owned();
+        Err(DeviceError::UnknownSignal { name: name.to_owned(), hint })
+    }
 
     /// Makes the device fit to go on after a call that was stopped in the middle ([`crate::budget`]): its storage is made
     /// anew, its states stay as they are. A device that holds no half computed storage does nothing.

@@ -233,6 +233,8 @@ impl Session {
                     Signal::Rate(_, 2) => nothing / self.first_step,
                     Signal::Rate(..) => nothing * system.length_scale / self.first_step,
                     Signal::Temperature(_) | Signal::Prescribed(_) => SAME_TEMPERATURE,
+                    Signal::Capacitance(g) => nothing * system.capacitance(*g, view.q).abs(),
+                    Signal::Pull(g) => nothing * system.pull(*g, view.q, view.volts[*g]).abs(),
                     Signal::Charge(g) => charge(system.capacitance(*g, view.q), view.volts[*g]),
                 };
                 before.step(request.dt, seen, tol, |n| match n.checked_sub(signals) {

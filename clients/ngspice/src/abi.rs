@@ -52,6 +52,10 @@ pub(crate) mod kind {
     pub(crate) const IF_STRING: c_int = 0x20;
     /// SPICE: an array of what the lower bits say.
     pub(crate) const IF_VECTOR: c_int = 0x8000;
+    /// SPICE: may be read, and `.sens` leaves it alone.
+    pub(crate) const IF_ASK: c_int = 0x0020_1000;
+    /// SPICE: `show` leaves it out unless all is asked for.
+    pub(crate) const IF_UNINTERESTING: c_int = 0x0200_0000;
     /// SPICE: may be read and set, and `.sens` leaves it alone.
     pub(crate) const IF_ASK_SET: c_int = 0x0020_3000;
 }
@@ -63,6 +67,8 @@ pub(crate) mod code {
     pub(crate) const OK: c_int = 0;
     /// Ends an analysis where no better code exists.
     pub(crate) const PANIC: c_int = 1;
+    /// There is no such parameter.
+    pub(crate) const BADPARM: c_int = 7;
     /// A parameter value cannot be used.
     pub(crate) const PARMVAL: c_int = 11;
     /// Newton's iteration limit: the step or the operating point is tried again by other means.
@@ -75,7 +81,6 @@ pub(crate) mod slot {
     pub(crate) const UNSETUP: usize = 4;
     pub(crate) const LOAD: usize = 5;
     pub(crate) const MODEL_PARAM: usize = 6;
-    pub(crate) const ASK: usize = 7;
     pub(crate) const MODEL_ASK: usize = 8;
     pub(crate) const TRUNC: usize = 9;
     pub(crate) const DELETE: usize = 11;

@@ -10,7 +10,7 @@ use crate::instance::Outcome;
 use crate::opening::open_all;
 use crate::registry::{close, registry};
 use crate::respond::{respond, settle};
-use crate::table::LAYOUT;
+use crate::table::{DEVICE, LAYOUT};
 use crate::{host, panics, trace};
 use std::ffi::{c_int, c_void};
 use std::io::Write;
@@ -40,16 +40,23 @@ pub(crate) unsafe extern "C" fn model_delete(model: *mut Model) -> c_int {
     guarded(|| unsafe { host::model_delete(model) })
 }
 
-/// Reads an instance parameter.
+/// Reads an instance parameter: what `show` and `@a1[…]` show.
 pub(crate) unsafe extern "C" fn ask(
-    circuit: *mut c_void,
+    _circuit: *mut c_void,
     instance: *mut abi::Instance,
     index: c_int,
     value: *mut c_void,
-    select: *mut c_void,
+    _select: *mut c_void,
 ) -> c_int {
-    // SAFETY: passed on.
-    guarded(|| unsafe { host::ask(circuit, instance, index, value, select) })
+    guarded(|| {
+        // SAFETY: the host passes a live instance.
+        let key = unsafe { (*instance).conn as usize };
+        let found = usize::try_from(index).ok().and_then(|number| registry().look(key, number));
+        let Some(x) = found else { return code::BADPARM };
+        // SAFETY: the host passes a place for a value, which for a real parameter begins with a double.
+        unsafe { value.cast::<f64>().write(x) };
+        code::OK
+    })
 }
 
 /// Reads a model parameter.
@@ -84,7 +91,10 @@ pub(crate) unsafe extern "C" fn setup(
         }
         // SAFETY: the host's lists of models and instances, set up above.
         match unsafe { open_all(model, circuit) } {
-            Ok(()) => code::OK,
+            Ok(()) => {
+                offer_names();
+                code::OK
+            }
             Err(text) => {
                 let _ = writeln!(std::io::stderr(), "Error: bimorph: {text}");
                 record_failure(&text);
@@ -93,6 +103,17 @@ pub(crate) unsafe extern "C" fn setup(
             }
         }
     })
+}
+
+/// Lets the host know what can be asked of the instances that are set up now.
+fn offer_names() {
+    let mut registry = registry();
+    let mut names = registry.names.take().unwrap_or_default();
+    if let Some(table) = names.renew(&registry) {
+        // SAFETY: the host is setting a circuit up and waits.
+        unsafe { DEVICE.set_instance_parameters(&table) };
+    }
+    registry.names = Some(names);
 }
 
 /// Closes the instances of these models: states and connections to servers end with the analysis.

@@ -57,8 +57,6 @@ pass_on!(/// Allocates matrix entries and outputs.
     setup, SETUP, (matrix: *mut c_void, model: *mut Model, circuit: *mut c_void, states: *mut c_int));
 pass_on!(/// Stores a model parameter.
     model_param, MODEL_PARAM, (index: c_int, value: *mut c_void, model: *mut Model));
-pass_on!(/// Reads an instance parameter.
-    ask, ASK, (circuit: *mut c_void, instance: *mut Instance, index: c_int, value: *mut c_void, select: *mut c_void));
 pass_on!(/// Reads a model parameter.
     model_ask, MODEL_ASK, (circuit: *mut c_void, model: *mut Model, index: c_int, value: *mut c_void));
 pass_on!(/// Bounds the next step.

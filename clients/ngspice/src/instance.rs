@@ -72,14 +72,14 @@ pub struct Answer {
 /// One device in a circuit.
 pub struct Instance {
     name: String,
-    device: Box<dyn Device>,
-    monitors: Vec<Monitor>,
+    pub(crate) device: Box<dyn Device>,
+    pub(crate) monitors: Vec<Monitor>,
     description: Description,
     /// Of each port.
     scales: Vec<Scale>,
     /// What is given to each port, in its own unit.
-    given: Vec<f64>,
-    reply: TrialReply,
+    pub(crate) given: Vec<f64>,
+    pub(crate) reply: TrialReply,
     answer: Answer,
     small: SmallSignal,
     small_key: Option<(Token, u64)>,
@@ -87,6 +87,18 @@ pub struct Instance {
     step_bound: f64,
     failures: u32,
     longest: f64,
+    pub(crate) counts: Counts,
+}
+
+/// What an instance has been asked since it was opened.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct Counts {
+    /// Points that the circuit accepted.
+    pub(crate) points: u64,
+    /// Questions for currents.
+    pub(crate) trials: u64,
+    /// Those without an answer.
+    pub(crate) refused: u64,
 }
 
 impl Instance {
@@ -155,6 +167,7 @@ impl Instance {
             step_bound: f64::INFINITY,
             failures: 0,
             longest: 0.0,
+            counts: Counts::default(),
         })
     }
 
@@ -223,6 +236,7 @@ impl Instance {
         if let Some(token) = self.answer.token.filter(|t| self.accepted != Some(*t)) {
             self.device.accept(token);
             self.accepted = Some(token);
+            self.counts.points += 1;
         }
     }
 
@@ -250,6 +264,7 @@ impl Instance {
         parent: Option<Token>,
     ) -> Result<(), DeviceError> {
         let request = Trial { mode, parent, t, dt, voltages };
+        self.counts.trials += 1;
         match self.device.trial(&request, &mut self.reply) {
             // A sweep's parent is a hint about the branch; equilibrium can be found without.
             Err(DeviceError::UnknownToken(_)) if mode == Mode::Static => {
@@ -273,13 +288,17 @@ impl Instance {
                 return Outcome::Solved;
             }
             // The host shortens the step and asks again, by as much as it takes.
-            Status::NeedDt(_) if step > HOPELESS * self.longest => return Outcome::Retry,
+            Status::NeedDt(_) if step > HOPELESS * self.longest => {
+                self.counts.refused += 1;
+                return Outcome::Retry;
+            }
             Status::NeedDt(bound) => {
                 format!("the model needs steps below {bound:e} s, and even {step:e} s is too long")
             }
             Status::Fail(why) => why.clone(),
         };
         self.failures += 1;
+        self.counts.refused += 1;
         let hopeless = time.is_some() && step <= HOPELESS * self.longest;
         if self.failures < ATTEMPTS && !hopeless { Outcome::Retry } else { Outcome::Stop(why) }
     }

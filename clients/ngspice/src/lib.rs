@@ -11,7 +11,7 @@
 //! # Layout
 //! What ngspice's memory looks like: `abi` the structures, [`layout`] which host this is, `table` what the plug-in
 //! declares, `exports` the symbols, `host` the host's functions, `call` one call's data,
-//! `circuit` what it is part of. Between the two sides stand
+//! `circuit` what it is part of, `look_table` what can be asked of it by name. Between the two sides stand
 //! `callbacks`, `opening` and `respond`, with the `registry` of instances. What does not know ngspice: [`model_card`],
 //! [`settings`], [`deck_options`] and `names` the `.model` line, [`opener`] from line to device, [`instance`] questions and outcomes,
 //! [`companion`] charges to currents, [`scale`] volts to micrometres, [`history`] what an accepted point leaves behind.
@@ -32,6 +32,8 @@ pub mod history;
 mod host;
 pub mod instance;
 pub mod layout;
+mod look;
+mod look_table;
 pub mod model_card;
 mod names;
 pub mod opener;

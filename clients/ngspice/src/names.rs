@@ -32,8 +32,9 @@ pub(crate) fn respell(card: &mut ModelCard, structure: &Structure) {
         } else {
             owner
         };
-        // Temperature is the only quantity with a capital letter.
-        Some(format!("{owner}.{}", if quantity == "t" { "T" } else { quantity }))
+        // Temperature, capacitance and force have a capital letter.
+        let capital = ["t", "c", "f"].contains(&quantity);
+        Some(format!("{owner}.{}", if capital { quantity.to_ascii_uppercase() } else { quantity.to_owned() }))
     };
     for port in &mut card.ports {
         let known = spelled(&port.name, ports.clone()).map(str::to_owned);

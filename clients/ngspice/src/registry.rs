@@ -4,6 +4,7 @@ use crate::call::Wanted;
 use crate::circuit::Circuit;
 use crate::history::History;
 use crate::instance::Instance;
+use crate::look_table::Names;
 use crate::trace;
 use bimorph::device::Token;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -41,10 +42,19 @@ pub(crate) struct Registry {
     pub(crate) stopped: bool,
     /// Key of the instance being asked.
     pub(crate) asked: usize,
+    /// What can be asked of instances by name; none before the first setup.
+    pub(crate) names: Option<Names>,
 }
 
-static REGISTRY: Mutex<Registry> =
-    Mutex::new(Registry { entries: Vec::new(), epochs: 0, loading: None, good: true, stopped: false, asked: 0 });
+static REGISTRY: Mutex<Registry> = Mutex::new(Registry {
+    entries: Vec::new(),
+    epochs: 0,
+    loading: None,
+    good: true,
+    stopped: false,
+    asked: 0,
+    names: None,
+});
 
 /// The registry, for as long as the guard lives: never while the host may call back.
 pub(crate) fn registry() -> MutexGuard<'static, Registry> {
@@ -80,6 +90,17 @@ pub(crate) fn close(key: usize) {
 }
 
 impl Registry {
+    /// Every instance that is set up, in the order of the circuit.
+    pub(crate) fn instances(&self) -> impl Iterator<Item = &Instance> {
+        self.entries.iter().map(|entry| &entry.instance)
+    }
+
+    /// Value of the quantity with this number in the last state of an instance; none where it has none.
+    pub(crate) fn look(&mut self, key: usize, number: usize) -> Option<f64> {
+        let name = self.names.as_ref()?.get(number)?.to_owned();
+        self.find(key)?.instance.look(&name)
+    }
+
     /// The instance whose connections stand at `key`: that address stays the same as long as it lives.
     pub(crate) fn find(&mut self, key: usize) -> Option<&mut Entry> {
         self.entries.iter_mut().find(|e| e.key == key)

@@ -10,6 +10,7 @@ use crate::abi::{
 use crate::callbacks;
 use crate::deck_options::{Declared, Written, declared};
 use crate::layout::{Layout, LayoutError, TABLE_WORDS};
+use crate::look_table;
 use crate::model_card::DEADLINE;
 use std::cell::UnsafeCell;
 use std::ffi::{CStr, CString, c_char, c_int, c_void};
@@ -207,7 +208,7 @@ fn connection<const N: usize>(
 /// The device table, with room for any host's.
 pub(crate) struct Table(UnsafeCell<[usize; TABLE_WORDS]>);
 
-// SAFETY: the plug-in writes it only while the host loads it, from the loading thread; the host reads it afterwards.
+// SAFETY: the plug-in writes it only while the host loads it or sets circuits up, from the host's thread; the host reads it afterwards.
 unsafe impl Sync for Table {}
 
 /// The one device of this plug-in.
@@ -225,7 +226,7 @@ impl Table {
     /// Writes one word of the table.
     ///
     /// # Safety
-    /// The host is loading the plug-in.
+    /// The host is loading the plug-in, or waits in a call for it.
     unsafe fn put<T>(&self, byte: usize, value: T) {
         debug_assert!(byte + size_of::<T>() <= TABLE_WORDS * 8);
         // SAFETY: in bounds and aligned; by contract nobody else uses the table now.
@@ -251,6 +252,18 @@ impl Table {
             self.put(80, declarations.connections.len() as c_int);
             self.put(88, declarations.connections.as_ptr());
             self.put(96, declarations.count);
+        }
+    }
+
+    /// Exchanges the instance parameters.
+    ///
+    /// # Safety
+    /// The host has called the plug-in and waits for it; it reads these two words when it looks a name up.
+    pub(crate) unsafe fn set_instance_parameters(&self, parameters: &look_table::Table) {
+        // SAFETY: by contract; what they point to stays for good.
+        unsafe {
+            self.put(40, std::ptr::from_ref(parameters.count));
+            self.put(48, parameters.first);
         }
     }
 

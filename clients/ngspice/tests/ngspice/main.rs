@@ -3,6 +3,7 @@
 mod analyses;
 mod analytic;
 mod charge;
+mod look;
 mod models;
 mod ports;
 #[cfg(feature = "remote")]
