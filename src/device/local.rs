@@ -109,14 +109,7 @@ impl Device for LocalDevice {
 
     fn linearize(&mut self, token: Token, omega: f64, reply: &mut SmallSignal) -> Result<(), DeviceError> {
         let session = self.session.as_mut().ok_or(DeviceError::NotOpen)?;
-        if !omega.is_finite() || omega < 0.0 {
-            return Err(DeviceError::BadRequest {
-                what: "omega",
-                expected: "a finite angular frequency of at least 0 rad/s".into(),
-                got: omega.to_string(),
-            });
-        }
-        let state = session.states.get(token).ok_or(DeviceError::UnknownToken(token))?;
+        let state = session.about(token, omega)?;
         session.respond(&self.compiled, token, &state, omega, reply)
     }
 
@@ -128,6 +121,12 @@ impl Device for LocalDevice {
         let session = self.session.as_mut().ok_or(DeviceError::NotOpen)?;
         let state = session.states.get(token).ok_or(DeviceError::UnknownToken(token))?;
         session.look(&self.compiled, &state, name)
+    }
+
+    fn noise(&mut self, token: Token, omega: f64, reply: &mut Vec<[f64; 2]>) -> Result<(), DeviceError> {
+        let session = self.session.as_mut().ok_or(DeviceError::NotOpen)?;
+        let state = session.about(token, omega)?;
+        session.noise(&self.compiled, (token, &state), omega, reply)
     }
 
     fn save(&self, only: Option<Token>) -> Result<Vec<u8>, DeviceError> {
@@ -242,6 +241,18 @@ impl Session {
             && (followed == 0 || followed == self.signals.len() + self.ports.len())
             && (state.carried.is_empty()
                 || state.carried.len() == carried.len() && state.carried.iter().zip(carried).all(alike))
+    }
+
+    /// The state that a small signal is about.
+    fn about(&mut self, token: Token, omega: f64) -> Result<Arc<Snapshot>, DeviceError> {
+        if !omega.is_finite() || omega < 0.0 {
+            return Err(DeviceError::BadRequest {
+                what: "omega",
+                expected: "a finite angular frequency of at least 0 rad/s".into(),
+                got: omega.to_string(),
+            });
+        }
+        self.states.get(token).ok_or(DeviceError::UnknownToken(token))
     }
 
     fn check(&self, request: &Trial<'_>) -> Result<(), DeviceError> {

@@ -16,6 +16,7 @@
 
 pub mod local;
 pub mod look;
+mod noise;
 pub mod ports;
 mod saved;
 pub mod shown;
@@ -227,6 +228,18 @@ pub trait Device: Send {
         let _ = token;
         let hint = "this device shows what was opened alone".to_owned();
         Err(DeviceError::UnknownSignal { name: name.to_owned(), hint })
+    }
+
+    /// One-sided spectral densities of what ports and signals answer at angular frequency `omega` [rad/s] about the state
+    /// `token`, and their cross-spectra: ports, then signals; row-major, complex, [answered²/Hz]. Each is that with nothing
+    /// else changed: the current of a port whose voltage is held. Empty where a device makes no noise.
+    ///
+    /// # Errors
+    /// Those of [`Device::linearize`].
+    fn noise(&mut self, token: Token, omega: f64, reply: &mut Vec<[f64; 2]>) -> Result<(), DeviceError> {
+        let _ = (token, omega);
+        reply.clear();
+        Ok(())
     }
 
     /// Makes the device fit to go on after a call that was stopped in the middle ([`crate::budget`]): its storage is made

@@ -6,12 +6,34 @@ use super::states::Snapshot;
 use super::{DeviceError, SmallSignal, Token};
 use crate::analysis::signal::View;
 use crate::compile::Compiled;
+use crate::gaps::System;
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
 use crate::solve::frequency::gyroscopic;
 use crate::solve::time::gyration::{held_out, skew};
 
 impl Session {
+    /// Factors the dynamic stiffness about a state, whose drive has been set.
+    pub(super) fn factor_about(
+        &mut self,
+        system: &System,
+        token: Token,
+        state: &Snapshot,
+        omega: f64,
+    ) -> Result<(), DeviceError> {
+        if self.linear.as_ref().is_none_or(|(t, _)| *t != token) {
+            let mut tangent = BlockMatrix::new(&system.model.pattern);
+            system.tangent(&state.q, &self.drive, &mut tangent, &mut self.motion.q);
+            self.linear = Some((token, tangent));
+        }
+        let Some((_, tangent)) = &self.linear else { return Err(DeviceError::NotOpen) };
+        self.harmonic.factor(system, tangent, omega).map_err(|e| DeviceError::BadRequest {
+            what: "omega",
+            expected: "a frequency away from an undamped resonance".into(),
+            got: format!("{omega:e} rad/s ({e})"),
+        })
+    }
+
     /// Small-signal response about a state.
     pub(super) fn respond(
         &mut self,
@@ -25,17 +47,7 @@ impl Session {
         let system = Self::system(&own, compiled);
         let electrics = &system.electrics;
         electrics.apply(&state.sources, &state.rise, &mut self.drive);
-        if self.linear.as_ref().is_none_or(|(t, _)| *t != token) {
-            let mut tangent = BlockMatrix::new(&system.model.pattern);
-            system.tangent(&state.q, &self.drive, &mut tangent, &mut self.motion.q);
-            self.linear = Some((token, tangent));
-        }
-        let Some((_, tangent)) = &self.linear else { return Err(DeviceError::NotOpen) };
-        self.harmonic.factor(system, tangent, omega).map_err(|e| DeviceError::BadRequest {
-            what: "omega",
-            expected: "a frequency away from an undamped resonance".into(),
-            got: format!("{omega:e} rad/s ({e})"),
-        })?;
+        self.factor_about(system, token, state, omega)?;
         let rate = system.frame(&self.drive).map_or(0.0, |frame| frame.rate);
         let (ports, gaps, heaters) = (self.ports.len(), self.drive.volts.len(), state.rise.len());
         reply.admittance.clear();

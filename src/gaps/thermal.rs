@@ -46,6 +46,8 @@ pub struct Heating {
     sources: usize,
     /// Heater by heater, its symmetric form Q over the sources, row-major [K/V²].
     form: Vec<f64>,
+    /// Heater by heater, its current for each volt of the sources that drive the network [S].
+    currents: Vec<DVector<f64>>,
     /// Nodes that stay at ambient.
     sink: Vec<bool>,
     /// Heater by heater, its rise for each watt of the inputs that follow the sources [K/W].
@@ -90,7 +92,7 @@ impl Heating {
                 }
             }
         }
-        Ok(Self { heaters, sources, form, sink: sink.to_vec(), heat: Vec::new() })
+        Ok(Self { heaters, sources, form, currents, sink: sink.to_vec(), heat: Vec::new() })
     }
 
     /// The same with inputs behind the sources, some of them heat.
@@ -126,6 +128,11 @@ impl Heating {
             return 0.0;
         }
         self.heat[k * count..(k + 1) * count].iter().zip(&u[self.sources..]).map(|(z, w)| z * w).sum()
+    }
+
+    /// Current in heater `k` for each volt of source `source` [S].
+    pub fn current(&self, k: usize, source: usize) -> f64 {
+        self.currents[k].get(source).copied().unwrap_or(0.0)
     }
 
     /// Entry (i, j) of the form of heater `k` [K/V²].

@@ -16,11 +16,13 @@
 //! | [`model`] | bodies, joints, dampers: the immutable model and the mutable state |
 //! | [`rcr`] | the same graph in relative joint coordinates, loops reduced inside the recursion |
 //! | [`relative`] | joint coordinates on a spanning tree, loops closed by springs |
+//! | [`agitation`] | the random forces that come with drag and dampers |
 //! | [`linear_system`] | K, M and C of a linear frame on one pattern |
 //! | [`forces`] | elastic forces, energy and tangent of a model at a configuration |
 //! | [`precise`] | the product of that tangent with a displacement in extended precision |
 //! | [`double`] | double-double numbers |
 
+pub mod agitation;
 pub mod body;
 pub mod double;
 pub mod factor;

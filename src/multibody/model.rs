@@ -6,7 +6,7 @@ use super::pattern::Pattern;
 use super::planar::{Block, JointFrame, Pose};
 use super::section::{LaidJoint, NONE, Place, Section, Sections};
 use crate::sets::Sets;
-use nalgebra::{Matrix2, Matrix3, Matrix6, Vector3};
+use nalgebra::{Matrix2, Matrix3, Matrix3x6, Matrix6, Vector3};
 use serde::{Deserialize, Serialize};
 
 /// A body of the model, or ground.
@@ -56,9 +56,14 @@ pub struct Damper {
 impl Damper {
     /// Force on the pair's six coordinates per rate: symmetric and constant.
     fn matrix(&self) -> Matrix6<f64> {
-        let rest = Pose::zeros();
-        let rows = self.frame.kinematics(&rest, &rest, &[0.0; 3]).rows();
+        let rows = self.rows();
         rows.transpose() * Matrix3::from_diagonal(&self.coefficients) * rows
+    }
+
+    /// Strains (u, g, p) per displacement of the pair, about the drawn place.
+    pub(crate) fn rows(&self) -> Matrix3x6<f64> {
+        let rest = Pose::zeros();
+        self.frame.kinematics(&rest, &rest, &[0.0; 3]).rows()
     }
 }
 

@@ -164,7 +164,7 @@ impl proto::bimorph_server::Bimorph for Calls {
         let turn = session.turn().await?;
         let job = move || {
             let _turn = turn;
-            session.linearize(Token(request.token), &request.omega)
+            session.linearize(Token(request.token), &request.omega, request.noise)
         };
         let points = self.0.desk.run(job).await?;
         Ok(Response::new(proto::LinearizeResponse { points }))

@@ -142,7 +142,7 @@ impl Session {
                 return None;
             }
             Question::Linearize(request) => {
-                small_signal(device, Token(request.token), request.omega).map(ReplyKind::Linearized)
+                small_signal(device, Token(request.token), request.omega, request.noise).map(ReplyKind::Linearized)
             }
         };
         Some(answer.unwrap_or_else(|error| ReplyKind::Fault(wire::fault_to_wire(&error))))
@@ -192,11 +192,16 @@ impl Session {
     }
 
     /// Small-signal answers at several frequencies, for the unary call, which runs under a budget of its own.
-    pub(super) fn linearize(&self, token: Token, omega: &[f64]) -> Result<Vec<proto::SmallSignal>, Status> {
+    pub(super) fn linearize(
+        &self,
+        token: Token,
+        omega: &[f64],
+        noise: bool,
+    ) -> Result<Vec<proto::SmallSignal>, Status> {
         self.touch();
         let mut device = self.device.lock().unwrap_or_else(PoisonError::into_inner);
         let budget = budget::current().unwrap_or_else(|| Budget::new(Allowance::default()));
-        let one = |&omega: &f64, device: &mut dyn Device| small_signal(device, token, omega);
+        let one = |&omega: &f64, device: &mut dyn Device| small_signal(device, token, omega, noise);
         match caught(&budget, || omega.iter().map(|omega| one(omega, device.as_mut())).collect::<Result<_, _>>()) {
             Some(Ok(answer)) => answer.map_err(|error| status::device(&error)),
             Some(Err(why)) => {
@@ -254,10 +259,20 @@ impl Session {
     }
 }
 
-fn small_signal(device: &mut dyn Device, token: Token, omega: f64) -> Result<proto::SmallSignal, DeviceError> {
+fn small_signal(
+    device: &mut dyn Device,
+    token: Token,
+    omega: f64,
+    noise: bool,
+) -> Result<proto::SmallSignal, DeviceError> {
     if !omega.is_finite() {
         let (expected, got) = ("a finite angular frequency [rad/s]".to_owned(), omega.to_string());
         return Err(DeviceError::BadRequest { what: "omega", expected, got });
+    }
+    if noise {
+        let mut densities = Vec::new();
+        device.noise(token, omega, &mut densities)?;
+        return Ok(wire::noise_to_wire(&densities));
     }
     let mut answer = SmallSignal::default();
     device.linearize(token, omega, &mut answer)?;

@@ -215,7 +215,7 @@ fn long_linearize() {
         let reply = replies.message().await.expect("a trial").expect("a reply");
         let Some(proto::device_reply::Kind::Trial(reply)) = reply.kind else { panic!("{reply:?}") };
         let omega = (0..5000).map(|k| 1e3 + f64::from(k)).collect();
-        let request = proto::LinearizeRequest { session: opened.session, token: reply.token, omega };
+        let request = proto::LinearizeRequest { session: opened.session, token: reply.token, omega, noise: false };
         let mut other = wire.clone();
         let long = tokio::time::timeout(Duration::from_secs(3), other.linearize(request));
         let waits = async {

@@ -118,7 +118,12 @@ fn sessions_outlive_streams() {
         let replies = client.trial(tokio_stream::iter(requests)).await.expect("a stream").into_inner();
         let replies: Vec<_> = replies.map(|r| r.expect("a reply").kind.expect("a kind")).collect().await;
         assert!(matches!(&replies[1], Reply::Trial(t) if t.token != answer.token), "{:?}", replies[1]);
-        let request = proto::LinearizeRequest { session: session.clone(), token: answer.token, omega: vec![1.0, 2.0] };
+        let request = proto::LinearizeRequest {
+            session: session.clone(),
+            token: answer.token,
+            omega: vec![1.0, 2.0],
+            ..Default::default()
+        };
         let points = client.linearize(request).await.expect("an answer").into_inner().points;
         assert_eq!(points[1].admittance_im, [2e-12, 0.0, 0.0, 2e-12]);
 

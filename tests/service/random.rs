@@ -33,8 +33,8 @@ fn request() -> impl Strategy<Value = Option<Ask>> {
             Ask::Trial(proto::TrialRequest { mode, parent, t, dt, voltages })
         });
     let accept = any::<u64>().prop_map(|token| Ask::Accept(proto::Accept { token }));
-    let linearize =
-        (any::<u64>(), number()).prop_map(|(token, omega)| Ask::Linearize(proto::SmallSignalRequest { token, omega }));
+    let linearize = (any::<u64>(), number())
+        .prop_map(|(token, omega)| Ask::Linearize(proto::SmallSignalRequest { token, omega, noise: token % 2 == 0 }));
     let attach = ".{0,12}".prop_map(|session| Ask::Attach(proto::Attach { session }));
     prop_oneof![
         3 => open.prop_map(Some),

@@ -69,6 +69,10 @@ fn drive(device: &mut dyn Device, ports: &[(&str, f64)], signals: &[&str]) -> Ve
     for omega in [0.0, 1e5, 6e6] {
         let outcome = state.map(|token| device.linearize(token, omega, &mut small));
         said.push(format!("{outcome:?} {small:?}"));
+        let mut noise = Vec::new();
+        let outcome = state.map(|token| device.noise(token, omega, &mut noise));
+        assert!(state.is_none() || noise.len() >= ports.len() * ports.len());
+        said.push(format!("{outcome:?} {noise:?}"));
     }
     said
 }

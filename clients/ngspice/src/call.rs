@@ -112,6 +112,31 @@ pub(crate) unsafe fn partial_at_80(conn: *mut *mut Connection) -> bool {
     unsafe { !(*(*(**conn).port).add(port_data::PARTIAL_39).cast::<*mut c_void>()).is_null() }
 }
 
+/// The two places in the circuit's solution between which each port, then each monitor adds what it answers: a current flows
+/// into the part, out of the circuit; a voltage stands in a branch.
+///
+/// # Safety
+/// As for [`partial_at_80`], in the host's layout.
+pub(crate) unsafe fn terminals(conn: *mut *mut Connection, layout: &Layout) -> Vec<[i32; 2]> {
+    // SAFETY: by contract; a port's matrix data hold its nodes and its branch.
+    unsafe {
+        let matrix = layout.port_matrix(partial_at_80(conn));
+        let mut terminals = Vec::new();
+        for which in [PORTS, MONITORS] {
+            for n in 0..size(conn, which) {
+                let port = *(**conn.add(which)).port.add(n);
+                let number = |at: usize| *port.add(matrix + at).cast::<i32>();
+                let branch = which == MONITORS || is_branch(port);
+                terminals.push(match branch {
+                    true => [number(port_data::BRANCH), 0],
+                    false => [number(port_data::NODES[1]), number(port_data::NODES[0])],
+                });
+            }
+        }
+        terminals
+    }
+}
+
 /// By which of its functions the host wants the device loaded. It tells a code model the kind of the analysis, too, but
 /// that may be the kind of the one before: `.noise`, `.pz`, `.tf` and `.sens` do not set it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

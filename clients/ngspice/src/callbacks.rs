@@ -11,7 +11,7 @@ use crate::opening::open_all;
 use crate::registry::{close, registry};
 use crate::respond::{respond, settle};
 use crate::table::{DEVICE, LAYOUT};
-use crate::{host, panics, trace};
+use crate::{host, noise, panics, trace};
 use std::ffi::{c_int, c_void};
 use std::io::Write;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -201,6 +201,25 @@ pub(crate) unsafe extern "C" fn distortion(_mode: c_int, model: *mut Model, _cir
         let any = unsafe { call::instances(model).next() }.is_some();
         let text = ".disto knows no electro-mechanical parts; use .tran and fourier";
         if any { refuse(text) } else { code::OK }
+    })
+}
+
+/// Adds the part's share to the noise at the output.
+pub(crate) unsafe extern "C" fn noise(
+    mode: c_int,
+    operation: c_int,
+    model: *mut Model,
+    circuit: *mut c_void,
+    analysis: *mut noise::Analysis,
+    density: *mut f64,
+) -> c_int {
+    guarded(|| {
+        let Some(layout) = LAYOUT.get() else { return code::PANIC };
+        // SAFETY: passed on.
+        match unsafe { noise::add((mode, operation), model, circuit, layout, (analysis, density)) } {
+            Ok(()) => code::OK,
+            Err(text) => refuse(&text),
+        }
     })
 }
 

@@ -16,12 +16,17 @@ const SOLUTION: usize = 280;
 /// Offset of the solution before it, at which the devices were loaded [byte].
 const LOADED_AT: usize = 288;
 
+/// Offset of the imaginary part of a small-signal solution [byte].
+const IMAGINARY: usize = 304;
+
 /// Offset of the angular frequency up to ngspice 41 [byte].
 const OMEGA_39: usize = 568;
 
 /// Bits of the mode.
 mod bit {
     pub(super) const TRANSIENT: u64 = 0x1;
+    pub(super) const SMALL: u64 = 0x2;
+    pub(super) const NOISE: u64 = 0x8;
     pub(super) const SWEEP: u64 = 0x40;
     /// Every kind of analysis.
     pub(super) const KINDS: u64 = 0x73;
@@ -92,6 +97,12 @@ impl Circuit {
         self.mode() & (bit::GIVEN | bit::TRANSIENT_POINT) == bit::GIVEN | bit::TRANSIENT_POINT
     }
 
+    /// Noise is being analysed, in the adjoint of the circuit.
+    pub(crate) fn noise(self) -> bool {
+        let noise = |word: u64| word & !bit::ALL == 0 && word & bit::KINDS == bit::SMALL && word & bit::NOISE != 0;
+        self.layout.mode_offsets().into_iter().any(|offset| noise(self.read(offset)))
+    }
+
     /// Angular frequency of a small-signal solution [rad/s], where it is known how this host keeps it.
     pub(crate) fn omega(self) -> Option<f64> {
         (self.layout.generation == Generation::Since39).then(|| self.read(OMEGA_39))
@@ -118,6 +129,16 @@ impl Circuit {
     pub(crate) unsafe fn loaded_at(self, [positive, negative]: [i32; 2]) -> f64 {
         // SAFETY: as above.
         unsafe { difference(self.read(LOADED_AT), positive, negative) }
+    }
+
+    /// Difference of the complex solution between two places, while the circuit's adjoint is solved: the effect on the
+    /// output of a current into the first and out of the second.
+    ///
+    /// # Safety
+    /// The places are the circuit's.
+    pub(crate) unsafe fn adjoint(self, [positive, negative]: [i32; 2]) -> [f64; 2] {
+        // SAFETY: by contract.
+        [SOLUTION, IMAGINARY].map(|part| unsafe { difference(self.read(part), positive, negative) })
     }
 
     /// Adds to the right-hand side of an equation.

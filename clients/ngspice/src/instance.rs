@@ -355,6 +355,28 @@ impl Instance {
         }
     }
 
+    /// Spectral density that the part adds at an output on which its ports, then its monitors act by `gains` [complex].
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn noise(&mut self, token: Token, omega: f64, gains: &[[f64; 2]]) -> Result<f64, DeviceError> {
+        let mut densities = Vec::new();
+        self.device.noise(token, omega, &mut densities)?;
+        if densities.len() != gains.len() * gains.len() {
+            return Ok(0.0);
+        }
+        let scales = self.scales.iter().map(|s| s.answered).chain(self.monitors.iter().map(|m| m.scale));
+        let gains: Vec<[f64; 2]> = gains.iter().zip(scales).map(|(g, scale)| g.map(|x| x * scale)).collect();
+        let mut sum = 0.0;
+        for (row, a) in densities.chunks_exact(gains.len().max(1)).zip(&gains) {
+            for (s, b) in row.iter().zip(&gains) {
+                // the real part of a·s·b̄; the imaginary ones cancel
+                sum += (a[0] * b[0] + a[1] * b[1]) * s[0] - (a[1] * b[0] - a[0] * b[1]) * s[1];
+            }
+        }
+        Ok(sum.max(0.0))
+    }
+
     fn linearize(&mut self, omega: f64, token: Option<Token>) -> Outcome {
         let Some(token) = token else {
             return Outcome::Stop("a small-signal analysis needs an operating point first".into());

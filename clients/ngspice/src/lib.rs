@@ -36,6 +36,7 @@ mod look;
 mod look_table;
 pub mod model_card;
 mod names;
+mod noise;
 pub mod opener;
 mod opening;
 mod panics;

@@ -28,6 +28,8 @@ pub(crate) struct Entry {
     pub(crate) balanced: Option<Token>,
     /// Where the last answer's record stands: an address in the host's state memory, good until the point is accepted.
     pub(crate) record: usize,
+    /// Its share in the noise at the output at the last frequency.
+    pub(crate) density: f64,
 }
 
 /// Every instance, and what concerns the load under way.
@@ -77,6 +79,7 @@ pub(crate) fn register(key: usize, instance: Instance) {
         nodes: Vec::new(),
         balanced: None,
         record: 0,
+        density: 0.0,
     };
     match registry.find(key) {
         Some(old) => *old = entry,

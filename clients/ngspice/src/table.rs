@@ -300,6 +300,7 @@ impl Table {
             self.put(at + 128, callbacks::model_ask as *const c_void);
             self.put(at + 144, callbacks::convergence_test as *const c_void);
             self.put(at + 200, callbacks::distortion as *const c_void);
+            self.put(at + 208, callbacks::noise as *const c_void);
             // Behind the table of a host without KLU, which never looks there.
             let bind = layout.sizes() + 16;
             self.put(bind, callbacks::bind as *const c_void);

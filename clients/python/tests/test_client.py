@@ -122,6 +122,23 @@ def test_small_signals(plate: bimorph.Model) -> None:
         assert abs(y.imag) == pytest.approx(omega * abs(charge[1] - charge[0]) / (2 * h), rel=1e-5)
 
 
+def test_noise(client: bimorph.Client) -> None:
+    """A damped mass moves by 4·k_B·T·c·|χ|² (Callen and Welton 1951); 27 °C where the netlist names no temperature."""
+    m, c, k = 1e-10, 5e-7, 4.0
+    text = (
+        "anchor * [g] [l=1u w=1u h=1u]\nmass2d * [m] [m=1e-10 J=1e-20]\n"
+        "spring2d * [g m] [kx=4 ky=1e3 krz=1]\ndamper2d * [g m] [bx=5e-7]\n"
+    )
+    model = client.compile(bimorph.Netlist.text(text, "mass.net"))
+    with model.session(ports=["m.x"], signals=["m.vx"]) as session:
+        session.operating_point({})
+        for omega in (1e3, 2e5):
+            noise = session.noise(omega)
+            want = 4 * 1.380649e-23 * 300.15 * c / ((k - m * omega**2) ** 2 + (omega * c) ** 2)
+            assert noise["m.x"]["m.x"] == pytest.approx(want, rel=1e-9, abs=0)
+            assert noise["m.vx"]["m.x"] == pytest.approx(1j * omega * want, rel=1e-9, abs=0)
+
+
 def test_sweeps(client: bimorph.Client) -> None:
     """A grid comes back in order; shards put together are the whole; a failed point has a reason and no number."""
     netlist = bimorph.Netlist.text(PLATE, "plate.net")

@@ -108,6 +108,14 @@ impl RemoteDevice {
         answer.map_err(|status| self.lose(&status))
     }
 
+    fn small_signal(&mut self, request: proto::SmallSignalRequest) -> Result<proto::SmallSignal, DeviceError> {
+        match self.ask(RequestKind::Linearize(request))? {
+            ReplyKind::Linearized(answer) => Ok(answer),
+            ReplyKind::Fault(fault) => Err(self.fault(fault)),
+            _ => Err(self.unexpected()),
+        }
+    }
+
     fn opened(&self) -> bool {
         self.stream.as_ref().is_some_and(|stream| stream.opened)
     }
@@ -215,13 +223,17 @@ impl Device for RemoteDevice {
         if !self.opened() {
             return Err(self.closed());
         }
-        match self.ask(RequestKind::Linearize(proto::SmallSignalRequest { token: token.0, omega }))? {
-            ReplyKind::Linearized(answer) => {
-                wire::small_signal_from_wire(&answer, reply);
-                Ok(())
-            }
-            ReplyKind::Fault(fault) => Err(self.fault(fault)),
-            _ => Err(self.unexpected()),
+        let answer = self.small_signal(proto::SmallSignalRequest { token: token.0, omega, noise: false })?;
+        wire::small_signal_from_wire(&answer, reply);
+        Ok(())
+    }
+
+    fn noise(&mut self, token: Token, omega: f64, reply: &mut Vec<[f64; 2]>) -> Result<(), DeviceError> {
+        if !self.opened() {
+            return Err(self.closed());
         }
+        let answer = self.small_signal(proto::SmallSignalRequest { token: token.0, omega, noise: true })?;
+        wire::noise_from_wire(&answer, reply);
+        Ok(())
     }
 }

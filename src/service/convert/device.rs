@@ -135,7 +135,20 @@ pub fn small_signal_to_wire(answer: &SmallSignal) -> proto::SmallSignal {
         admittance_im: part(&answer.admittance, 1),
         outputs_re: part(&answer.outputs, 0),
         outputs_im: part(&answer.outputs, 1),
+        ..Default::default()
     }
+}
+
+/// Spectral densities as they travel.
+pub fn noise_to_wire(noise: &[[f64; 2]]) -> proto::SmallSignal {
+    let part = |k: usize| noise.iter().map(|z| z[k]).collect();
+    proto::SmallSignal { noise_re: part(0), noise_im: part(1), ..Default::default() }
+}
+
+/// Fills `noise` from a message.
+pub fn noise_from_wire(wire: &proto::SmallSignal, noise: &mut Vec<[f64; 2]>) {
+    noise.clear();
+    noise.extend(wire.noise_re.iter().zip(&wire.noise_im).map(|(&re, &im)| [re, im]));
 }
 
 /// Fills `answer` from a message.

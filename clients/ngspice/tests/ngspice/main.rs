@@ -5,6 +5,7 @@ mod analytic;
 mod charge;
 mod look;
 mod models;
+mod noise;
 mod ports;
 #[cfg(feature = "remote")]
 mod remote;

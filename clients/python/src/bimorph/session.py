@@ -175,13 +175,25 @@ class Session:
 
     def linearize(self, omega: float, reply: TrialReply | None = None) -> dict[str, dict[str, complex]]:
         """Port admittances [S] at angular frequency ``omega`` [rad/s] about a state, by default the accepted one."""
+        answer = self._small_signal(omega, reply, noise=False)
+        values = [complex(re, im) for re, im in zip(answer.admittance_re, answer.admittance_im)]
+        return _matrix(self.ports, self.ports, values)
+
+    def noise(self, omega: float, reply: TrialReply | None = None) -> dict[str, dict[str, complex]]:
+        """One-sided spectral densities of what ports and signals answer, at angular frequency ``omega`` [rad/s] about a state,
+        by default the accepted one, and their cross-spectra: each with nothing else changed, as the current [A²/Hz] of a port
+        whose voltage is held, or the displacement [m²/Hz] of ``NODE.x``."""
+        answer = self._small_signal(omega, reply, noise=True)
+        values = [complex(re, im) for re, im in zip(answer.noise_re, answer.noise_im)]
+        names = (*self.ports, *self.signals)
+        return _matrix(names, names, values)
+
+    def _small_signal(self, omega: float, reply: TrialReply | None, *, noise: bool) -> device_pb2.SmallSignal:
         state = reply or self.accepted
         if state is None:
             raise ValueError("there is no accepted state; call operating_point first")
-        request = device_pb2.SmallSignalRequest(token=state.token, omega=omega)
-        answer = self._ask(device_pb2.DeviceRequest(linearize=request)).linearized
-        values = [complex(re, im) for re, im in zip(answer.admittance_re, answer.admittance_im)]
-        return _matrix(self.ports, self.ports, values)
+        request = device_pb2.SmallSignalRequest(token=state.token, omega=omega, noise=noise)
+        return self._ask(device_pb2.DeviceRequest(linearize=request)).linearized
 
     def read(self, signal: str) -> float:
         """Value of an opened signal in the accepted state, in its unit."""

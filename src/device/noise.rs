@@ -1,0 +1,164 @@
+//! Noise of ports and signals: what drag, dampers and resistors add to every answer by being warm.
+//!
+//! Drag and dampers push the mechanism with forces of the spectral density 4·k_B·T·C ([`crate::multibody::agitation`]), and a
+//! beam that carries current has Johnson's 4·k_B·T/R across it, T with its own rise. With hᵢ what a unit force on each body
+//! does to answer i, the one-sided spectral densities of the answers and their cross-spectra are
+//! ```text
+//! S_ij = 4·k_B·T·hᵢᵀ·C·h̄_j + 4·k_B·[T·G_ij + Σ_k rise_k·R_k·I_ki·I_kj]     [answered²/Hz]
+//! ```
+//! G being the conductance between electrical ports and I_ki the current in beam k for a volt at port i. hᵢ is found from one
+//! solution for each answer, not for each damper: hᵢ = Z⁻ᵀ·lᵢ, where lᵢ is what answer i sees of a displacement (the adjoint of the
+//! response; a frame that turns makes Z differ from its transpose by the sign of the rate).
+//!
+//! An answer is that with nothing else changed: the current of a port whose voltage is held, the motion of one whose force
+//! is. Left out: fluctuations of temperature, and what Johnson's noise heats.
+
+use super::local::Session;
+use super::ports::Answer;
+use super::states::Snapshot;
+use super::{DeviceError, Token};
+use crate::analysis::signal::{Signal, View};
+use crate::budget;
+use crate::compile::Compiled;
+use crate::gaps::System;
+use crate::multibody::agitation::{BOLTZMANN, damped};
+use crate::multibody::planar::Pose;
+use crate::solve::frequency::gyroscopic;
+use crate::solve::harmonic::ComplexPose;
+use nalgebra::Complex;
+
+/// Temperature of a mechanism whose netlist names none: 27 °C, as circuits have it [K].
+const ROOM: f64 = 300.15;
+
+/// Temperature of what surrounds the mechanism [K].
+pub(super) fn surroundings(compiled: &Compiled) -> f64 {
+    let ambient = compiled.structure.beams.iter().map(|beam| beam.material.ambient_temperature);
+    ambient.into_iter().find(|t| *t > 0.0).unwrap_or(ROOM)
+}
+
+impl Session {
+    /// Spectral densities of ports, then signals, about a state: row-major, complex.
+    pub(super) fn noise(
+        &mut self,
+        compiled: &Compiled,
+        (token, state): (Token, &Snapshot),
+        omega: f64,
+        out: &mut Vec<[f64; 2]>,
+    ) -> Result<(), DeviceError> {
+        let own = self.ports.system.clone();
+        let system = Self::system(&own, compiled);
+        let electrics = &system.electrics;
+        electrics.apply(&state.sources, &state.rise, &mut self.drive);
+        self.factor_about(system, token, state, omega)?;
+        let rate = system.frame(&self.drive).map_or(0.0, |frame| frame.rate);
+        let (ports, n) = (self.ports.len(), system.bodies());
+        let answers = ports + self.signals.len();
+        budget::lay_out_matrix(answers, 12 * n + 2 * answers);
+
+        let mut adjoint: Vec<Vec<ComplexPose>> = Vec::with_capacity(answers);
+        for i in 0..answers {
+            budget::check();
+            let mut h = self.seen(compiled, system, state, i, omega);
+            for (h, body) in h.iter_mut().zip(&system.model.bodies) {
+                if let Some(free) = &body.free {
+                    *h = free.map(Complex::from) * *h;
+                }
+            }
+            gyroscopic::solve(&mut self.harmonic, system, (omega, -rate), &mut h);
+            adjoint.push(h);
+        }
+        let warm = 4.0 * BOLTZMANN * surroundings(compiled);
+        out.clear();
+        out.resize(answers * answers, [0.0; 2]);
+        for j in 0..answers {
+            budget::check();
+            let pushed = damped(&system.model, &adjoint[j]);
+            for i in 0..=j {
+                let sum: Complex<f64> =
+                    adjoint[i].iter().zip(&pushed).map(|(h, p)| h.x * p.x + h.y * p.y + h.z * p.z).sum();
+                let johnson = self.johnson(system, state, (i, j)) * 4.0 * BOLTZMANN;
+                let sum = sum * warm + johnson + self.conducted(system, (i, j)) * warm;
+                // one half gives the other: the matrix is Hermitian to the last bit
+                out[i * answers + j] = [sum.re, if i == j { 0.0 } else { sum.im }];
+                out[j * answers + i] = [sum.re, if i == j { 0.0 } else { -sum.im }];
+            }
+        }
+        Ok(())
+    }
+
+    /// What answer `i` sees of a displacement of each body.
+    fn seen(
+        &mut self,
+        compiled: &Compiled,
+        system: &System,
+        state: &Snapshot,
+        i: usize,
+        omega: f64,
+    ) -> Vec<ComplexPose> {
+        let signal = match i.checked_sub(self.ports.len()) {
+            Some(signal) => self.signals[signal],
+            None => match self.ports.answers[i] {
+                Answer::Current => return self.charge_seen(system, state, self.ports.sources[i], omega),
+                Answer::Motion(signal) => signal,
+                Answer::Rise(_) | Answer::Nothing => return vec![ComplexPose::zeros(); system.bodies()],
+            },
+        };
+        if matches!(signal, Signal::Temperature(_) | Signal::Prescribed(_)) {
+            return vec![ComplexPose::zeros(); system.bodies()];
+        }
+        let (heaters, gaps) = (state.rise.len(), self.drive.volts.len());
+        let view = View { q: &state.q, v: &state.v, rise: &state.rise, volts: &self.drive.volts };
+        let (cold, off) = (vec![0.0; heaters], vec![0.0; gaps]);
+        let mut unit = vec![Pose::zeros(); system.bodies()];
+        let still = unit.clone();
+        let mut seen = vec![ComplexPose::zeros(); system.bodies()];
+        for (k, seen) in seen.iter_mut().enumerate() {
+            for d in 0..3 {
+                unit[k][d] = 1.0;
+                let place = View { q: &unit, v: &still, rise: &cold, volts: &off };
+                let motion = View { q: &still, v: &unit, rise: &cold, volts: &off };
+                let of = |change: &View<'_>| signal.slope(compiled, &view, change);
+                // rates are iω times displacements
+                seen[d] = Complex::new(of(&place), omega * of(&motion));
+                unit[k][d] = 0.0;
+            }
+        }
+        seen
+    }
+
+    /// What the current of source `source` sees: iω times the change of its charge, which is minus the force of a volt there.
+    fn charge_seen(&mut self, system: &System, state: &Snapshot, source: usize, omega: f64) -> Vec<ComplexPose> {
+        let mut change = system.electrics.drive();
+        change.load = 0.0;
+        for (g, volts) in change.volts.iter_mut().enumerate() {
+            *volts = system.electrics.gap_rows[(g, source)];
+        }
+        let mut force = vec![Pose::zeros(); system.bodies()];
+        system.drive_force(&state.q, &self.drive, &change, &mut force);
+        force.iter().map(|f| f.map(|x| Complex::new(0.0, -omega * x))).collect()
+    }
+
+    /// Σ rise·R·I·I of two answers [K·S].
+    fn johnson(&self, system: &System, state: &Snapshot, (i, j): (usize, usize)) -> f64 {
+        let Some((a, b)) = self.both_electrical(i, j) else { return 0.0 };
+        let heating = &system.electrics.heating;
+        let one = |(k, rise): (usize, &f64)| {
+            rise * heating.heaters[k].resistance * heating.current(k, a) * heating.current(k, b)
+        };
+        state.rise.iter().enumerate().map(one).sum()
+    }
+
+    /// Conductance between two answers [S].
+    fn conducted(&self, system: &System, (i, j): (usize, usize)) -> f64 {
+        self.both_electrical(i, j).map_or(0.0, |(a, b)| system.electrics.conductance[(a, b)])
+    }
+
+    /// The sources of two answers, if both are currents.
+    fn both_electrical(&self, i: usize, j: usize) -> Option<(usize, usize)> {
+        let source = |i: usize| {
+            let current = self.ports.answers.get(i) == Some(&Answer::Current);
+            current.then(|| self.ports.sources[i])
+        };
+        Some((source(i)?, source(j)?))
+    }
+}

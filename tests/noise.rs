@@ -1,0 +1,151 @@
+//! Noise of a device: what is warm and takes energy gives it back. Checked against the fluctuation–dissipation theorem, which
+//! holds for any linear system in equilibrium (Callen and Welton 1951), and against closed forms.
+
+use bimorph::compile::{CompileOptions, Compiled, Junctions, compile};
+use bimorph::device::local::LocalDevice;
+use bimorph::device::{Device, Mode, OpenRequest, PortKind, SmallSignal, Status, Token, Trial, TrialReply};
+use bimorph::multibody::agitation::BOLTZMANN;
+use bimorph::netlist::Bundle;
+use nalgebra::Complex;
+use std::sync::Arc;
+
+const AMBIENT: f64 = 350.0;
+
+/// A shuttle on two beams in gas, with a plate on one side and a comb on the other: all of it in equilibrium at 350 K.
+const RESONATOR: &str = "
+process p = [ Youngsmodulus=160e9 density=2300 viscosity=1.8e-5 fluid=2e-6 ambienttemperature=350 h=2u permittivity=8.854e-12 ]
+anchor p [a] [l=10u w=10u h=2u]
+upper beam2d p [a s] [l=120u w=2u]
+lower beam2d p [s b] [l=90u w=2u]
+anchor p [b] [l=10u w=10u h=2u]
+rod beam2d p [s t] [l=40u w=4u oz=pi/2]
+mass2d * [t] [m=2e-11 J=1e-20]
+dash damper2d * [t e] [bx=3e-7 oz=pi/2]
+comb comb2de p [t k] [N=40 gap=2u l=10u L=30u h=2u oz=pi/2]
+anchor p [k] [l=5u w=5u h=2u]
+plate plategap2d p [t e] [A=4e-10 gap=1.5u oz=0]
+anchor p [e] [l=5u w=5u h=2u]
+eground * [a] []
+eground * [b] []
+drive port * [k] []
+sense port * [e] []
+";
+
+/// One heated beam between anchors, nothing to pull at.
+const HEATER: &str = "
+process p = [ Youngsmodulus=160e9 density=2300 sheetresistance=20 thermalexpansion=2.5e-6 ambienttemperature=300 thermcond=32 h=2u ]
+anchor p [a] [l=10u w=10u h=2u]
+beam beam2det p [a b] [l=120u w=2u]
+anchor p [b] [l=10u w=10u h=2u]
+eground * [b] []
+heat port * [a] []
+";
+
+fn compiled(text: &str) -> Arc<Compiled> {
+    let options = CompileOptions { junctions: Junctions::Centreline, ..CompileOptions::default() };
+    Arc::new(compile(&Bundle::from_text("noise.net", text), &options).unwrap_or_else(|e| panic!("{e}")))
+}
+
+fn opened(compiled: &Arc<Compiled>, ports: &[&str], signals: &[&str]) -> LocalDevice {
+    let mut device = LocalDevice::new(Arc::clone(compiled));
+    let names = |list: &[&str]| list.iter().map(|name| (*name).to_owned()).collect();
+    let request = OpenRequest { ports: names(ports), signals: names(signals) };
+    device.open(&request).unwrap_or_else(|e| panic!("{e}"));
+    device
+}
+
+fn balanced(device: &mut LocalDevice, given: &[f64]) -> (Token, TrialReply) {
+    let mut reply = TrialReply::default();
+    let request = Trial { mode: Mode::Static, parent: None, t: 0.0, dt: 0.0, voltages: given };
+    device.trial(&request, &mut reply).unwrap();
+    assert_eq!(reply.status, Status::Ok);
+    (reply.token.unwrap(), reply)
+}
+
+fn complex(z: [f64; 2]) -> Complex<f64> {
+    Complex::new(z[0], z[1])
+}
+
+/// In equilibrium S = 2·k_B·T·(H + Hᴴ), where H is what takes power: the current per volt, the velocity per force. Ports of every
+/// kind, charged, at frequencies below, at and above resonances, in a frame at rest and in one that turns at 3e4 rad/s.
+#[test]
+fn fluctuation_is_dissipation() {
+    let names = ["drive", "t.y", "sense", "t.vx", "s.rz", "frame.wz", "s.vrz"];
+    let model = compiled(RESONATOR);
+    for turning in [0.0, 3e4] {
+        let mut device = opened(&model, &names, &[]);
+        let (token, _) = balanced(&mut device, &[12.0, 0.0, -3.0, 0.0, 0.0, turning, 0.0]);
+        let kinds =
+            [PortKind::Electrical, PortKind::Force, PortKind::Electrical, PortKind::ForceRate, PortKind::Moment];
+        let kinds = [&kinds[..], &[PortKind::Rate, PortKind::MomentRate]].concat();
+        for omega in [1e3, 4e5, 1.1e6, 3e6, 2e7] {
+            let (mut small, mut noise) = (SmallSignal::default(), Vec::new());
+            device.linearize(token, omega, &mut small).unwrap();
+            device.noise(token, omega, &mut noise).unwrap();
+            let n = names.len();
+            // rates of what is answered, so that each is the flow or motion that takes power
+            let rate = |row: usize| match kinds[row] {
+                PortKind::Force | PortKind::Moment => Complex::new(0.0, omega),
+                _ => Complex::new(1.0, 0.0),
+            };
+            let takes_power = |row: usize| kinds[row] != PortKind::Rate;
+            let h = |row: usize, column: usize| rate(row) * complex(small.admittance[row * n + column]);
+            for i in (0..n).filter(|&i| takes_power(i)) {
+                for j in (0..n).filter(|&j| takes_power(j)) {
+                    let s = rate(i) * complex(noise[i * n + j]) * rate(j).conj();
+                    let want = (h(i, j) + h(j, i).conj()) * 2.0 * BOLTZMANN * AMBIENT;
+                    let size = (complex(noise[i * n + i]).norm() * complex(noise[j * n + j]).norm()).sqrt();
+                    let size = size * rate(i).norm() * rate(j).norm();
+                    assert!(size > 0.0);
+                    // the part that takes no power is left of it as rounding
+                    let rounding = 1e-11 * 4.0 * BOLTZMANN * AMBIENT * h(i, j).norm().max(h(j, i).norm());
+                    let error = (s - want).norm();
+                    assert!(error <= 1e-9 * size + rounding, "{} {}: {s:e} {want:e}", names[i], names[j]);
+                }
+            }
+        }
+    }
+}
+
+/// The displacement of a damped mass has 4·k_B·T·c·|χ|², the rate ω² times that, and their cross-spectrum is −iω times it; 27 °C where
+/// the netlist names no temperature.
+#[test]
+fn a_damped_mass_has_the_closed_form() {
+    let (m, c, k): (f64, f64, f64) = (1e-10, 5e-7, 4.0);
+    let text = format!(
+        "anchor * [g] [l=1u w=1u h=1u]\nmass2d * [m] [m={m} J=1e-20]\nspring2d * [g m] [kx={k} ky=1e3 krz=1]\ndamper2d * [g m] [bx={c}]\n"
+    );
+    let mut device = opened(&compiled(&text), &["m.x"], &["m.x", "m.vx"]);
+    let (token, _) = balanced(&mut device, &[0.0]);
+    for omega in [0.0, 1e4, 2e5, 1e6] {
+        let mut noise = Vec::new();
+        device.noise(token, omega, &mut noise).unwrap();
+        let chi = 1.0 / Complex::new(k - m * omega * omega, omega * c);
+        let want = 4.0 * BOLTZMANN * 300.15 * c * chi.norm_sqr();
+        let of = |row: usize, column: usize| complex(noise[row * 3 + column]);
+        for (row, column, factor) in [
+            (0, 0, Complex::new(1.0, 0.0)),
+            (1, 1, Complex::new(1.0, 0.0)),
+            (2, 2, Complex::new(omega * omega, 0.0)),
+            (1, 2, Complex::new(0.0, -omega)),
+        ] {
+            let error = (of(row, column) - factor * want).norm();
+            assert!(error <= 1e-9 * want * factor.norm().max(f64::MIN_POSITIVE), "{omega:e} {row} {column}: {error:e}");
+        }
+    }
+}
+
+/// A beam that carries current has Johnson's noise at its own mean temperature: 4·k_B·(T₀ + rise)/R.
+#[test]
+fn a_heater_is_a_warm_resistor() {
+    let mut device = opened(&compiled(HEATER), &["heat"], &["beam.T"]);
+    for volts in [0.0, 0.5, 2.0] {
+        let (token, reply) = balanced(&mut device, &[volts]);
+        let mut noise = Vec::new();
+        device.noise(token, 1e4, &mut noise).unwrap();
+        let resistance = 20.0 * 120.0 / 2.0;
+        let want = 4.0 * BOLTZMANN * reply.outputs[0] / resistance;
+        println!("{volts} V: {:.1} K, {:e} A²/Hz", reply.outputs[0], noise[0][0]);
+        assert!((noise[0][0] / want - 1.0).abs() <= 1e-12, "{:e} {want:e}", noise[0][0]);
+    }
+}
