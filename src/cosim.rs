@@ -1,6 +1,6 @@
 //! Runs ngspice on a deck with the plug-in loaded.
 //!
-//! The deck is not copied or changed: ngspice is started in the working directory it would have anyway, with an
+//! The deck is not copied or changed, unless the run is to be compared with a finer one ([`check`]): ngspice is started in the working directory it would have anyway, with an
 //! initialisation file of its own (`SPICE_USERINIT_DIR`) that first reads the user's and then loads the plug-in. So
 //! relative includes and `.control` sections work as they always do.
 //!
@@ -8,6 +8,11 @@
 //! reason in a file, and ngspice's own "simulation(s) aborted" is heard. A raw file appears under its name only when
 //! the run was good.
 
+pub mod check;
+pub mod compare;
+pub mod finer;
+
+use crate::results::raw::RawError;
 use std::ffi::OsString;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
@@ -29,6 +34,10 @@ pub struct CosimOptions {
     pub ngspice: Option<PathBuf>,
     /// The plug-in; none: [`find_plugin`].
     pub plugin: Option<PathBuf>,
+    /// Runs this text in the deck's place, as if it stood there; none: the deck itself.
+    pub text: Option<String>,
+    /// Share of its tolerance that every model gets [1]; none: all of it.
+    pub tolerance_share: Option<f64>,
     /// Keep ngspice's output for [`CosimReport::output`] instead of passing it on.
     pub capture: bool,
 }
@@ -105,6 +114,14 @@ pub enum CosimError {
         /// The deck.
         deck: PathBuf,
     },
+    /// A raw file that ngspice wrote cannot be understood.
+    #[error("{path}: {source}")]
+    Raw {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        source: RawError,
+    },
     /// No raw file was written.
     #[error("{deck}: ngspice wrote no raw file; the deck has no analysis outside .control")]
     NoRaw {
@@ -174,15 +191,37 @@ fn io(what: impl FnOnce() -> String) -> impl FnOnce(std::io::Error) -> CosimErro
 /// # Errors
 /// [`CosimError`]
 pub fn run(options: &CosimOptions, keep_going: &dyn Fn() -> bool) -> Result<CosimReport, CosimError> {
+    let report = run_whatever(options, keep_going)?;
+    if options.raw.is_some() && report.raw.is_none() {
+        return Err(CosimError::NoRaw { deck: options.deck.clone() });
+    }
+    Ok(report)
+}
+
+/// [`run`], also of a deck that leaves no raw file.
+fn run_whatever(options: &CosimOptions, keep_going: &dyn Fn() -> bool) -> Result<CosimReport, CosimError> {
     let deck = &options.deck;
-    let text = std::fs::read(deck).map_err(|source| CosimError::Deck { path: deck.clone(), source })?;
+    let text = match &options.text {
+        Some(text) => text.clone().into_bytes(),
+        None => std::fs::read(deck).map_err(|source| CosimError::Deck { path: deck.clone(), source })?,
+    };
     let ngspice = options.ngspice.clone().or_else(find_ngspice).ok_or(CosimError::NoNgspice)?;
     let plugin = match &options.plugin {
         Some(path) => path.canonicalize().map_err(io(|| format!("cannot read the plug-in {}", path.display())))?,
         None => find_plugin()?,
     };
     let scratch = Scratch::new()?;
-    initialise(&scratch.0, &plugin)?;
+    let folder = deck.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = folder.canonicalize().map_err(|source| CosimError::Deck { path: deck.clone(), source })?;
+    initialise(&scratch.0, &plugin, options.text.as_ref().map(|_| folder.as_path()))?;
+    let run_deck = match &options.text {
+        Some(text) => {
+            let copy = scratch.0.join(deck.file_name().unwrap_or(deck.as_os_str()));
+            std::fs::write(&copy, text).map_err(io(|| format!("cannot write {}", copy.display())))?;
+            copy
+        }
+        None => deck.clone(),
+    };
     let failure = scratch.0.join("failure");
     let unfinished = options.raw.as_ref().map(|raw| {
         let mut name = OsString::from(raw);
@@ -192,10 +231,9 @@ pub fn run(options: &CosimOptions, keep_going: &dyn Fn() -> bool) -> Result<Cosi
 
     let mut command = Command::new(&ngspice);
     command.arg("-b").env("SPICE_USERINIT_DIR", &scratch.0).env("BIMORPH_FAILURE", &failure).stdin(Stdio::null());
-    if let Some(folder) =
-        deck.parent().and_then(|p| if p.as_os_str().is_empty() { None } else { p.canonicalize().ok() })
-    {
-        command.env("BIMORPH_DECK_DIR", folder);
+    command.env("BIMORPH_DECK_DIR", &folder);
+    if let Some(share) = options.tolerance_share {
+        command.env("BIMORPH_TOL_SHARE", share.to_string());
     }
     if let Some(remote) = &options.remote {
         command.env("BIMORPH_REMOTE", remote);
@@ -203,11 +241,14 @@ pub fn run(options: &CosimOptions, keep_going: &dyn Fn() -> bool) -> Result<Cosi
     if let Some(path) = &unfinished {
         command.arg("-r").arg(path);
     }
-    command.arg(deck).stdout(if options.capture { Stdio::piped() } else { Stdio::inherit() }).stderr(Stdio::piped());
+    command
+        .arg(&run_deck)
+        .stdout(if options.capture { Stdio::piped() } else { Stdio::inherit() })
+        .stderr(Stdio::piped());
     let child = command.spawn().map_err(io(|| format!("cannot start {}", ngspice.display())))?;
     let heard = listen(child, options.capture, keep_going).map_err(io(|| "ngspice's output cannot be read".into()))?;
 
-    let has_control = String::from_utf8_lossy(&text).lines().any(|l| l.trim().eq_ignore_ascii_case(".control"));
+    let has_control = has_control(&String::from_utf8_lossy(&text));
     let judged = if heard.cancelled { Err(CosimError::Cancelled) } else { judge(&heard, &failure, deck, has_control) };
     match (judged, unfinished, &options.raw) {
         (Err(error), Some(path), _) => {
@@ -218,14 +259,19 @@ pub fn run(options: &CosimOptions, keep_going: &dyn Fn() -> bool) -> Result<Cosi
         (Ok(()), Some(path), Some(raw)) if path.is_file() => {
             std::fs::rename(&path, raw).map_err(io(|| format!("cannot write {}", raw.display())))?;
         }
-        (Ok(()), Some(_), _) => return Err(CosimError::NoRaw { deck: deck.clone() }),
-        (Ok(()), None, _) => {}
+        (Ok(()), ..) => return Ok(CosimReport { ngspice, plugin, raw: None, output: heard.output }),
     }
     Ok(CosimReport { ngspice, plugin, raw: options.raw.clone(), output: heard.output })
 }
 
-/// Writes the initialisation file. The plug-in is linked under a plain name: ngspice splits paths at blanks.
-fn initialise(folder: &Path, plugin: &Path) -> Result<(), CosimError> {
+/// Whether a deck has a `.control` section.
+fn has_control(text: &str) -> bool {
+    text.lines().any(|l| l.trim().eq_ignore_ascii_case(".control"))
+}
+
+/// Writes the initialisation file. The plug-in is linked under a plain name: ngspice splits paths at blanks; so is the folder in which
+/// the includes of a deck are looked for that is run as a copy.
+fn initialise(folder: &Path, plugin: &Path, includes: Option<&Path>) -> Result<(), CosimError> {
     let link = folder.join("bimorph.cm");
     #[cfg(unix)]
     let linked = std::os::unix::fs::symlink(plugin, &link);
@@ -239,8 +285,22 @@ fn initialise(folder: &Path, plugin: &Path) -> Result<(), CosimError> {
         lines += &format!("source {}\n", user.display());
     }
     lines += &format!("codemodel {}\n", link.display());
+    if let Some(includes) = includes {
+        lines += &format!("set sourcepath = ( {} $sourcepath )\n", plain(includes, folder)?.display());
+    }
     let path = folder.join(".spiceinit");
     std::fs::write(&path, lines).map_err(io(|| format!("cannot write {}", path.display())))
+}
+
+/// A folder under a name without blanks: its own, or that of a link.
+fn plain(folder: &Path, scratch: &Path) -> Result<PathBuf, CosimError> {
+    if !folder.to_string_lossy().contains(char::is_whitespace) {
+        return Ok(folder.to_owned());
+    }
+    let link = scratch.join("includes");
+    #[cfg(unix)]
+    std::os::unix::fs::symlink(folder, &link).map_err(io(|| format!("cannot write {}", link.display())))?;
+    Ok(link)
 }
 
 /// What ngspice said and how it ended.

@@ -3,7 +3,8 @@
 use super::failure::Failure;
 use super::output::{check_folder, write};
 use super::plot::{chart_of, longest};
-use super::{interrupt, progress};
+use super::{cosim_check, interrupt, progress};
+use bimorph::cosim::check::check;
 use bimorph::cosim::{CosimError, CosimOptions, run};
 use bimorph::results::format::Format;
 use clap::Args;
@@ -17,6 +18,7 @@ use std::time::Instant;
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  bimorph cosim bank.cir --out bank.raw\n  \
     bimorph cosim bank.cir --out bank.png              every voltage and current of the deck's analysis\n  \
+    bimorph cosim bank.cir --check                     how far off may the steps and tolerances be?\n  \
     bimorph cosim bank.cir --remote unix:///tmp/bimorph.sock --out bank.raw\n\n\
     A device in a deck:\n  \
     .model bank bimorph(file=\"bank.net\" ports=[\"heat\" \"sense\"] monitors=[\"yoke.y:1e6\"])\n  \
@@ -32,6 +34,14 @@ pub(crate) struct Cosim {
     /// Write the waveforms: .raw, .csv, .svg, .png or .html
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+
+    /// Repeat the run with half the steps and a tenth of the tolerances (reltol, and tol of every model), and tell the difference
+    #[arg(long)]
+    check: bool,
+
+    /// With --check: print one JSON document in place of ngspice's output and the table
+    #[arg(long, requires = "check")]
+    json: bool,
 
     /// Do not pass ngspice's output on
     #[arg(long, short)]
@@ -65,12 +75,18 @@ impl Cosim {
             ngspice: self.ngspice.clone(),
             plugin: self.plugin.clone(),
             capture: self.quiet,
+            ..CosimOptions::default()
         };
-        let busy = self.quiet.then(|| progress::spinner("ngspice"));
+        let busy = (self.quiet || self.check).then(|| progress::spinner("ngspice"));
         let start = Instant::now();
         // Ctrl-C at a terminal reaches ngspice too; a signal to this process alone ends ngspice from here. Either way what
         // it leaves behind is cleared away before this process goes.
-        let report = run(&options, &|| !interrupt::asked());
+        let mut checked = None;
+        let report = if self.check {
+            check(&options, &|| !interrupt::asked()).map(|found| checked.insert(found).report.clone())
+        } else {
+            run(&options, &|| !interrupt::asked())
+        };
         if let Some(busy) = busy {
             busy.finish_and_clear();
         }
@@ -80,6 +96,9 @@ impl Cosim {
             other => other?,
         };
         eprintln!("{}: done in {:.2} s", self.deck.display(), start.elapsed().as_secs_f64());
+        if let Some(checked) = &checked {
+            cosim_check::print_check(&self.deck, checked, self.json, self.quiet)?;
+        }
         let (Some(out), Some(format), Some(raw)) = (&self.out, format, report.raw) else { return Ok(()) };
         if format == Format::Raw {
             return Ok(());

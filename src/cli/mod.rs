@@ -6,6 +6,7 @@
 mod chart;
 mod check;
 mod cosim;
+mod cosim_check;
 mod doctor;
 mod draw_motion;
 mod failure;

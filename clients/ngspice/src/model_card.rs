@@ -116,6 +116,12 @@ impl ModelCard {
         })
     }
 
+    /// With this share of its tolerance [1].
+    pub fn with_share(mut self, share: f64) -> Self {
+        self.options.tol *= share;
+        self
+    }
+
     /// Compares the names on the line with the nodes of an instance.
     ///
     /// # Errors

@@ -16,6 +16,13 @@ use std::path::{Path, PathBuf};
 /// `model` heads the host's list of models; each is set up. `circuit` is the host's.
 pub(crate) unsafe fn open_all(model: *mut Model, circuit: *mut c_void) -> Result<(), String> {
     let remote = std::env::var("BIMORPH_REMOTE").ok();
+    let share = match std::env::var("BIMORPH_TOL_SHARE") {
+        Ok(text) => match text.parse() {
+            Ok(share) if share > 0.0 && share <= 1.0 => share,
+            _ => return Err(format!("BIMORPH_TOL_SHARE: expected a number above 0 and up to 1, got {text}")),
+        },
+        Err(_) => 1.0,
+    };
     // SAFETY: the host's lists and strings, by contract.
     for (model, instance) in unsafe { call::instances(model) } {
         // SAFETY: as above; the host has set up the connections.
@@ -29,7 +36,9 @@ pub(crate) unsafe fn open_all(model: *mut Model, circuit: *mut c_void) -> Result
                 deck_directory(instance.conn, circuit),
             )
         };
-        let card = ModelCard::new(&raw, remote.clone()).and_then(|c| c.check_counts(ports.len(), monitors).map(|()| c));
+        let card = ModelCard::new(&raw, remote.clone())
+            .map(|card| card.with_share(share))
+            .and_then(|c| c.check_counts(ports.len(), monitors).map(|()| c));
         let opened = card
             .map_err(|e| e.to_string())
             .and_then(|mut card| open(&name, &mut card, &ports, directory.as_deref()))

@@ -3,6 +3,7 @@
 mod analyses;
 mod analytic;
 mod charge;
+mod check;
 mod look;
 mod models;
 mod noise;

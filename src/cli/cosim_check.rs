@@ -1,0 +1,68 @@
+//! What `bimorph cosim --check` prints: how far a run and its finer repetition lie apart.
+
+use super::failure::Failure;
+use super::output::print;
+use super::report::columns;
+use bimorph::cosim::check::Checked;
+use bimorph::cosim::compare::{Plot, Printed};
+use bimorph::results::plot::axis::quantity;
+use serde::Serialize;
+use std::path::Path;
+
+#[derive(Serialize)]
+struct Document<'a> {
+    file: String,
+    plots: &'a [Plot],
+    printed: &'a [Printed],
+    warnings: &'a [String],
+}
+
+/// Prints ngspice's output of the run as it is, unless `quiet`, then a table for each plot; or one document.
+pub(crate) fn print_check(deck: &Path, checked: &Checked, json: bool, quiet: bool) -> Result<(), Failure> {
+    for note in &checked.notes {
+        eprintln!("warning: {note}");
+    }
+    if json {
+        let file = deck.display().to_string();
+        let document = Document { file, plots: &checked.plots, printed: &checked.printed, warnings: &checked.notes };
+        let text = serde_json::to_string(&document).map_err(|e| Failure::Stdout(e.into()))?;
+        return print(&format!("{text}\n"));
+    }
+    let mut text = if quiet { String::new() } else { format!("{}\n", checked.report.output.trim_end()) };
+    text += "as it is, against half the steps and a tenth of the tolerances; differences are relative to the range\n";
+    for plot in &checked.plots {
+        text += &table(plot);
+    }
+    if !checked.printed.is_empty() {
+        let row = |p: &Printed| {
+            vec![p.name.clone(), format!("{:.6e}", p.values[0]), format!("{:.6e}", p.values[1]), share(p.difference)]
+        };
+        let rows: Vec<Vec<String>> = checked.printed.iter().map(row).collect();
+        text += &format!("\n{}", columns(&["printed", "as it is", "finer", "difference"], &rows));
+    }
+    let worst = (checked.plots.iter().flat_map(|plot| plot.vectors.iter().map(move |v| (plot, v))))
+        .max_by(|(_, a), (_, b)| a.largest.total_cmp(&b.largest));
+    if let Some((plot, vector)) = worst {
+        text += &format!("\nlargest: {} of {} in {}\n", share(vector.largest), vector.name, plot.name);
+    }
+    print(&text)
+}
+
+fn table(plot: &Plot) -> String {
+    let place = |x: f64| match plot.axis.as_str() {
+        "" => String::new(),
+        "time" => quantity(x, "s"),
+        "frequency" => quantity(x, "Hz"),
+        _ => quantity(x, ""),
+    };
+    let rows: Vec<Vec<String>> = (plot.vectors.iter())
+        .map(|v| vec![v.name.clone(), quantity(v.range, &v.unit), share(v.largest), share(v.rms), place(v.at)])
+        .collect();
+    let [points, finer] = plot.points;
+    let header = ["vector", "range", "largest", "rms", if plot.axis.is_empty() { "" } else { "at" }];
+    format!("\n{}, {points} points against {finer}\n{}", plot.name, columns(&header, &rows))
+}
+
+fn share(difference: f64) -> String {
+    format!("{difference:.1e}")
+}

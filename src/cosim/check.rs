@@ -1,0 +1,75 @@
+//! A run repeated with half the steps and a tenth of the tolerances: how far off it may be.
+
+use super::compare::{self, Plot, Printed};
+use super::finer::{TOLERANCE_SHARE, finer, keeping_plots};
+use super::{CosimError, CosimOptions, CosimReport, Scratch, io, run_whatever};
+use crate::results::raw;
+use crate::results::table::Table;
+use std::path::Path;
+
+/// How far a run and its finer repetition lie apart.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Checked {
+    /// The run as the deck has it.
+    pub report: CosimReport,
+    /// Every plot.
+    pub plots: Vec<Plot>,
+    /// Every number that was printed by name.
+    pub printed: Vec<Printed>,
+    /// What could not be made finer or compared, one sentence each.
+    pub notes: Vec<String>,
+}
+
+/// Runs a deck with half the longest step of every transient, a tenth of `reltol` and a tenth of each model's `tol`, then as it is, and
+/// compares. Files that the deck writes itself are those of the second run. Output is captured.
+///
+/// # Errors
+/// [`CosimError`]: of either run.
+pub fn check(options: &CosimOptions, keep_going: &dyn Fn() -> bool) -> Result<Checked, CosimError> {
+    let deck = &options.deck;
+    let bytes = std::fs::read(deck).map_err(|source| CosimError::Deck { path: deck.clone(), source })?;
+    let text = options.text.clone().unwrap_or_else(|| String::from_utf8_lossy(&bytes).into_owned());
+    let scratch = Scratch::new()?;
+    let changed = finer(&text, deck.parent().unwrap_or(Path::new(".")));
+    let mut notes = changed.notes;
+    let one = |text: &str, name: &str, share: f64| {
+        let kept = scratch.0.join(format!("{name}-kept.raw"));
+        let raw = scratch.0.join(format!("{name}.raw"));
+        let run_options = CosimOptions {
+            text: Some(keeping_plots(text, &kept)),
+            tolerance_share: Some(share),
+            raw: Some(raw.clone()),
+            capture: true,
+            ..options.clone()
+        };
+        let report = run_whatever(&run_options, keep_going)?;
+        let mut plots = read(&kept)?;
+        plots.extend(read(&raw)?);
+        plots.retain(|plot| plot.plot_name != "constants");
+        Ok((report, plots, raw))
+    };
+    let (fine, fine_plots, _) = one(&changed.text, "finer", TOLERANCE_SHARE)?;
+    let (mut report, plots, raw) = one(&text, "as-it-is", 1.0)?;
+    report.raw = None;
+    if let Some(out) = &options.raw {
+        if !raw.is_file() {
+            return Err(CosimError::NoRaw { deck: deck.clone() });
+        }
+        let bytes = std::fs::read(&raw).map_err(io(|| format!("cannot read {}", raw.display())))?;
+        crate::results::atomic::write(out, |file| file.write_all(&bytes))
+            .map_err(io(|| format!("cannot write {}", out.display())))?;
+        report.raw = Some(out.clone());
+    }
+    let (plots, more) = compare::plots(&plots, &fine_plots);
+    notes.extend(more);
+    Ok(Checked { plots, printed: compare::printed(&report.output, &fine.output), notes, report })
+}
+
+/// Plots of a raw file; none where there is none.
+fn read(path: &Path) -> Result<Vec<Table>, CosimError> {
+    if !path.is_file() {
+        return Ok(Vec::new());
+    }
+    let bytes = std::fs::read(path).map_err(io(|| format!("cannot read {}", path.display())))?;
+    raw::read(&bytes).map_err(|source| CosimError::Raw { path: path.to_owned(), source })
+}
