@@ -6,7 +6,7 @@
 //! `multibody` holds those bodies and the O(n+m) recursion over them; `gaps` are the forces and rest offsets that
 //! heat and voltage cause. `solve` advances or balances a model, [`refine`] chooses how fine it must be, [`analysis`]
 //! holds the verbs every front shares, and [`device`] is the electrical view that a circuit simulator drives. [`results`]
-//! writes tables and pictures.
+//! writes tables and pictures, [`export`] a model for other simulators.
 //! [`compile`](mod@compile) walks that path once, from netlist text to a ready model.
 //!
 //! [`budget`] bounds what a computation may use, and stops it.
@@ -20,6 +20,7 @@ pub mod cosim;
 pub mod device;
 pub mod discretize;
 pub mod equations;
+pub mod export;
 pub mod gaps;
 pub mod jobs;
 pub mod multibody;

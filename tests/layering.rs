@@ -12,7 +12,7 @@ const FLOORS: [&[&str]; 10] = [
     &["discretize", "solve"],
     &["refine"],
     &["compile", "device", "analysis"],
-    &["jobs", "cosim"],
+    &["jobs", "cosim", "export"],
     &["service"],
     &["cli", "main"],
 ];

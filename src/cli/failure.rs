@@ -4,6 +4,7 @@ use bimorph::analysis::AnalysisError;
 use bimorph::analysis::chart::ChartError;
 use bimorph::compile::CompileError;
 use bimorph::cosim::CosimError;
+use bimorph::export::ExportError;
 use bimorph::jobs::sweep::SweepError;
 use bimorph::options::Refused;
 use bimorph::results::format::UnknownFormat;
@@ -48,6 +49,8 @@ pub(crate) enum Failure {
     Compile(CompileError),
     #[error(transparent)]
     Analysis(#[from] AnalysisError),
+    #[error(transparent)]
+    Export(ExportError),
     #[error(transparent)]
     Chart(ChartError),
     #[error(transparent)]

@@ -9,6 +9,7 @@ mod cosim;
 mod cosim_check;
 mod doctor;
 mod draw_motion;
+mod export;
 mod failure;
 mod interrupt;
 mod model;
@@ -50,6 +51,7 @@ enum Command {
     Modes(modes::Modes),
     Pullin(pull_in::Pullin),
     Tran(tran::Tran),
+    Export(export::Export),
     Cosim(cosim::Cosim),
     Serve(serve::Serve),
     Sweep(sweep::Sweep),
@@ -68,6 +70,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Modes(command) => command.run(),
         Command::Pullin(command) => command.run(),
         Command::Tran(command) => command.run(),
+        Command::Export(command) => command.run(),
         Command::Cosim(command) => command.run(),
         Command::Serve(command) => command.run(),
         Command::Sweep(command) => command.run(),

@@ -55,6 +55,12 @@ pub(crate) fn names(lists: &[String]) -> Vec<String> {
     names
 }
 
+/// `NAME` or `NAME:SCALE`: a scale stands after the last colon where that is a number.
+pub(crate) fn scaled(text: &str) -> (String, Option<f64>) {
+    let scaled = text.rsplit_once(':').and_then(|(name, scale)| Some((name, number(scale).ok()?)));
+    scaled.map_or_else(|| (text.to_owned(), None), |(name, scale)| (name.to_owned(), Some(scale)))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -67,6 +73,8 @@ mod tests {
         assert_eq!(volts("heat=-500m"), Ok(("heat".into(), -0.5)));
         assert_eq!(setting("oz=pi/4"), Ok(("oz".into(), Setting::Number(std::f64::consts::FRAC_PI_4))));
         assert!(volts("heat=ten").is_err() && setting("w").is_err() && setting("=1").is_err());
+        assert_eq!(scaled("yoke.y:1M"), ("yoke.y".into(), Some(1e6)));
+        assert_eq!(scaled("odd:name"), ("odd:name".into(), None));
         assert_eq!(names(&["a.x, D(1,2).y".into(), "b.x".into()]), ["a.x", "D(1,2).y", "b.x"]);
     }
 }

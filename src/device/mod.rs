@@ -19,6 +19,7 @@ pub mod look;
 mod noise;
 pub mod ports;
 mod saved;
+pub mod scale;
 pub mod shown;
 mod small_signal;
 pub mod states;

@@ -92,7 +92,7 @@ impl PortKind {
 
 /// How a port answers.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Answer {
+pub(crate) enum Answer {
     /// With the current and charge of this source.
     Current,
     /// With a motion.
@@ -105,13 +105,13 @@ pub(super) enum Answer {
 
 /// The ports that a session was opened with.
 #[derive(Debug)]
-pub(super) struct Ports {
+pub(crate) struct Ports {
     /// Index of each in the source vector.
-    pub(super) sources: Vec<usize>,
-    pub(super) kinds: Vec<PortKind>,
-    pub(super) answers: Vec<Answer>,
+    pub(crate) sources: Vec<usize>,
+    pub(crate) kinds: Vec<PortKind>,
+    pub(crate) answers: Vec<Answer>,
     /// The model with the inputs among them; none where there are none.
-    pub(super) system: Option<Arc<System>>,
+    pub(crate) system: Option<Arc<System>>,
 }
 
 impl Ports {
@@ -119,7 +119,7 @@ impl Ports {
     ///
     /// # Errors
     /// [`DeviceError::UnknownPort`], [`DeviceError::BadRequest`] for a port that cannot be.
-    pub(super) fn find(compiled: &Compiled, names: &[String]) -> Result<Self, DeviceError> {
+    pub(crate) fn find(compiled: &Compiled, names: &[String]) -> Result<Self, DeviceError> {
         let system = &compiled.parts.system;
         let electrics = &system.electrics;
         let known: HashMap<&str, usize> =
@@ -153,12 +153,12 @@ impl Ports {
     }
 
     /// How many they are.
-    pub(super) fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.sources.len()
     }
 
     /// Joint coordinates of the model with the inputs.
-    pub(super) fn joints(&self, joints: &Arc<Joints>) -> Arc<Joints> {
+    pub(crate) fn joints(&self, joints: &Arc<Joints>) -> Arc<Joints> {
         match &self.system {
             None => Arc::clone(joints),
             Some(system) => {

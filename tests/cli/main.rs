@@ -4,5 +4,6 @@ mod analyses;
 mod bench;
 mod chart;
 mod errors;
+mod export;
 mod outputs;
 mod service;

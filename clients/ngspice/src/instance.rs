@@ -5,8 +5,8 @@
 
 use crate::companion::{Companion, shortest};
 use crate::history::{Base, History};
-use crate::scale::Scale;
 use crate::settings::{Monitor, PortName};
+use bimorph::device::scale::Scale;
 use bimorph::device::{
     Description, Device, DeviceError, Mode, OpenRequest, PortKind, SmallSignal, Status, Token, Trial, TrialReply,
 };

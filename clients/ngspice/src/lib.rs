@@ -14,7 +14,7 @@
 //! `circuit` what it is part of, `look_table` what can be asked of it by name. Between the two sides stand
 //! `callbacks`, `opening` and `respond`, with the `registry` of instances. What does not know ngspice: [`model_card`],
 //! [`settings`], [`deck_options`] and `names` the `.model` line, [`opener`] from line to device, [`instance`] questions and outcomes,
-//! [`companion`] charges to currents, [`scale`] volts to micrometres, [`history`] what an accepted point leaves behind.
+//! [`companion`] charges to currents, [`bimorph::device::scale`] volts to micrometres, [`history`] what an accepted point leaves behind.
 //!
 //! This is the only crate of the project with `unsafe` code; each block says why it holds.
 
@@ -42,7 +42,6 @@ mod opening;
 mod panics;
 mod registry;
 mod respond;
-pub mod scale;
 pub mod settings;
 mod table;
 mod trace;

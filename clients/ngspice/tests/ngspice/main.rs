@@ -4,6 +4,7 @@ mod analyses;
 mod analytic;
 mod charge;
 mod check;
+mod export;
 mod look;
 mod models;
 mod noise;

@@ -7,7 +7,7 @@
 //! scales a volt times an ampere is 1 µJ at every port that answers with a displacement or rotation, 1 W at every one that
 //! answers with a velocity: ports stay reciprocal.
 
-use bimorph::device::PortKind;
+use super::PortKind;
 
 /// Factors of a port.
 #[derive(Debug, Clone, Copy, PartialEq)]

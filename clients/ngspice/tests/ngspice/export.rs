@@ -1,0 +1,201 @@
+//! Subcircuits that `bimorph export --spice` writes, in ngspice, against the full model in the plug-in, both in one deck.
+
+use crate::support::{complex, deviation, real, run, versions};
+use bimorph::compile::{CompileOptions, Compiled, compile};
+use bimorph::cosim::CosimOptions;
+use bimorph::export::compare::{Fitted, fit};
+use bimorph::export::names::Pins;
+use bimorph::export::{Request, spice};
+use bimorph::netlist::Bundle;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// A scene with its operating point, and what is connected to it.
+struct Scene {
+    file: &'static str,
+    /// Electrical ports with their voltages at the operating point [V].
+    electrical: &'static [(&'static str, f64)],
+    /// Ports that a force is given to.
+    forces: &'static [&'static str],
+    /// Signals, volts per unit.
+    signals: &'static [(&'static str, f64)],
+}
+
+/// The bank of bimorphs, heated by 1 V and sensed by a comb at 10 V.
+const BANK: Scene = Scene {
+    file: "examples/bank/bank.net",
+    electrical: &[("heat", 1.0), ("sense", 10.0)],
+    forces: &["yoke.y"],
+    signals: &[("yoke.y", 1e6), ("b1.hot.T", 1.0), ("low.vy", 1.0)],
+};
+
+/// The comb resonator, driven at 20 V and sensed at 10 V.
+const COMB: Scene = Scene {
+    file: "examples/comb_resonator/comb_resonator.net",
+    electrical: &[("drive", 20.0), ("sense", 10.0)],
+    forces: &["shuttle.vx"],
+    signals: &[("shuttle.x", 1e6), ("drive_comb.q", 1e15)],
+};
+
+fn netlist(file: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(file)
+}
+
+impl Scene {
+    fn compiled(&self) -> Arc<Compiled> {
+        let bundle = Bundle::read(&netlist(self.file), &[]).unwrap();
+        Arc::new(compile(&bundle, &CompileOptions::default()).unwrap_or_else(|e| panic!("{}: {e}", self.file)))
+    }
+
+    fn ports(&self) -> Vec<&'static str> {
+        self.electrical.iter().map(|(name, _)| *name).chain(self.forces.iter().copied()).collect()
+    }
+
+    fn exported(&self) -> Fitted {
+        let request = Request {
+            ports: self.ports().into_iter().map(|name| (name.to_owned(), None)).collect(),
+            signals: self.signals.iter().map(|(name, scale)| ((*name).to_owned(), *scale)).collect(),
+            bias: self.electrical.iter().map(|(name, volts)| ((*name).to_owned(), *volts)).collect(),
+            count: None,
+            to: None,
+            within: 1e-4,
+        };
+        fit(&self.compiled(), &request).unwrap_or_else(|e| panic!("{}: {e}", self.file))
+    }
+
+    /// A deck with the full model on nodes that end in 1 and the written one on nodes that end in 2, both driven by the same; `driven` is
+    /// what stands behind the source at a port.
+    fn deck(&self, fitted: &Fitted, driven: impl Fn(&str) -> String, analysis: &str) -> String {
+        let pins = Pins::of(&fitted.model).unwrap();
+        let mut deck = format!("* {}\n{}", self.file, spice::write(fitted, &pins, "part", &["a test".to_owned()]));
+        let (mut electrical, mut forces, mut plain) = (String::new(), String::new(), String::new());
+        for (k, name) in self.ports().into_iter().enumerate() {
+            let bias = self.electrical.get(k).map(|(_, volts)| *volts);
+            for side in [1, 2] {
+                let _ = match bias {
+                    Some(volts) => writeln!(deck, "Vp{k}_{side} p{k}_{side} 0 DC {volts} {}", driven(name)),
+                    None => writeln!(deck, "Ip{k}_{side} 0 p{k}_{side} DC 0 {}", driven(name)),
+                };
+            }
+            let list = if bias.is_some() { &mut electrical } else { &mut forces };
+            let _ = write!(list, "p{k}_1 0 ");
+            let _ = write!(plain, "p{k}_2 0 ");
+        }
+        let shown = |side: usize| (0..self.signals.len()).map(|k| format!("s{k}_{side} ")).collect::<String>();
+        let quoted = |names: Vec<String>| names.iter().map(|n| format!("\"{n}\" ")).collect::<String>();
+        let ports = quoted(self.ports().iter().map(|n| (*n).to_owned()).collect());
+        let monitors = quoted(self.signals.iter().map(|(n, scale)| format!("{n}:{scale:e}")).collect());
+        let file = netlist(self.file);
+        let _ = write!(
+            deck,
+            "A1 [%gd {electrical}%hd {forces}] %v [{}] full\n.model full bimorph(file=\"{}\" ports=[{ports}] \
+             monitors=[{monitors}])\nX2 {plain}{}part\n{analysis}\n.end\n",
+            shown(1),
+            file.canonicalize().unwrap().display(),
+            shown(2),
+        );
+        deck
+    }
+
+    /// What is read of either side: currents of sources, voltages across ports with forces, signals.
+    fn read(&self, side: usize) -> Vec<(String, String)> {
+        let electrical = self.electrical.len();
+        let ports = self.ports().into_iter().enumerate().map(|(k, name)| {
+            let column = if k < electrical { format!("i(vp{k}_{side})") } else { format!("v(p{k}_{side})") };
+            (name.to_owned(), column)
+        });
+        let signals =
+            self.signals.iter().enumerate().map(|(k, (name, _))| ((*name).to_owned(), format!("v(s{k}_{side})")));
+        ports.chain(signals).collect()
+    }
+
+    fn run(&self, text: &str, ngspice: &Path) -> crate::support::Run {
+        let folder = tempfile::tempdir().unwrap();
+        let deck = folder.path().join("deck.cir");
+        std::fs::write(&deck, text).unwrap();
+        run(CosimOptions { deck, ngspice: Some(ngspice.to_owned()), ..CosimOptions::default() })
+            .unwrap_or_else(|e| panic!("{}: {e}\n{text}", self.file))
+    }
+}
+
+/// In `.ac`, from a thousandth of the first mode to just below the second one that ports and signals see, every port and signal over
+/// every port is that of the full model, to 1e-3 of its own value at every frequency; a sweep across the first resonance too.
+#[test]
+fn small_signals_are_those_of_the_full_model() {
+    for scene in [BANK, COMB] {
+        let fitted = scene.exported();
+        let (first, end) = (fitted.model.modes[0].omega / std::f64::consts::TAU, 0.999 * fitted.band[1]);
+        let around = format!(".ac lin 401 {:e} {:e}", 0.98 * first, 1.02 * first);
+        let all = format!(".ac dec 200 {:e} {end:e}", 1e-3 * first);
+        for (version, ngspice) in versions() {
+            for port in scene.ports() {
+                let driven = |name: &str| if name == port { "AC 1".to_owned() } else { "AC 0".to_owned() };
+                for sweep in [&all, &around] {
+                    let run = scene.run(&scene.deck(&fitted, driven, sweep), &ngspice);
+                    let plot = run.plot("AC");
+                    for ((name, full), (_, written)) in scene.read(1).iter().zip(&scene.read(2)) {
+                        let (full, written) = (complex(plot, full), complex(plot, written));
+                        let size = |v: &[f64; 2]| v[0].hypot(v[1]);
+                        let largest = full.iter().map(size).fold(0.0, f64::max);
+                        let off = full.iter().zip(written).map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]));
+                        if largest < 1e-18 {
+                            // motion does not act back on heat
+                            assert!(off.fold(0.0, f64::max) < 1e-18, "{} {name} over {port}", scene.file);
+                            continue;
+                        }
+                        let worst = off.zip(full).map(|(off, a)| off / size(a)).fold(0.0, f64::max);
+                        println!(
+                            "ngspice {version}, {}, {} modes, {name} over {port}, {sweep}: {worst:.2e}",
+                            scene.file,
+                            fitted.model.modes.len()
+                        );
+                        assert!(worst < 1e-3, "ngspice {version}, {} {name} over {port}: {worst:e}", scene.file);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// At the operating point currents, places and temperatures are those of the full model, to 1e-6 of each.
+#[test]
+fn the_operating_point_is_that_of_the_full_model() {
+    for scene in [BANK, COMB] {
+        let fitted = scene.exported();
+        for (version, ngspice) in versions() {
+            let run = scene.run(&scene.deck(&fitted, |_| String::new(), ".op"), &ngspice);
+            let plot = run.plot("Operating");
+            for ((name, full), (_, written)) in scene.read(1).iter().zip(&scene.read(2)) {
+                let (full, written) = (real(plot, full)[0], real(plot, written)[0]);
+                println!("ngspice {version}, {} {name}: {full:e} {written:e}", scene.file);
+                // what is 0 in the full model is so to a picoampere and a picometre
+                assert!(
+                    (full - written).abs() <= 1e-6 * full.abs() + 1e-12,
+                    "ngspice {version}, {} {name}",
+                    scene.file
+                );
+            }
+        }
+    }
+}
+
+/// After a small step of a voltage both move alike: displacement within 1e-3 of its range, at equal steps.
+#[test]
+fn a_small_step_moves_both_alike() {
+    let bank = ("heat", "PULSE(1 1.0002 1u 1u 1u 1 1)", ".tran 50n 100u 0 50n", 100e-6);
+    let comb = ("drive", "PULSE(20 20.002 1u 1u 1u 1 1)", ".tran 100n 200u 0 100n", 200e-6);
+    for (scene, (port, pulse, analysis, end)) in [(BANK, bank), (COMB, comb)] {
+        let fitted = scene.exported();
+        let driven = |name: &str| if name == port { pulse.to_owned() } else { String::new() };
+        for (version, ngspice) in versions() {
+            let text = scene.deck(&fitted, driven, &format!(".options reltol=1e-6\n{analysis}"));
+            let run = scene.run(&text, &ngspice);
+            let plot = run.plot("Transient");
+            let t = real(plot, "time");
+            let off = deviation((t, real(plot, "v(s0_2)")), (t, real(plot, "v(s0_1)")), 0.0, end);
+            println!("ngspice {version}, {}: {off:.2e} of range", scene.file);
+            assert!(off < 1e-3, "ngspice {version}, {}: {off:e}", scene.file);
+        }
+    }
+}

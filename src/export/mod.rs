@@ -1,0 +1,108 @@
+//! Out of the simulator: a model written down for circuit simulators that know nothing of this program.
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | [`linear`] | the reduced linear model: modes, static correction, lags of heaters, ports; its response |
+//! | [`reduce`] | how it is made of a mechanism at an operating point |
+//! | [`compare`] | how far it is from the exact small-signal answer, and how many modes that takes |
+//! | [`spice`] | it as a subcircuit |
+//! | [`verilog_a`] | it as a Verilog-A module |
+//!
+//! What lies across a port, and what flows into it, have the scales of the ngspice plug-in ([`crate::device::scale`]), so
+//! that a subcircuit takes the place of an instance pin by pin.
+
+pub mod compare;
+pub mod linear;
+pub mod names;
+pub mod reduce;
+pub mod spice;
+pub mod verilog_a;
+
+pub use linear::Reduced;
+
+use crate::analysis::AnalysisError;
+use crate::device::DeviceError;
+use thiserror::Error;
+
+/// What is to be written.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Request {
+    /// Ports with volts per unit of what lies across them, where that is not the default; none: every electrical one.
+    pub ports: Vec<(String, Option<f64>)>,
+    /// Signals shown as voltages, with volts per unit.
+    pub signals: Vec<(String, f64)>,
+    /// Voltages of the operating point by port name [V]; others are at 0 V.
+    pub bias: Vec<(String, f64)>,
+    /// Modes to keep; none: as many as `within` takes.
+    pub count: Option<usize>,
+    /// Highest frequency that the model is for [Hz]; none: that of the second mode that ports and signals see.
+    pub to: Option<f64>,
+    /// Largest relative deviation from the exact small-signal answer [1].
+    pub within: f64,
+}
+
+/// Why nothing can be written.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum ExportError {
+    /// The operating point or its modes cannot be had.
+    #[error(transparent)]
+    Analysis(#[from] AnalysisError),
+    /// A port or signal cannot be had.
+    #[error(transparent)]
+    Device(#[from] DeviceError),
+    /// There is nothing to connect.
+    #[error(
+        "the netlist has no ports, and none is asked for: add one with `NAME port * [node] []`, or name NODE.x with --ports"
+    )]
+    NoPorts,
+    /// A port that a linear model with constant coefficients cannot have.
+    #[error(
+        "port \"{port}\": the rate of a frame couples motions by its own value and its rate of change, which the written \
+         model does not have; leave it out, or use the plug-in"
+    )]
+    Turning {
+        /// Its name.
+        port: String,
+    },
+    /// The equilibrium is none that a mechanism stays at.
+    #[error(
+        "the equilibrium at these voltages is unstable in {negative} direction(s): a linear model about it would grow \
+         without bound; choose another --port voltage"
+    )]
+    Unstable {
+        /// Directions in which it is.
+        negative: usize,
+    },
+    /// No number of modes is enough.
+    #[error(
+        "{modes} modes come within {error:.1e} of the exact small-signal answer up to {to:.4e} Hz, not within {within:.1e}; \
+         lower --to, raise --within, or name --count"
+    )]
+    NotReached {
+        /// Modes tried.
+        modes: usize,
+        /// Largest deviation [1].
+        error: f64,
+        /// Up to [Hz].
+        to: f64,
+        /// What was asked for [1].
+        within: f64,
+    },
+    /// Two names would be the same in the file.
+    #[error("\"{first}\" and \"{second}\" would both be called {name} in the file; leave one out")]
+    SameName {
+        /// First of them.
+        first: String,
+        /// Second of them.
+        second: String,
+        /// What both become.
+        name: String,
+    },
+    /// A name that files cannot have.
+    #[error("--name: expected a letter, then letters, digits and _, got \"{got}\"")]
+    BadName {
+        /// What was given.
+        got: String,
+    },
+}

@@ -1,0 +1,87 @@
+//! Names of pins: those of ports and signals with the characters that simulators take.
+
+use super::ExportError;
+use super::linear::Reduced;
+
+/// Pins of a written model, in order.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Pins {
+    /// Positive and negative pin of each port.
+    pub ports: Vec<[String; 2]>,
+    /// Pin of each signal, a voltage against ground.
+    pub signals: Vec<String>,
+}
+
+impl Pins {
+    /// Those of a model: `p_NAME`, `n_NAME` of each port, `s_NAME` of each signal.
+    ///
+    /// # Errors
+    /// [`ExportError::SameName`] where two become one.
+    pub fn of(model: &Reduced) -> Result<Self, ExportError> {
+        let ports: Vec<String> = model.ports.iter().map(|p| plain(&p.name)).collect();
+        let signals: Vec<String> = model.signals.iter().map(|s| plain(&s.name)).collect();
+        let named = |plain: &[String], full: &dyn Fn(usize) -> String| {
+            for (k, name) in plain.iter().enumerate() {
+                if let Some(j) = plain[..k].iter().position(|n| n == name) {
+                    return Err(ExportError::SameName { first: full(j), second: full(k), name: name.clone() });
+                }
+            }
+            Ok(())
+        };
+        named(&ports, &|k| model.ports[k].name.clone())?;
+        named(&signals, &|k| model.signals[k].name.clone())?;
+        Ok(Self {
+            ports: ports.iter().map(|n| [format!("p_{n}"), format!("n_{n}")]).collect(),
+            signals: signals.iter().map(|n| format!("s_{n}")).collect(),
+        })
+    }
+
+    /// All of them in the order of the subcircuit's line.
+    pub fn all(&self) -> impl Iterator<Item = &str> {
+        self.ports.iter().flatten().chain(&self.signals).map(String::as_str)
+    }
+}
+
+/// Lower case, with `_` in place of every run of other characters.
+fn plain(name: &str) -> String {
+    let mut out = String::new();
+    for c in name.chars() {
+        if c.is_ascii_alphanumeric() {
+            out.push(c.to_ascii_lowercase());
+        } else if !out.ends_with('_') && !out.is_empty() {
+            out.push('_');
+        }
+    }
+    out.trim_end_matches('_').to_owned()
+}
+
+/// Checks the name of a subcircuit or module.
+///
+/// # Errors
+/// [`ExportError::BadName`].
+pub fn checked(name: &str) -> Result<&str, ExportError> {
+    let good = name.starts_with(|c: char| c.is_ascii_alphabetic())
+        && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
+    if good { Ok(name) } else { Err(ExportError::BadName { got: name.to_owned() }) }
+}
+
+/// A name made of a file's.
+pub fn from_file(stem: &str) -> String {
+    let name = plain(stem);
+    if name.starts_with(|c: char| c.is_ascii_alphabetic()) { name } else { format!("m_{name}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Names keep letters and digits, in lower case; a name for a module begins with a letter.
+    #[test]
+    fn plain_names() {
+        assert_eq!(plain("x1(2).Y"), "x1_2_y");
+        assert_eq!(plain("b1.hot.T"), "b1_hot_t");
+        assert_eq!(from_file("3arms"), "m_3arms");
+        assert_eq!(checked("bank_2"), Ok("bank_2"));
+        assert!(checked("2bank").is_err() && checked("a b").is_err() && checked("").is_err());
+    }
+}

@@ -1,0 +1,131 @@
+//! The reduced model of [`bimorph::export`] against the device that it stands for, at frequencies of the test's own.
+
+use bimorph::compile::{CompileOptions, Compiled, compile};
+use bimorph::device::local::LocalDevice;
+use bimorph::device::scale::Scale;
+use bimorph::device::{Device, Mode, OpenRequest, SmallSignal, Trial, TrialReply};
+use bimorph::export::compare::{Fitted, fit};
+use bimorph::export::{ExportError, Request};
+use bimorph::netlist::Bundle;
+use nalgebra::Complex;
+use std::f64::consts::TAU;
+use std::path::Path;
+use std::sync::Arc;
+
+fn compiled(file: &str, options: CompileOptions) -> Arc<Compiled> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(file);
+    Arc::new(compile(&Bundle::read(&path, &[]).unwrap(), &options).unwrap_or_else(|e| panic!("{file}: {e}")))
+}
+
+fn request(ports: &[&str], signals: &[&str], bias: &[(&str, f64)]) -> Request {
+    Request {
+        ports: ports.iter().map(|p| ((*p).to_owned(), None)).collect(),
+        signals: signals.iter().map(|s| ((*s).to_owned(), 1.0)).collect(),
+        bias: bias.iter().map(|(n, v)| ((*n).to_owned(), *v)).collect(),
+        count: None,
+        to: None,
+        within: 1e-4,
+    }
+}
+
+/// Largest deviation of the model from [`Device::linearize`] over the largest value of its curve, at 41 frequencies of the band.
+fn deviation(compiled: &Arc<Compiled>, request: &Request, fitted: &Fitted) -> f64 {
+    let mut device = LocalDevice::new(Arc::clone(compiled));
+    let ports: Vec<String> = request.ports.iter().map(|(n, _)| n.clone()).collect();
+    let signals = request.signals.iter().map(|(n, _)| n.clone()).collect();
+    let opened = device.open(&OpenRequest { ports: ports.clone(), signals }).unwrap();
+    let bias = |name: &String| request.bias.iter().find(|(n, _)| n == name).map_or(0.0, |(_, v)| *v);
+    let voltages: Vec<f64> = ports.iter().map(bias).collect();
+    let mut reply = TrialReply::default();
+    device
+        .trial(&Trial { mode: Mode::Static, parent: None, t: 0.0, dt: 0.0, voltages: &voltages }, &mut reply)
+        .unwrap();
+    let scales: Vec<Scale> = opened.ports.iter().map(|p| Scale::new(p.kind, None)).collect();
+    let (p, mut small) = (scales.len(), SmallSignal::default());
+    let [low, high] = fitted.band;
+    let rows = fitted.model.rows();
+    let (mut worst, mut largest) = (vec![0.0f64; rows * p], vec![0.0f64; rows * p]);
+    for k in 0..41 {
+        let omega = TAU * low * (high / low).powf((f64::from(k) + 0.37) / 41.5);
+        device.linearize(reply.token.unwrap(), omega, &mut small).unwrap();
+        let y = fitted.model.response(omega).unwrap();
+        for row in 0..rows {
+            for q in 0..p {
+                let ([re, im], scale) = if row < p {
+                    (small.admittance[row * p + q], scales[row].answered)
+                } else {
+                    (small.outputs[(row - p) * p + q], 1.0)
+                };
+                let exact = Complex::new(re, im) * (scale * scales[q].given);
+                worst[row * p + q] = worst[row * p + q].max((y[(row, q)] - exact).norm());
+                largest[row * p + q] = largest[row * p + q].max(exact.norm());
+            }
+        }
+    }
+    // a coupling that symmetry forbids is rounding in both
+    let most = |q: usize, row: usize| {
+        let column =
+            (0..rows).filter(|r| fitted.model.row_name(*r).contains('.') == fitted.model.row_name(row).contains('.'));
+        column.map(|r| largest[r * p + q]).fold(0.0, f64::max)
+    };
+    (0..rows * p).filter(|k| largest[*k] > 1e-9 * most(k % p, k / p)).map(|k| worst[k] / largest[k]).fold(0.0, f64::max)
+}
+
+/// Every kind of port and signal, with heaters behind a lag, on the bank, the resonator and the gyroscope: the model is within 1e-3 of
+/// the device between the frequencies at which it was fitted, too.
+#[test]
+fn it_is_the_device_in_small_signals() {
+    let bank = request(
+        &["heat", "sense", "yoke.y", "low.vx", "high.rz", "b1.hot.T", "frame.ax"],
+        &["yoke.x", "yoke.vy", "b2.hot.T"],
+        &[("heat", 1.5), ("sense", 20.0)],
+    );
+    let comb = request(
+        &["drive", "sense", "shuttle.x"],
+        &["shuttle.vx", "drive_comb.gap"],
+        &[("drive", 30.0), ("sense", 5.0)],
+    );
+    for (file, request) in [("examples/bank/bank.net", bank), ("examples/comb_resonator/comb_resonator.net", comb)] {
+        let compiled = compiled(file, CompileOptions::default());
+        let fitted = fit(&compiled, &request).unwrap();
+        let off = deviation(&compiled, &request, &fitted);
+        println!("{file}: {} modes, own check {:.1e}, here {off:.1e}", fitted.model.modes.len(), fitted.error);
+        assert!(fitted.error <= 1e-4 && off < 1e-3, "{file}: {off:e}");
+    }
+}
+
+/// Without damping, resonances have no height, and the model is made all the same.
+#[test]
+fn an_undamped_mechanism() {
+    let compiled = compiled(
+        "examples/comb_resonator/comb_resonator.net",
+        CompileOptions { undamped: true, ..CompileOptions::default() },
+    );
+    let request = request(&["drive", "sense"], &["shuttle.x"], &[("drive", 20.0), ("sense", 10.0)]);
+    let fitted = fit(&compiled, &request).unwrap();
+    assert!(fitted.error <= 1e-4 && fitted.model.damping.amax() == 0.0);
+    assert!(deviation(&compiled, &request, &fitted) < 1e-3);
+}
+
+/// More modes than named are not kept, and the error is told, not hidden.
+#[test]
+fn a_count_is_kept() {
+    let compiled = compiled("examples/bank/bank.net", CompileOptions::default());
+    let request =
+        Request { count: Some(1), to: Some(1e6), ..request(&["heat", "sense"], &["yoke.y"], &[("heat", 1.0)]) };
+    let fitted = fit(&compiled, &request).unwrap();
+    assert_eq!(fitted.model.modes.iter().filter(|m| m.number.is_some()).count(), 1);
+    assert!(fitted.error > 1e-2);
+}
+
+/// A plate on its spring 0.1 % below pull-in is still written; beyond it there is no equilibrium to be linear about, or it is closed.
+#[test]
+fn next_to_pull_in() {
+    let compiled = compiled("tests/decks/plate.net", CompileOptions::default());
+    // √(8·k·g³/(27·ε·A)) = 5.1741 V
+    let fitted = fit(&compiled, &request(&["drive"], &["m.x"], &[("drive", 5.1741 * 0.999)])).unwrap();
+    let soft = fitted.model.modes[0].omega / TAU;
+    assert!(soft < 0.5 * 15_915.5, "{soft}");
+    let frame = fit(&compiled, &request(&["frame.wz"], &[], &[]));
+    assert!(matches!(frame, Err(ExportError::Turning { .. })), "{frame:?}");
+}
