@@ -72,7 +72,7 @@ fn percentiles(name: &str, mut call: impl FnMut(usize)) {
 
 /// Newton's trials of one step: the same parent, voltages that differ.
 fn steps(criterion: &mut Criterion, name: &str, device: &mut dyn Device) {
-    device.open(&OpenRequest { ports: vec![], signals: vec!["m.x".into()] }).expect("opens");
+    device.open(&OpenRequest { ports: vec![], signals: vec!["m.x".into()], noise: None }).expect("opens");
     let mut reply = TrialReply::default();
     let rest = Trial { mode: Mode::Static, parent: None, t: 0.0, dt: 0.0, voltages: &[1.0] };
     ask(device, &rest, &mut reply);

@@ -21,7 +21,7 @@ fn opened(compiled: &Arc<Compiled>) -> LocalDevice {
     let mut device = LocalDevice::new(Arc::clone(compiled));
     let signals =
         ["s.y", "s.x", "s.vy", "left.T", "right.T", "drive.q", "squeeze.gap", "squeeze.C", "squeeze.F", "drive.F"];
-    let request = OpenRequest { ports: Vec::new(), signals: signals.map(String::from).to_vec() };
+    let request = OpenRequest { ports: Vec::new(), signals: signals.map(String::from).to_vec(), noise: None };
     device.open(&request).unwrap();
     device
 }
@@ -190,9 +190,9 @@ fn bad_requests_are_refused() {
         Trial { mode: Mode::Static, parent: None, t: 0.0, dt: 0.0, voltages }
     }
     assert_eq!(device.trial(&trial(&[0.0, 0.0]), &mut reply), Err(DeviceError::NotOpen));
-    let unknown = OpenRequest { ports: vec!["heet".into()], signals: vec![] };
+    let unknown = OpenRequest { ports: vec!["heet".into()], signals: vec![], noise: None };
     assert!(matches!(device.open(&unknown), Err(DeviceError::UnknownPort { .. })));
-    let unknown = OpenRequest { ports: vec![], signals: vec!["s.z".into()] };
+    let unknown = OpenRequest { ports: vec![], signals: vec!["s.z".into()], noise: None };
     assert!(matches!(device.open(&unknown), Err(DeviceError::UnknownSignal { .. })));
     let mut device = opened(&compiled);
     assert!(matches!(device.trial(&trial(&[0.0]), &mut reply), Err(DeviceError::BadRequest { .. })));

@@ -1,9 +1,9 @@
 //! Noise of a device: what is warm and takes energy gives it back. Checked against the fluctuation–dissipation theorem, which
 //! holds for any linear system in equilibrium (Callen and Welton 1951), and against closed forms.
 
-use bimorph::compile::{CompileOptions, Compiled, Junctions, compile};
+use bimorph::compile::{CompileOptions, Compiled, Formulation, Junctions, compile};
 use bimorph::device::local::LocalDevice;
-use bimorph::device::{Device, Mode, OpenRequest, PortKind, SmallSignal, Status, Token, Trial, TrialReply};
+use bimorph::device::{Agitation, Device, Mode, OpenRequest, PortKind, SmallSignal, Status, Token, Trial, TrialReply};
 use bimorph::multibody::agitation::BOLTZMANN;
 use bimorph::netlist::Bundle;
 use nalgebra::Complex;
@@ -49,7 +49,7 @@ fn compiled(text: &str) -> Arc<Compiled> {
 fn opened(compiled: &Arc<Compiled>, ports: &[&str], signals: &[&str]) -> LocalDevice {
     let mut device = LocalDevice::new(Arc::clone(compiled));
     let names = |list: &[&str]| list.iter().map(|name| (*name).to_owned()).collect();
-    let request = OpenRequest { ports: names(ports), signals: names(signals) };
+    let request = OpenRequest { ports: names(ports), signals: names(signals), noise: None };
     device.open(&request).unwrap_or_else(|e| panic!("{e}"));
     device
 }
@@ -148,4 +148,103 @@ fn a_heater_is_a_warm_resistor() {
         println!("{volts} V: {:.1} K, {:e} A²/Hz", reply.outputs[0], noise[0][0]);
         assert!((noise[0][0] / want - 1.0).abs() <= 1e-12, "{:e} {want:e}", noise[0][0]);
     }
+}
+
+fn shaken(compiled: &Arc<Compiled>, signal: &str, seed: u64, band: Option<f64>) -> LocalDevice {
+    let mut device = LocalDevice::new(Arc::clone(compiled));
+    let noise = Some(Agitation { seed, band });
+    device.open(&OpenRequest { ports: vec![], signals: vec![signal.into()], noise }).unwrap_or_else(|e| panic!("{e}"));
+    device
+}
+
+/// The signal after each of so many steps from rest, and the last state.
+fn run(device: &mut LocalDevice, given: &[f64], dt: f64, steps: usize) -> (Vec<f64>, Token) {
+    let (mut token, mut reply) = balanced(device, given);
+    let values = (0..steps).map(|_| {
+        let request = Trial { mode: Mode::Transient, parent: Some(token), t: 0.0, dt, voltages: given };
+        device.trial(&request, &mut reply).unwrap();
+        assert_eq!(reply.status, Status::Ok);
+        token = reply.token.unwrap();
+        device.accept(token);
+        reply.outputs[0]
+    });
+    (values.collect(), token)
+}
+
+/// A mass of 1 ng at 5 kHz.
+fn mass(c: f64) -> Arc<Compiled> {
+    compiled(&format!(
+        "anchor * [g] [l=1u w=1u h=1u]\nmass2d * [m] [m=1e-9 J=1e-20]\nguide2d * [m] []\nspring2d * [g m] [kx=1]\ndamper2d * [g m] [bx={c}]\n"
+    ))
+}
+
+/// Equipartition: over a long run ½k⟨x²⟩ = ½k_B·T and ½m⟨v²⟩ = ½k_B·T, within three standard deviations of the mean of
+/// γT = 4000 correlation times, σ = √(2/γT) = 2.2 %. The band takes 0.2 % of it.
+#[test]
+fn every_degree_of_freedom_has_its_share() {
+    let c = 6e-6;
+    let model = mass(c);
+    for seed in [1, 2] {
+        let mut square = [0.0; 2];
+        for (signal, square) in ["m.x", "m.vx"].into_iter().zip(&mut square) {
+            let (values, _) = run(&mut shaken(&model, signal, seed, None), &[], 5e-6, 133_000);
+            *square = values.iter().map(|x| x * x).sum::<f64>() / values.len() as f64;
+        }
+        let energy = BOLTZMANN * 300.15;
+        let shares = [square[0] / energy, 1e-9 * square[1] / energy];
+        println!("seed {seed}: k<x2>/kT = {:.3}, m<v2>/kT = {:.3}", shares[0], shares[1]);
+        assert!(shares.iter().all(|share| (share - 1.0).abs() < 3.0 * 0.0224), "{shares:?}");
+    }
+}
+
+/// The same seed gives the same bits, also from a snapshot and when steps are tried and thrown away in between; another seed
+/// another motion. A step over more cells than two is refused with the length of one.
+#[test]
+fn a_seed_decides() {
+    let model = mass(6e-6);
+    let (first, token) = run(&mut shaken(&model, "m.x", 7, Some(2e5)), &[], 2.5e-6, 50);
+    assert!(first.iter().all(|x| x.abs() < 1e-8) && first.iter().any(|x| x.abs() > 1e-12), "{first:?}");
+    let mut device = shaken(&model, "m.x", 7, Some(2e5));
+    assert_eq!(run(&mut device, &[], 2.5e-6, 50), (first.clone(), token));
+    assert_ne!(run(&mut shaken(&model, "m.x", 8, Some(2e5)), &[], 2.5e-6, 50).0, first);
+
+    let mut reply = TrialReply::default();
+    let step = |dt: f64| Trial { mode: Mode::Transient, parent: Some(token), t: 0.0, dt, voltages: &[] };
+    device.trial(&step(5.1e-6), &mut reply).unwrap();
+    assert_eq!(reply.status, Status::NeedDt(2.5e-6));
+    device.trial(&step(1e-6), &mut reply).unwrap();
+    assert!(reply.dt_next <= 2.5e-6);
+    let mut other = LocalDevice::new(Arc::clone(&model));
+    other.load(&device.save(Some(token)).unwrap()).unwrap();
+    let (mut here, mut there) = (TrialReply::default(), TrialReply::default());
+    device.trial(&step(2e-6), &mut here).unwrap();
+    other.trial(&step(2e-6), &mut there).unwrap();
+    assert_eq!(here, there);
+    for band in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        let noise = Some(Agitation { seed: 1, band: Some(band) });
+        let refused = LocalDevice::new(Arc::clone(&model)).open(&OpenRequest { noise, ..OpenRequest::default() });
+        assert!(refused.unwrap_err().to_string().starts_with("noise band: expected a positive frequency"));
+    }
+}
+
+/// Both formulations of one mechanism are shaken by one force: within 5e-3 of the range of the motion, by which
+/// their joints differ at 16 segments a beam (1.6e-3; 2e-2 at 2).
+#[test]
+fn formulations_feel_the_same() {
+    let motion = |formulation| {
+        let options = CompileOptions {
+            formulation,
+            tol: 1e-4,
+            junctions: Junctions::Centreline,
+            segments: Some(16),
+            ..CompileOptions::default()
+        };
+        let model = Arc::new(compile(&Bundle::from_text("noise.net", RESONATOR), &options).unwrap());
+        run(&mut shaken(&model, "t.y", 3, Some(1e6)), &[5.0, 0.0], 5e-7, 400).0
+    };
+    let (bodies, joints) = (motion(Formulation::Compliant), motion(Formulation::Rcr));
+    let range = bodies.iter().map(|x| (x - bodies[0]).abs()).fold(0.0, f64::max);
+    let apart = bodies.iter().zip(&joints).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    println!("apart by {:e} of {range:e} m", apart / range);
+    assert!(range > 1e-11 && apart < 5e-3 * range, "{apart:e} {range:e}");
 }

@@ -45,7 +45,9 @@ fn compiled_to(tol: f64, text: &str, formulation: Formulation) -> Arc<Compiled> 
 fn opened(compiled: &Arc<Compiled>, ports: &[&str], signals: &[&str]) -> LocalDevice {
     let mut device = LocalDevice::new(Arc::clone(compiled));
     let names = |list: &[&str]| list.iter().map(|name| (*name).to_owned()).collect();
-    device.open(&OpenRequest { ports: names(ports), signals: names(signals) }).unwrap_or_else(|e| panic!("{e}"));
+    device
+        .open(&OpenRequest { ports: names(ports), signals: names(signals), noise: None })
+        .unwrap_or_else(|e| panic!("{e}"));
     device
 }
 
@@ -70,7 +72,7 @@ fn given(formulation: Formulation, share: f64) -> Vec<f64> {
 fn kinds_are_told() {
     let mut device = LocalDevice::new(compiled(SHUTTLE, Formulation::Compliant));
     let ports = PORTS.iter().map(|(name, ..)| (*name).to_owned()).collect();
-    let told = device.open(&OpenRequest { ports, signals: vec![] }).unwrap();
+    let told = device.open(&OpenRequest { ports, signals: vec![], noise: None }).unwrap();
     for (port, (name, kind, _)) in told.ports.iter().zip(PORTS) {
         assert_eq!((port.name.as_str(), port.kind), (name, kind));
     }
@@ -297,7 +299,7 @@ fn heat_given_is_heat_of_a_current() {
 #[test]
 fn impossible_ports_are_refused() {
     let mut device = LocalDevice::new(compiled(SHUTTLE, Formulation::Compliant));
-    let mut open = |port: &str| device.open(&OpenRequest { ports: vec![port.into()], signals: vec![] });
+    let mut open = |port: &str| device.open(&OpenRequest { ports: vec![port.into()], signals: vec![], noise: None });
     assert!(matches!(open("s.z"), Err(DeviceError::UnknownPort { .. })));
     for (port, why) in [("a.x", "held"), ("rod.T", "beam2det"), ("drive.q", "monitored")] {
         match open(port) {
@@ -306,7 +308,7 @@ fn impossible_ports_are_refused() {
         }
     }
     let mut device = LocalDevice::new(compiled(SHUTTLE, Formulation::Rcr));
-    match device.open(&OpenRequest { ports: vec!["frame.wz".into()], signals: vec![] }) {
+    match device.open(&OpenRequest { ports: vec!["frame.wz".into()], signals: vec![], noise: None }) {
         Err(DeviceError::BadRequest { expected, .. }) => assert!(expected.contains("compliant"), "{expected}"),
         other => panic!("{other:?}"),
     }

@@ -4,7 +4,9 @@
 //! copy, and stores the result under a token that is a hash of the request: the same request always gives the same token
 //! and the same bits, whatever was asked in between.
 
+use super::agitation::Shaken;
 use super::look;
+use super::noise::surroundings;
 use super::ports::Ports;
 use super::saved;
 use super::states::{Snapshot, States};
@@ -44,6 +46,9 @@ pub(super) struct Session {
     pub(super) states: States,
     pub(super) first_step: f64,
     pub(super) equilibrium: Equilibrium,
+    /// Thermal agitation, if it was asked for, and its force in this step.
+    pub(super) shaken: Option<Shaken>,
+    pub(super) push: Vec<Pose>,
     /// Carries ∂motion/∂(final voltage), one for each opened port.
     pub(super) stepper: Adaptive<Formulated>,
     pub(super) motion: Motion,
@@ -202,8 +207,14 @@ impl Session {
             }
             None => None,
         };
+        let shaken = match &request.noise {
+            Some(noise) => Some(Shaken::new(noise, compiled, surroundings(compiled))?),
+            None => None,
+        };
         let session = Self {
             opened: request.clone(),
+            shaken,
+            push: Vec::new(),
             stepper: Adaptive::new(system, Formulated::new(system, joints.as_ref(), first_step, &ports.sources)),
             ports,
             signals,
@@ -238,6 +249,7 @@ impl Session {
             && numbers(&state.rise, self.rise.len())
             && numbers(&state.sources, self.sources.len())
             && state.next_step > 0.0
+            && state.elapsed >= 0.0
             && (followed == 0 || followed == self.signals.len() + self.ports.len())
             && (state.carried.is_empty()
                 || state.carried.len() == carried.len() && state.carried.iter().zip(carried).all(alike))

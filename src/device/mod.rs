@@ -14,6 +14,7 @@
 //! voltage, and it answers with a motion or a temperature in the place of a current; it has no charge. What is said of
 //! voltages and currents here holds for what is given and answered.
 
+pub mod agitation;
 pub mod local;
 pub mod look;
 mod noise;
@@ -25,6 +26,7 @@ mod small_signal;
 pub mod states;
 mod trial;
 
+pub use agitation::Agitation;
 pub use ports::PortKind;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -135,13 +137,15 @@ pub struct Description {
 }
 
 /// What to open: which ports, in which order, and which signals.
-#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct OpenRequest {
     /// Port names in the caller's order, see [`ports`]; empty: all electrical ones, in netlist order. A port left out is held
     /// at 0 V, or free.
     pub ports: Vec<String>,
     /// Signal names, see [`SignalInfo::name`].
     pub signals: Vec<String>,
+    /// Thermal agitation in transient trials; none: without.
+    pub noise: Option<Agitation>,
 }
 
 /// What can go wrong with a request itself. A trial that finds no answer is not an error but [`Status::Fail`].

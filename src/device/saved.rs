@@ -6,12 +6,12 @@
 
 use super::shown::Shown;
 use super::states::{Snapshot, States};
-use super::{DeviceError, OpenRequest, Token};
+use super::{Agitation, DeviceError, OpenRequest, Token};
 use crate::multibody::planar::Pose;
 use crate::solve::time::method::Motion;
 
 /// What the bytes begin with: a name and the version of this format.
-const HEAD: [u8; 8] = *b"bimorph\x01";
+const HEAD: [u8; 8] = *b"bimorph\x02";
 
 /// Writes what is open and its states.
 pub(super) fn write(opened: &OpenRequest, states: &States) -> Vec<u8> {
@@ -23,6 +23,11 @@ pub(super) fn write(opened: &OpenRequest, states: &States) -> Vec<u8> {
             out.0.extend(name.as_bytes());
         }
     }
+    out.word(opened.noise.is_some().into());
+    if let Some(noise) = &opened.noise {
+        out.word(noise.seed);
+        out.word(noise.band.map_or(0, f64::to_bits));
+    }
     out.count(states.len());
     for (token, parent, state) in states.in_order() {
         out.word(token.0);
@@ -32,6 +37,7 @@ pub(super) fn write(opened: &OpenRequest, states: &States) -> Vec<u8> {
         out.numbers(&state.rise);
         out.numbers(&state.sources);
         out.word(state.next_step.to_bits());
+        out.word(state.elapsed.to_bits());
         for numbers in state.shown.numbers() {
             out.numbers(numbers);
         }
@@ -90,7 +96,7 @@ struct Reader<'a>(&'a [u8]);
 impl Reader<'_> {
     fn all(&mut self) -> Option<(OpenRequest, States)> {
         self.0 = self.0.strip_prefix(&HEAD)?;
-        let opened = OpenRequest { ports: self.names()?, signals: self.names()? };
+        let opened = OpenRequest { ports: self.names()?, signals: self.names()?, noise: self.noise()? };
         let mut states = States::default();
         for _ in 0..self.count(8)? {
             let (token, parent) = (Token(self.word()?), self.word()?);
@@ -100,6 +106,7 @@ impl Reader<'_> {
                 rise: self.numbers()?,
                 sources: self.numbers()?,
                 next_step: f64::from_bits(self.word()?),
+                elapsed: f64::from_bits(self.word()?),
                 shown: {
                     let mut parts = [const { Vec::new() }; Shown::PARTS];
                     for part in &mut parts {
@@ -136,6 +143,17 @@ impl Reader<'_> {
         (count <= self.0.len() / each).then_some(count)
     }
 
+    fn noise(&mut self) -> Option<Option<Agitation>> {
+        Some(match self.word()? {
+            0 => None,
+            1 => {
+                let (seed, band) = (self.word()?, self.word()?);
+                Some(Agitation { seed, band: (band != 0).then(|| f64::from_bits(band)) })
+            }
+            _ => return None,
+        })
+    }
+
     fn names(&mut self) -> Option<Vec<String>> {
         let mut names = Vec::new();
         for _ in 0..self.count(8)? {
@@ -170,7 +188,11 @@ mod tests {
     use crate::device::{Mode, Trial};
 
     fn some() -> (OpenRequest, States) {
-        let opened = OpenRequest { ports: vec!["drive".into()], signals: vec!["µ.x".into(), String::new()] };
+        let opened = OpenRequest {
+            ports: vec!["drive".into()],
+            signals: vec!["µ.x".into(), String::new()],
+            noise: Some(Agitation { seed: 7, band: Some(1e6) }),
+        };
         let mut states = States::default();
         let mut parent = None;
         for k in 0..3 {
@@ -181,6 +203,7 @@ mod tests {
                 v: pose(0.1),
                 rise: vec![300.0; k as usize],
                 sources: vec![1.0, -2.0],
+                elapsed: 3e-6,
                 next_step: f64::INFINITY,
                 shown: Shown::start(vec![1.0, 2.0]).step(1e-6, vec![1.5, 2.5], 1e-3, |_| 1e-9).0,
                 carried,

@@ -28,6 +28,8 @@ pub struct Snapshot {
     pub sources: Vec<f64>,
     /// First internal step of what follows [s].
     pub next_step: f64,
+    /// Time since the equilibrium that the motion began from [s].
+    pub elapsed: f64,
     /// What the circuit has seen.
     pub shown: Shown,
     /// What a formulation carries from step to step beside the bodies' motion.

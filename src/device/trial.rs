@@ -101,7 +101,15 @@ impl Session {
         };
         self.stepper.method.begin(parent.map_or(&[], |p| &p.carried));
         let electrics = &system.electrics;
-        let ramp = Ramp { electrics, from: &from, to: &self.sources, rise: &self.rise, dt: request.dt };
+        if let Some(shaken) = &mut self.shaken {
+            let start = parent.map_or(0.0, |p| p.elapsed);
+            if let Err(longest) = shaken.mean(compiled, start, request.dt, &mut self.push) {
+                reply.status = Status::NeedDt(longest);
+                return;
+            }
+        }
+        let push = std::mem::take(&mut self.push);
+        let ramp = Ramp { electrics, from: &from, to: &self.sources, rise: &self.rise, dt: request.dt, push: &push };
         let mut h = parent.map_or(self.first_step, |p| p.next_step);
         let advanced = self.stepper.advance(
             system,
@@ -133,9 +141,11 @@ impl Session {
         }
         ramp.at(request.dt, &mut self.drive);
         self.rise.copy_from_slice(&self.rise_slope);
-        let none = Shown::default();
-        self.answer(compiled, request, Some((&from, parent.map_or(&none, |p| &p.shown))), h, reply);
-        reply.dt_next = reply.dt_next.min(PROPOSED_STEPS * h);
+        let rest = Snapshot::default();
+        self.push = push;
+        self.answer(compiled, request, Some((&from, parent.unwrap_or(&rest))), h, reply);
+        let cell = self.shaken.as_ref().map_or(f64::INFINITY, |shaken| shaken.cell);
+        reply.dt_next = reply.dt_next.min(PROPOSED_STEPS * h).min(cell);
     }
 
     /// Fills in the reply from `motion`, `rise`, `sources` and `sensitivity`, and stores the state. `from` holds the
@@ -144,7 +154,7 @@ impl Session {
         &mut self,
         compiled: &Compiled,
         request: &Trial<'_>,
-        from: Option<(&[f64], &Shown)>,
+        from: Option<(&[f64], &Snapshot)>,
         next_step: f64,
         reply: &mut TrialReply,
     ) {
@@ -191,8 +201,10 @@ impl Session {
                         self.unit[port] = 1.0;
                         electrics.heating.slope(k, &self.sources, &self.unit)
                     }
-                    Some((from, _)) => Ramp { electrics, from, to: &self.sources, rise: &self.rise, dt: request.dt }
-                        .rise_sensitivity(k, request.dt, port),
+                    Some((from, _)) => {
+                        Ramp { electrics, from, to: &self.sources, rise: &self.rise, dt: request.dt, push: &[] }
+                            .rise_sensitivity(k, request.dt, port)
+                    }
                 };
             }
             for (g, volts) in gap_row.iter().enumerate() {
@@ -237,7 +249,7 @@ impl Session {
                     Signal::Pull(g) => nothing * system.pull(*g, view.q, view.volts[*g]).abs(),
                     Signal::Charge(g) => charge(system.capacitance(*g, view.q), view.volts[*g]),
                 };
-                before.step(request.dt, seen, tol, |n| match n.checked_sub(signals) {
+                before.shown.step(request.dt, seen, tol, |n| match n.checked_sub(signals) {
                     None => of_signal(&self.signals[n]),
                     Some(port) => match &self.ports.answers[port] {
                         Answer::Current => charge(reply.dq_dv[port * (ports + 1)], request.voltages[port]),
@@ -255,6 +267,7 @@ impl Session {
             rise: self.rise.clone(),
             sources: self.sources.clone(),
             next_step,
+            elapsed: from.map_or(0.0, |(_, before)| before.elapsed + request.dt),
             carried: if from.is_some() { self.stepper.method.state().to_vec() } else { Vec::new() },
         };
         reply.token = Some(self.states.insert(request, snapshot));

@@ -4,6 +4,7 @@
 use super::inputs::Input;
 use super::thermal::{Heating, Lag, lagged};
 use crate::multibody::forces::RestStrain;
+use crate::multibody::planar::Pose;
 use nalgebra::DMatrix;
 
 /// What a mechanism feels at one instant, or the change of it.
@@ -19,6 +20,8 @@ pub struct Drive {
     pub inputs: Vec<f64>,
     /// Rate of change of the frame's rate [rad/s²].
     pub turning: f64,
+    /// Force and moment on each body, as thermal agitation gives them; empty: none.
+    pub push: Vec<Pose>,
 }
 
 impl Drive {
@@ -30,6 +33,7 @@ impl Drive {
     /// Leaves of a change what acts in proportion to the drive that it changes: voltages, and the rate of the frame.
     pub fn keep_quadratic(&mut self, electrics: &Electrics) {
         self.expansion.fill(0.0);
+        self.push.clear();
         (self.load, self.turning) = (0.0, 0.0);
         for (value, input) in self.inputs.iter_mut().zip(&electrics.inputs) {
             if *input != Input::Rate {
@@ -92,6 +96,7 @@ impl Electrics {
             load: 1.0,
             inputs: vec![0.0; self.inputs.len()],
             turning: 0.0,
+            push: Vec::new(),
         }
     }
 
@@ -118,6 +123,7 @@ impl Electrics {
         }
         drive.inputs.copy_from_slice(&u[self.voltages()..]);
         drive.turning = 0.0;
+        drive.push.clear();
     }
 
     /// The change of the steady drive with source `s`, at source voltages `u`.
@@ -151,6 +157,8 @@ pub struct Ramp<'a> {
     pub rise: &'a [f64],
     /// Length of the step [s].
     pub dt: f64,
+    /// Force and moment on each body throughout the step; empty: none.
+    pub push: &'a [Pose],
 }
 
 impl Ramp<'_> {
@@ -189,6 +197,8 @@ impl Ramp<'_> {
             let rise = self.rise_after(k, s, self.parabola(k), &mut lag);
             drive.expansion[k] = self.electrics.heating.heaters[k].expansion * rise;
         }
+        drive.push.clear();
+        drive.push.extend_from_slice(self.push);
         let first = self.electrics.voltages();
         drive.turning = 0.0;
         for (k, value) in drive.inputs.iter_mut().enumerate() {
@@ -214,6 +224,7 @@ impl Ramp<'_> {
             *value = (self.to[first + k] - self.from[first + k]) / self.dt;
         }
         (rate.load, rate.turning) = (0.0, 0.0);
+        rate.push.clear();
     }
 
     /// Rate of the free strain of heater `k` at time `s` [1/s].
@@ -239,6 +250,7 @@ impl Ramp<'_> {
             out.expansion[k] = heater.expansion * self.rise_sensitivity(k, s, port);
         }
         out.load = 0.0;
+        out.push.clear();
         out.turning = if self.set_input(port, x, out) == Some(Input::Rate) { 1.0 / self.dt } else { 0.0 };
     }
 
@@ -274,6 +286,7 @@ impl Ramp<'_> {
         }
         self.set_input(port, 1.0 / self.dt, out);
         (out.load, out.turning) = (0.0, 0.0);
+        out.push.clear();
     }
 
     /// Change of the parabola's second and third coefficient with the final voltage of source `port`; the first has none.

@@ -90,6 +90,7 @@ impl System {
     /// `r +=` the share of inputs in the residual.
     pub(super) fn add_input_forces(&self, q: &[Pose], drive: &Drive, r: &mut [Pose]) {
         self.add_point_forces(q, &drive.inputs, r);
+        r.iter_mut().zip(&drive.push).for_each(|(r, push)| *r -= push);
         if let Some(frame) = self.frame(drive) {
             self.add_inertial(q, &frame, frame.rate * frame.rate, r);
         }

@@ -9,7 +9,7 @@ use super::snapshots;
 use super::work::caught;
 use super::{proto, status};
 use crate::budget::{self, Allowance, Budget, Stopped};
-use crate::device::{Device, DeviceError, OpenRequest, SmallSignal, Token, TrialReply};
+use crate::device::{Device, DeviceError, SmallSignal, Token, TrialReply};
 use proto::device_reply::Kind as ReplyKind;
 use std::collections::BTreeMap;
 use std::panic::catch_unwind;
@@ -124,7 +124,7 @@ impl Session {
     fn ask(&self, device: &mut dyn Device, question: &Question) -> Option<ReplyKind> {
         let answer = match question {
             Question::Open(request) => {
-                let request = OpenRequest { ports: request.ports.clone(), signals: request.signals.clone() };
+                let request = wire::open_from_wire(request);
                 device.open(&request).map(|description| {
                     let description = wire::description_to_wire(&description);
                     *self.description.lock().unwrap_or_else(PoisonError::into_inner) = description;

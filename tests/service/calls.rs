@@ -73,7 +73,7 @@ fn a_stream_answers_in_order() {
     block_on(async {
         let mut client = server.client().await;
         let model = compiled(&mut client).await;
-        let open = proto::OpenRequest { model, ports: vec![], signals: vec!["t".into()] };
+        let open = proto::OpenRequest { model, ports: vec![], signals: vec!["t".into()], noise: None };
         let requests = vec![
             ask(Ask::Open(open.clone())),
             ask(trial(0, 0.0, &[1.0, 2.0])),
@@ -102,7 +102,7 @@ fn sessions_outlive_streams() {
     block_on(async {
         let mut client = server.client().await;
         let model = compiled(&mut client).await;
-        let opened = client.open(proto::OpenRequest { model, ports: vec![], signals: vec![] }).await;
+        let opened = client.open(proto::OpenRequest { model, ports: vec![], signals: vec![], noise: None }).await;
         let session = opened.expect("opens").into_inner().session;
         let attach = || ask(Ask::Attach(proto::Attach { session: session.clone() }));
         let requests = vec![attach(), ask(trial(0, 0.0, &[1.0, 2.0]))];

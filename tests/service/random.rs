@@ -25,7 +25,7 @@ fn request() -> impl Strategy<Value = Option<Ask>> {
     let names = || prop::collection::vec(name.clone(), 0..3);
     let open = (model, names(), names()).prop_map(|(model, ports, signals)| {
         let signals = signals.into_iter().filter(|s| s == "t").collect();
-        Ask::Open(proto::OpenRequest { model, ports, signals })
+        Ask::Open(proto::OpenRequest { model, ports, signals, noise: None })
     });
     let trial = (any::<i32>(), any::<u64>(), number(), number(), prop::collection::vec(number(), 0..4), any::<bool>())
         .prop_map(|(mode, parent, t, dt, voltages, plain)| {

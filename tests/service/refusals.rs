@@ -57,7 +57,7 @@ fn bad_fields_are_named() {
         assert_eq!(field(nan.expect_err("is refused")), "voltages[0]");
         let stop = proto::TransientRequest { model: model.clone(), stop_s: -1.0, ..Default::default() };
         assert_eq!(field(client.transient(stop).await.expect_err("is refused")), "stop_s");
-        let port = proto::OpenRequest { model, ports: vec!["nosuch".into()], signals: vec![] };
+        let port = proto::OpenRequest { model, ports: vec!["nosuch".into()], signals: vec![], noise: None };
         assert_eq!(field(client.open(port).await.expect_err("is refused")), "ports");
         let spec = client.submit_sweep(proto::SubmitSweepRequest { bundle: netlist(""), options: None, spec: None });
         assert_eq!(field(spec.await.expect_err("is refused")), "spec");
@@ -116,7 +116,7 @@ fn device_errors_come_back_as_themselves() {
     let mut device = server.device();
     let mut reply = TrialReply::default();
     assert_eq!(device.trial(&at_rest(&[0.0, 0.0]), &mut reply), Err(DeviceError::NotOpen));
-    let ports = OpenRequest { ports: vec!["x".into()], signals: vec![] };
+    let ports = OpenRequest { ports: vec!["x".into()], signals: vec![], noise: None };
     assert!(matches!(device.open(&ports), Err(DeviceError::UnknownPort { name, .. }) if name == "x"));
     device.open(&OpenRequest::default()).expect("opens");
     let orphan = Trial { parent: Some(Token(7)), ..at_rest(&[0.0, 0.0]) };

@@ -43,7 +43,7 @@ fn drive(device: &mut dyn Device, ports: &[(&str, f64)], signals: &[&str]) -> Ve
     let mut said = Vec::new();
     let signals = signals.iter().map(|&signal| signal.to_owned()).collect();
     let names = ports.iter().map(|(name, _)| (*name).to_owned()).collect();
-    said.push(format!("{:?}", device.open(&OpenRequest { ports: names, signals })));
+    said.push(format!("{:?}", device.open(&OpenRequest { ports: names, signals, noise: None })));
     let mut ask = |device: &mut dyn Device, mode, parent, dt: f64, v: f64| -> Option<Token> {
         let voltages: Vec<f64> = ports.iter().map(|(_, share)| share * v).collect();
         let mut reply = TrialReply::default();

@@ -52,7 +52,7 @@ impl Attached {
 
 async fn open(client: &mut BimorphClient<Channel>, model: &str) -> String {
     let signals = ["m.x", "m.vx"].map(str::to_owned).to_vec();
-    let request = proto::OpenRequest { model: model.to_owned(), ports: vec![], signals };
+    let request = proto::OpenRequest { model: model.to_owned(), ports: vec![], signals, noise: None };
     client.open(request).await.expect("opens").into_inner().session
 }
 

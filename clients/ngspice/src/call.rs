@@ -50,6 +50,9 @@ pub(crate) unsafe fn card(param: *mut *mut Parameter, count: c_int) -> RawCard {
         set: strings(3),
         remote: string(4, 0),
         deadline: real(5),
+        noise: flag(6),
+        seed: real(7),
+        noise_band: real(8),
         options: (declared().iter().zip(OWN_COUNT..))
             .map(|(declared, n)| match declared.default {
                 Written::Flag(_) => flag(n).map(Written::Flag),

@@ -8,7 +8,8 @@ use crate::history::{Base, History};
 use crate::settings::{Monitor, PortName};
 use bimorph::device::scale::Scale;
 use bimorph::device::{
-    Description, Device, DeviceError, Mode, OpenRequest, PortKind, SmallSignal, Status, Token, Trial, TrialReply,
+    Agitation, Description, Device, DeviceError, Mode, OpenRequest, PortKind, SmallSignal, Status, Token, Trial,
+    TrialReply,
 };
 
 /// How often in a row a step or an operating point may fail before the analysis ends. Each attempt of a transient is
@@ -110,13 +111,13 @@ impl Instance {
     pub fn open(
         name: &str,
         mut device: Box<dyn Device>,
-        names: &[PortName],
-        branches: &[bool],
+        (names, branches): (&[PortName], &[bool]),
         monitors: &[Monitor],
+        noise: Option<Agitation>,
     ) -> Result<Self, DeviceError> {
         let signals = monitors.iter().map(|m| m.signal.clone()).collect();
         let description =
-            device.open(&OpenRequest { ports: names.iter().map(|p| p.name.clone()).collect(), signals })?;
+            device.open(&OpenRequest { ports: names.iter().map(|p| p.name.clone()).collect(), signals, noise })?;
         if description.ports.len() != branches.len() {
             let names: Vec<_> = description.ports.iter().map(|p| p.name.as_str()).collect();
             return Err(DeviceError::BadRequest {

@@ -3,6 +3,7 @@
 use crate::deck_options::{self, Written};
 use crate::settings::{self, Monitor, PortName};
 use bimorph::compile::CompileOptions;
+use bimorph::device::Agitation;
 use bimorph::options::{MODEL, Refused};
 use std::time::Duration;
 use thiserror::Error;
@@ -22,6 +23,12 @@ pub struct RawCard {
     pub remote: Option<String>,
     /// `deadline` [s]
     pub deadline: Option<f64>,
+    /// `noise`
+    pub noise: Option<bool>,
+    /// `seed`
+    pub seed: Option<f64>,
+    /// `noise_band` [Hz]
+    pub noise_band: Option<f64>,
     /// The options of the model, in the order of [`MODEL`]; those that were left out are none.
     pub options: Vec<Option<Written>>,
 }
@@ -41,6 +48,8 @@ pub struct ModelCard {
     pub options: CompileOptions,
     /// Longest wait for an answer of the server [s], default 5.
     pub deadline: Duration,
+    /// Thermal agitation in transients.
+    pub noise: Option<Agitation>,
 }
 
 /// What is wrong with a `.model` line.
@@ -69,6 +78,12 @@ pub enum CardError {
         /// Its value.
         value: f64,
     },
+    /// A seed that is no number for one.
+    #[error("seed={value} must be a whole number from 0 to 2^53")]
+    Seed {
+        /// Its value.
+        value: f64,
+    },
     /// As many names as nodes are needed.
     #[error("{what}: the .model line names {names}, but the instance connects {nodes}")]
     Count {
@@ -83,6 +98,19 @@ pub enum CardError {
 
 /// Longest wait for a server's answer unless `deadline` says otherwise [s].
 pub const DEADLINE: f64 = 5.0;
+
+/// The agitation that a line asks for. A band of 0 is none.
+fn agitation(raw: &RawCard) -> Result<Agitation, CardError> {
+    let seed = raw.seed.unwrap_or(1.0);
+    if !((0.0..=2f64.powi(53)).contains(&seed) && seed.fract() == 0.0) {
+        return Err(CardError::Seed { value: seed });
+    }
+    let band = raw.noise_band.filter(|band| *band != 0.0);
+    if let Some(value) = band.filter(|band| !(band.is_finite() && *band > 0.0)) {
+        return Err(CardError::NotPositive { name: "noise_band", value });
+    }
+    Ok(Agitation { seed: seed as u64, band })
+}
 
 impl ModelCard {
     /// Checks a line. `remote` is an address that overrides the line's, from outside the deck.
@@ -112,6 +140,7 @@ impl ModelCard {
                 address => address,
             },
             options,
+            noise: raw.noise.unwrap_or(false).then(|| agitation(raw)).transpose()?,
             deadline: Duration::from_secs_f64(positive("deadline", raw.deadline)?.unwrap_or(DEADLINE).min(1e6)),
         })
     }

@@ -7,6 +7,7 @@ use crate::model_card::ModelCard;
 use crate::registry::register;
 use crate::table::LAYOUT;
 use crate::{host, opener, trace};
+use bimorph::device::Agitation;
 use std::ffi::c_void;
 use std::path::{Path, PathBuf};
 
@@ -51,7 +52,15 @@ pub(crate) unsafe fn open_all(model: *mut Model, circuit: *mut c_void) -> Result
 fn open(name: &str, card: &mut ModelCard, ports: &[bool], directory: Option<&Path>) -> Result<Instance, String> {
     let device = opener::open(card, directory).map_err(|e| e.to_string())?;
     trace::line(format_args!("{name}: {card:?}, deck in {directory:?}"));
-    Instance::open(name, device, &card.ports, ports, &card.monitors).map_err(|e| format!("\"{}\": {e}", card.file))
+    let noise = card.noise.map(|noise| Agitation { seed: seed_of(noise.seed, name), ..noise });
+    Instance::open(name, device, (&card.ports, ports), &card.monitors, noise)
+        .map_err(|e| format!("\"{}\": {e}", card.file))
+}
+
+/// The seed of one instance, by FNV-1a over its name: parts of one model are shaken independently.
+fn seed_of(seed: u64, name: &str) -> u64 {
+    let mix = |hash: u64, byte: u8| (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3);
+    seed.to_le_bytes().into_iter().chain(name.bytes()).fold(0xcbf2_9ce4_8422_2325, mix)
 }
 
 /// The deck's directory: from whoever started ngspice, or from the host.

@@ -47,9 +47,12 @@ const OWN: [(&str, c_int, c_int, Option<f64>, &str); OWN_COUNT] = [
     ("set", kind::STRING, STRINGS, None, "netlist parameters, NAME=VALUE"),
     ("remote", kind::STRING, kind::IF_STRING, None, "address of a server that steps the model"),
     ("deadline", kind::REAL, kind::IF_REAL, Some(DEADLINE), "longest wait for the server [s]"),
+    ("noise", kind::BOOLEAN, kind::IF_FLAG, Some(0.0), "thermal agitation in .tran"),
+    ("seed", kind::REAL, kind::IF_REAL, Some(1.0), "names the random numbers of the agitation"),
+    ("noise_band", kind::REAL, kind::IF_REAL, Some(0.0), "band of the agitation [Hz]; 0: by the model"),
 ];
 /// How many they are.
-pub(crate) const OWN_COUNT: usize = 6;
+pub(crate) const OWN_COUNT: usize = 9;
 
 /// Parameters of a `.model` line, in the order of [`crate::call::card`].
 fn parameters() -> Vec<Declaration> {

@@ -122,14 +122,18 @@ def test_small_signals(plate: bimorph.Model) -> None:
         assert abs(y.imag) == pytest.approx(omega * abs(charge[1] - charge[0]) / (2 * h), rel=1e-5)
 
 
+MASS = """
+anchor * [g] [l=1u w=1u h=1u]
+mass2d * [m] [m=1e-10 J=1e-20]
+spring2d * [g m] [kx=4 ky=1e3 krz=1]
+damper2d * [g m] [bx=5e-7]
+"""
+
+
 def test_noise(client: bimorph.Client) -> None:
     """A damped mass moves by 4·k_B·T·c·|χ|² (Callen and Welton 1951); 27 °C where the netlist names no temperature."""
     m, c, k = 1e-10, 5e-7, 4.0
-    text = (
-        "anchor * [g] [l=1u w=1u h=1u]\nmass2d * [m] [m=1e-10 J=1e-20]\n"
-        "spring2d * [g m] [kx=4 ky=1e3 krz=1]\ndamper2d * [g m] [bx=5e-7]\n"
-    )
-    model = client.compile(bimorph.Netlist.text(text, "mass.net"))
+    model = client.compile(bimorph.Netlist.text(MASS, "mass.net"))
     with model.session(ports=["m.x"], signals=["m.vx"]) as session:
         session.operating_point({})
         for omega in (1e3, 2e5):
@@ -137,6 +141,23 @@ def test_noise(client: bimorph.Client) -> None:
             want = 4 * 1.380649e-23 * 300.15 * c / ((k - m * omega**2) ** 2 + (omega * c) ** 2)
             assert noise["m.x"]["m.x"] == pytest.approx(want, rel=1e-9, abs=0)
             assert noise["m.vx"]["m.x"] == pytest.approx(1j * omega * want, rel=1e-9, abs=0)
+
+
+def test_agitation(client: bimorph.Client) -> None:
+    """A seed decides how warm gas shakes a mechanism; without one it stands still."""
+    model = client.compile(bimorph.Netlist.text(MASS, "mass.net"))
+
+    def motion(seed: int | None) -> list[float]:
+        with model.session(signals=["m.x"], seed=seed, noise_band=None if seed is None else 1e6) as session:
+            session.operating_point({})
+            return [session.step({}, dt=4e-7).outputs["m.x"] for _ in range(30)]
+
+    still, one, other = motion(None), motion(1), motion(2)
+    assert max(map(abs, still)) < 1e-18
+    assert motion(1) == one
+    assert one != other
+    with pytest.raises(ValueError, match="seed"):
+        model.session(noise_band=1e6)
 
 
 def test_sweeps(client: bimorph.Client) -> None:

@@ -155,6 +155,7 @@ impl RemoteDevice {
             model: self.model.clone(),
             ports: request.ports.clone(),
             signals: request.signals.clone(),
+            noise: request.noise.map(|noise| proto::Agitation { seed: noise.seed, band_hz: noise.band }),
         }))
     }
 }

@@ -1,7 +1,8 @@
 //! Trials, replies and the errors of a device. Buffers are refilled in place: this runs once per Newton iteration.
 
 use crate::device::{
-    Description, DeviceError, Mode, PortInfo, PortKind, SignalInfo, SmallSignal, Status, Token, Trial, TrialReply,
+    Agitation, Description, DeviceError, Mode, OpenRequest, PortInfo, PortKind, SignalInfo, SmallSignal, Status, Token,
+    Trial, TrialReply,
 };
 use crate::service::proto;
 use proto::fault::Kind as FaultKind;
@@ -125,6 +126,12 @@ pub fn reply_from_wire(wire: proto::TrialReply, reply: &mut TrialReply) -> Resul
     reply.dt_next = wire.dt_next;
     reply.jumped = wire.jumped;
     Ok(())
+}
+
+/// What to open.
+pub fn open_from_wire(wire: &proto::OpenRequest) -> OpenRequest {
+    let noise = wire.noise.map(|noise| Agitation { seed: noise.seed, band: noise.band_hz });
+    OpenRequest { ports: wire.ports.clone(), signals: wire.signals.clone(), noise }
 }
 
 /// A small-signal answer as it travels.

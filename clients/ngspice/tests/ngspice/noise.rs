@@ -68,3 +68,40 @@ fn a_damper_is_a_resistor() {
         assert!(together > 0.15, "{together}");
     }
 }
+
+/// In time the mass has k⟨x²⟩ = k_B·T within three standard deviations of the mean of γT = 2000 correlation times, σ = √(2/γT) =
+/// 3.2 %. Two parts of one model are independent: their correlation is within three of its own, √(1/γT) = 2.2 %. The same seed
+/// gives the same bits, another seed another motion.
+#[test]
+fn a_mass_is_shaken() {
+    let deck = std::fs::read_to_string(crate::support::deck("brownian.cir")).unwrap();
+    let long = deck.replace(".tran 5u 2m 0 0.5u", ".tran 5u 0.2");
+    let motion = |text: &str, ngspice: &std::path::Path| {
+        let run = run_text(text, ngspice).unwrap_or_else(|e| panic!("{}: {e}", ngspice.display()));
+        let plot = run.plot("Transient");
+        ["v(x1)", "v(x2)"].map(|name| real(plot, name).to_vec())
+    };
+    for (version, ngspice) in versions() {
+        let [a, b] = motion(&long, &ngspice);
+        // the first tenth warms up
+        let from = a.len() / 10;
+        let mean = |x: &[f64], y: &[f64]| {
+            x[from..].iter().zip(&y[from..]).map(|(x, y)| x * y).sum::<f64>() / (x.len() - from) as f64
+        };
+        // in pm², with 1 N/m
+        let energy = BOLTZMANN * 300.15 * 1e24;
+        let shares = [mean(&a, &a) / energy, mean(&b, &b) / energy];
+        let together = mean(&a, &b) / energy;
+        println!(
+            "ngspice {version}: k<x2>/kT = {:.3} and {:.3}, correlation {together:.3}, {} points",
+            shares[0],
+            shares[1],
+            a.len()
+        );
+        assert!(shares.iter().all(|share| (share - 1.0).abs() < 3.0 * 0.034), "{shares:?}");
+        assert!(together.abs() < 3.0 * 0.024, "{together}");
+        let same = motion(&deck, &ngspice);
+        assert_eq!(motion(&deck, &ngspice), same);
+        assert_ne!(motion(&deck.replace("seed=3", "seed=4"), &ngspice), same);
+    }
+}

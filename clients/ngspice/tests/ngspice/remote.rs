@@ -103,9 +103,11 @@ fn a_server_gives_the_same_bits() {
         return;
     }
     let server = Serving::start();
-    let here = run(CosimOptions { deck: deck("comb_edges.cir"), ..CosimOptions::default() }).unwrap();
-    let there = run(on(&server.socket(), "comb_edges.cir")).unwrap();
-    assert_eq!(here.plots, there.plots);
+    for name in ["comb_edges.cir", "noise.cir", "brownian.cir"] {
+        let here = run(CosimOptions { deck: deck(name), ..CosimOptions::default() }).unwrap();
+        let there = run(on(&server.socket(), name)).unwrap();
+        assert_eq!(here.plots, there.plots, "{name}");
+    }
 }
 
 /// The bank's deck in each formulation: on a server the waveforms are those of the process to the last bit, and two

@@ -242,7 +242,13 @@ class Model:
         raise Unavailable(f"server {self._channel.address}: the stream ended before the run did")
 
     def session(
-        self, signals: Sequence[str] = (), ports: Sequence[str] = (), timeout: float = 60.0
+        self,
+        signals: Sequence[str] = (),
+        ports: Sequence[str] = (),
+        timeout: float = 60.0,
+        *,
+        seed: int | None = None,
+        noise_band: float | None = None,
     ) -> Session:
         """Opens a device to be stepped; use it in a ``with`` block.
 
@@ -251,10 +257,15 @@ class Model:
         velocity), ``BEAM.T`` (heat), ``frame.ax``, ``.ay`` and ``.wz`` (acceleration and rate of the
         frame). Those left out are held at 0 V, or
         free.
-        ``timeout`` [s] bounds each call.
+        ``timeout`` [s] bounds each call. With a ``seed``, warm gas and dampers shake the mechanism in every step, the same way for the
+        same seed; ``noise_band`` [Hz] is the band of their force, by default twenty times the lowest natural frequency. Steps
+        are then taken in pieces of at most two cells of 1/(2·band).
         """
         self._describe()
-        return Session(self._channel, self.id, tuple(ports), tuple(signals), timeout)
+        if seed is None and noise_band is not None:
+            raise ValueError("noise_band says nothing without a seed")
+        noise = None if seed is None else device_pb2.Agitation(seed=seed, band_hz=noise_band)
+        return Session(self._channel, self.id, tuple(ports), tuple(signals), timeout, noise=noise)
 
     def restore(self, snapshot: Snapshot, timeout: float = 60.0) -> Session:
         """Opens a device that goes on from a :meth:`Session.snapshot` of this model, with the same bits.

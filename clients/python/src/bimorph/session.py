@@ -62,6 +62,7 @@ class Session:
         signals: tuple[str, ...],
         timeout: float,
         session: str = "",
+        noise: device_pb2.Agitation | None = None,
     ) -> None:
         """With ``session`` it joins one that is open on the server, and closes it at its end."""
         self._channel = channel
@@ -87,7 +88,7 @@ class Session:
             first = device_pb2.DeviceRequest(attach=device_pb2.Attach(session=session))
         else:
             first = device_pb2.DeviceRequest(
-                open=device_pb2.OpenRequest(model=model, ports=ports, signals=signals)
+                open=device_pb2.OpenRequest(model=model, ports=ports, signals=signals, noise=noise)
             )
         try:
             opened = self._ask(first).opened

@@ -1,0 +1,111 @@
+//! Thermal agitation in time: what warm gas and dampers push, as a force that a seed decides.
+//!
+//! Time is cut into cells of τ = 1/(2·band). In each the random force of [`crate::multibody::agitation`] is constant, with the
+//! variance 2·k_B·T·C/τ, so that its one-sided spectral density is
+//! ```text
+//! S_F(f) = 4·k_B·T·C·sinc²(f·τ)        sinc x = sin πx/(πx)
+//! ```
+//! flat to 1 % up to an eighth of the band, half of it at 0.89 times the band. Over a step that crosses cells the mean of the
+//! force acts, which is the same push. The numbers of a cell follow from the seed and the cell's place alone: a
+//! step that is taken again, in other pieces, in another process, meets the same force, and trials stay pure.
+
+use super::DeviceError;
+use crate::analysis::modes::modes;
+use crate::compile::Compiled;
+use crate::multibody::agitation::{self, BOLTZMANN};
+use crate::multibody::planar::Pose;
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+use serde::{Deserialize, Serialize};
+
+/// Band of what is not told, in lowest natural frequencies [1].
+const BAND: f64 = 20.0;
+/// Cells that one step may cross: beyond, the mean of the force says too little.
+const MOST_CELLS: f64 = 2.0;
+
+/// The agitation of an opened device.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct Agitation {
+    /// Names the random numbers.
+    pub seed: u64,
+    /// Band of the force [Hz], positive; none: twenty times the lowest natural frequency, about the drawing.
+    pub band: Option<f64>,
+}
+
+/// An agitation of a model.
+#[derive(Debug, Clone)]
+pub(super) struct Shaken {
+    seed: u64,
+    /// Length of a cell [s].
+    pub(super) cell: f64,
+    /// √(2·k_B·T/τ) [√(J/s)].
+    size: f64,
+    /// Force of one cell.
+    force: Vec<Pose>,
+}
+
+/// A normally distributed number of variance 1 (G. E. P. Box, M. E. Muller, Ann. Math. Statist. 29, 1958), to 2⁻⁵³ of a turn.
+fn normal(numbers: &mut ChaCha8Rng) -> f64 {
+    let mut share = || ((numbers.next_u64() >> 11) as f64 + 0.5) * 2f64.powi(-53);
+    let (radius, turn) = ((-2.0 * share().ln()).sqrt(), 2.0 * std::f64::consts::PI * share());
+    radius * turn.cos()
+}
+
+impl Shaken {
+    /// Of a model whose surroundings are at `temperature` [K].
+    ///
+    /// # Errors
+    /// [`DeviceError::BadRequest`] for a band that is none, or that has to be given.
+    pub(super) fn new(asked: &Agitation, compiled: &Compiled, temperature: f64) -> Result<Self, DeviceError> {
+        let refused = |expected: &str, got: String| DeviceError::BadRequest {
+            what: "noise band",
+            expected: expected.into(),
+            got,
+        };
+        let band = match asked.band {
+            Some(band) => band,
+            None => {
+                let lowest = modes(compiled, 1, &[]).map_err(|why| {
+                    refused("one that is given, in hertz", format!("none, and the lowest mode was not found ({why})"))
+                })?;
+                BAND * lowest.frequencies_hz.first().copied().unwrap_or(0.0)
+            }
+        };
+        if !(band.is_finite() && band > 0.0) {
+            return Err(refused("a positive frequency in hertz", band.to_string()));
+        }
+        let cell = 0.5 / band;
+        let size = (2.0 * BOLTZMANN * temperature / cell).sqrt();
+        Ok(Self { seed: asked.seed, cell, size, force: vec![Pose::zeros(); compiled.parts.system.bodies()] })
+    }
+
+    /// The mean force over the `dt` seconds from `start` goes to `out`; or the longest step that may be taken.
+    ///
+    /// # Errors
+    /// That step [s].
+    pub(super) fn mean(&mut self, compiled: &Compiled, start: f64, dt: f64, out: &mut Vec<Pose>) -> Result<(), f64> {
+        // times are sums of steps: what a rounding is over the end of a cell is none of the next
+        let rounding = 1e-9;
+        let (from, to) = (start / self.cell, (start + dt) / self.cell);
+        if to - from > MOST_CELLS * (1.0 + rounding) {
+            return Err(self.cell);
+        }
+        out.clear();
+        out.resize(self.force.len(), Pose::zeros());
+        let (first, last) = ((from + rounding).floor(), (to - rounding).floor());
+        let mut cell = first;
+        while cell <= last.max(first) {
+            let share = ((cell + 1.0).min(to) - cell.max(from)) / (to - from);
+            let share = if first >= last { 1.0 } else { share };
+            let mut numbers = ChaCha8Rng::seed_from_u64(self.seed);
+            numbers.set_stream(cell as u64);
+            let system = &compiled.parts.system;
+            agitation::force(&system.model, || normal(&mut numbers), &mut self.force);
+            for (out, force) in out.iter_mut().zip(&self.force) {
+                *out += force * (share * self.size);
+            }
+            cell += 1.0;
+        }
+        Ok(())
+    }
+}
