@@ -209,7 +209,7 @@ impl Exact {
         more.dedup();
         ports.append(&mut more);
         let signals = request.signals.iter().map(|(name, _)| name.clone()).collect();
-        let opened = device.open(&OpenRequest { ports: ports.clone(), signals })?;
+        let opened = device.open(&OpenRequest { ports: ports.clone(), signals, noise: None })?;
         let scales: Vec<Scale> =
             opened.ports.iter().zip(&named).map(|(port, (_, across))| Scale::new(port.kind, *across)).collect();
         let volts = |name: &String| request.bias.iter().rev().find(|(n, _)| n == name).map_or(0.0, |(_, v)| *v);
