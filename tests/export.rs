@@ -33,7 +33,7 @@ fn deviation(compiled: &Arc<Compiled>, request: &Request, fitted: &Fitted) -> f6
     let mut device = LocalDevice::new(Arc::clone(compiled));
     let ports: Vec<String> = request.ports.iter().map(|(n, _)| n.clone()).collect();
     let signals = request.signals.iter().map(|(n, _)| n.clone()).collect();
-    let opened = device.open(&OpenRequest { ports: ports.clone(), signals }).unwrap();
+    let opened = device.open(&OpenRequest { ports: ports.clone(), signals, noise: None }).unwrap();
     let bias = |name: &String| request.bias.iter().find(|(n, _)| n == name).map_or(0.0, |(_, v)| *v);
     let voltages: Vec<f64> = ports.iter().map(bias).collect();
     let mut reply = TrialReply::default();
