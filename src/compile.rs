@@ -107,7 +107,8 @@ pub fn draw(source: &Source, options: &CompileOptions) -> Result<Drawn, CompileE
         (options.linear, options.junctions) = (true, Junctions::Centreline);
     }
     let loaded = source.load(&options.set).map_err(CompileError::Netlist)?;
-    Ok(Drawn { structure: loaded.structure, parameters: loaded.parameters, warnings: loaded.warnings, options })
+    let structure = if options.without_circuit { loaded.structure.without_circuit() } else { loaded.structure };
+    Ok(Drawn { structure, parameters: loaded.parameters, warnings: loaded.warnings, options })
 }
 
 impl Drawn {

@@ -8,6 +8,7 @@
 //! reason in a file, and ngspice's own "simulation(s) aborted" is heard. A raw file appears under its name only when
 //! the run was good.
 
+pub mod around;
 pub mod check;
 pub mod compare;
 pub mod finer;

@@ -1,5 +1,6 @@
 //! `bimorph cosim`: a circuit with mechanisms in it.
 
+use super::cosim_netlist::{NetlistArgs, is_netlist};
 use super::failure::Failure;
 use super::output::{check_folder, write};
 use super::plot::{chart_of, longest};
@@ -19,12 +20,14 @@ use std::time::Instant;
 #[command(after_help = "Examples:\n  bimorph cosim bank.cir --out bank.raw\n  \
     bimorph cosim bank.cir --out bank.png              every voltage and current of the deck's analysis\n  \
     bimorph cosim bank.cir --check                     how far off may the steps and tolerances be?\n  \
+    bimorph cosim part.net --tran '1u 1m' --drive 'V1=PULSE(0 4 1u 1u)' --out part.png\n  \
+    bimorph cosim part.net --ac 'dec 20 1k 1meg' --emit part.cir\n  \
     bimorph cosim bank.cir --remote unix:///tmp/bimorph.sock --out bank.raw\n\n\
     A device in a deck:\n  \
     .model bank bimorph(file=\"bank.net\" ports=[\"heat\" \"sense\"] monitors=[\"yoke.y:1e6\"])\n  \
     A1 %gd [heat 0 sense 0] %v [y] bank")]
 pub(crate) struct Cosim {
-    /// ngspice deck
+    /// ngspice deck; or a netlist (.net), which becomes a deck around its device with the circuit that it draws
     deck: PathBuf,
 
     /// Step every model of the deck on a server: unix:///path or http://host:port [default: as the deck says]
@@ -54,6 +57,9 @@ pub(crate) struct Cosim {
     /// The plug-in [default: beside this program]
     #[arg(long, value_name = "PATH", env = "BIMORPH_CM")]
     plugin: Option<PathBuf>,
+
+    #[command(flatten)]
+    netlist: NetlistArgs,
 }
 
 impl Cosim {
@@ -63,6 +69,16 @@ impl Cosim {
             check_folder(out)?;
         }
         interrupt::listen();
+        let text = if is_netlist(&self.deck) {
+            match self.netlist.deck(&self.deck)? {
+                Some(text) => Some(text),
+                None => return Ok(()),
+            }
+        } else if let Some(option) = self.netlist.given() {
+            return Err(Failure::bad(option, "a netlist (.net), and no deck", self.deck.display().to_string()));
+        } else {
+            None
+        };
         let raw = match (&self.out, format) {
             (Some(out), Some(Format::Raw)) => Some(out.clone()),
             (Some(out), Some(_)) => Some(out.with_extension(format!("{}.raw", std::process::id()))),
@@ -75,6 +91,7 @@ impl Cosim {
             ngspice: self.ngspice.clone(),
             plugin: self.plugin.clone(),
             capture: self.quiet,
+            text,
             ..CosimOptions::default()
         };
         let busy = (self.quiet || self.check).then(|| progress::spinner("ngspice"));

@@ -4,6 +4,7 @@ use bimorph::analysis::AnalysisError;
 use bimorph::analysis::chart::ChartError;
 use bimorph::compile::CompileError;
 use bimorph::cosim::CosimError;
+use bimorph::cosim::around::AroundError;
 use bimorph::export::ExportError;
 use bimorph::jobs::sweep::SweepError;
 use bimorph::options::Refused;
@@ -63,6 +64,8 @@ pub(crate) enum Failure {
     Client(#[from] ClientError),
     #[error(transparent)]
     Cosim(#[from] CosimError),
+    #[error(transparent)]
+    Around(#[from] AroundError),
     #[error(transparent)]
     Serve(#[from] ServeError),
     #[error(transparent)]

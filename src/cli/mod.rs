@@ -7,6 +7,7 @@ mod chart;
 mod check;
 mod cosim;
 mod cosim_check;
+mod cosim_netlist;
 mod doctor;
 mod draw_motion;
 mod export;

@@ -20,6 +20,21 @@ impl Chosen {
         Ok(options)
     }
 
+    /// The options that were given, and each as a word of a deck's `.model` line.
+    pub(crate) fn written(&self) -> impl Iterator<Item = (&'static str, String)> {
+        self.0.iter().map(|(k, value)| {
+            let name = MODEL[*k].about.name;
+            let value = match value {
+                Value::Flag(flag) => flag.to_string(),
+                Value::Count(count) => count.to_string(),
+                Value::Number(x) => format!("{x:e}"),
+                Value::Name(name) => format!("\"{name}\""),
+                Value::Unset => "0".to_owned(),
+            };
+            (FLAGS[*k].as_str(), format!("{name}={value}"))
+        })
+    }
+
     /// Whether an option was given.
     pub(crate) fn given(&self, name: &str) -> bool {
         self.0.iter().any(|(k, _)| MODEL[*k].about.name == name)

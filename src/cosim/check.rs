@@ -1,7 +1,7 @@
 //! A run repeated with half the steps and a tenth of the tolerances: how far off it may be.
 
 use super::compare::{self, Plot, Printed};
-use super::finer::{TOLERANCE_SHARE, finer, keeping_plots};
+use super::finer::{TIGHTER, finer, keeping_plots};
 use super::{CosimError, CosimOptions, CosimReport, Scratch, io, run_whatever};
 use crate::results::raw;
 use crate::results::table::Table;
@@ -48,7 +48,7 @@ pub fn check(options: &CosimOptions, keep_going: &dyn Fn() -> bool) -> Result<Ch
         plots.retain(|plot| plot.plot_name != "constants");
         Ok((report, plots, raw))
     };
-    let (fine, fine_plots, _) = one(&changed.text, "finer", TOLERANCE_SHARE)?;
+    let (fine, fine_plots, _) = one(&changed.text, "finer", 1.0 / TIGHTER)?;
     let (mut report, plots, raw) = one(&text, "as-it-is", 1.0)?;
     report.raw = None;
     if let Some(out) = &options.raw {

@@ -7,8 +7,8 @@
 
 use std::path::Path;
 
-/// By how much `reltol` and each model's tolerance become smaller [1].
-pub const TOLERANCE_SHARE: f64 = 0.1;
+/// How many times smaller `reltol` and each model's tolerance become [1].
+pub const TIGHTER: f64 = 10.0;
 /// By how much the longest step becomes shorter [1].
 const STEP_SHARE: f64 = 0.5;
 /// ngspice's `reltol` where a deck says nothing [1].
@@ -65,7 +65,7 @@ pub fn finer(deck: &str, folder: &Path) -> Rewritten {
         lines.push(changed.unwrap_or(line));
     }
     if !tightened && !lines.is_empty() {
-        lines.insert(1, format!(".options reltol={:e}", TOLERANCE_SHARE * DEFAULT_RELTOL));
+        lines.insert(1, format!(".options reltol={}", written(DEFAULT_RELTOL / TIGHTER)));
     }
     Rewritten { text: lines.join("\n") + "\n", notes }
 }
@@ -185,11 +185,17 @@ pub(super) fn number(word: &str) -> Option<f64> {
     Some(value * factor)
 }
 
+/// A number for a deck: twelve digits, so that 20n/2 is 1e-8.
+fn written(value: f64) -> String {
+    let rounded: f64 = format!("{value:.11e}").parse().unwrap_or(value);
+    format!("{rounded:e}")
+}
+
 /// What stands in braces or quotes, or is a number: something that can be part of an expression.
 fn expression(word: &str) -> Option<String> {
     let inner = |open: char, close: char| word.strip_prefix(open).and_then(|w| w.strip_suffix(close));
     if let Some(value) = number(word) {
-        return Some(format!("{value:e}"));
+        return Some(written(value));
     }
     inner('{', '}').or_else(|| inner('\'', '\'')).map(|w| format!("({w})"))
 }
@@ -203,10 +209,10 @@ fn halved(line: &str, control: bool) -> Option<String> {
     let start = times.get(2).map_or("0", String::as_str);
     let numbers: Option<Vec<f64>> = times.iter().map(|w| number(w)).collect();
     let longest = match (numbers, times.get(3)) {
-        (Some(numbers), Some(_)) => format!("{:e}", STEP_SHARE * numbers[3]),
+        (Some(numbers), Some(_)) => written(STEP_SHARE * numbers[3]),
         (Some(numbers), None) => {
             let span = numbers[1] - numbers.get(2).copied().unwrap_or(0.0);
-            format!("{:e}", STEP_SHARE * numbers[0].min(span / LEAST_STEPS))
+            written(STEP_SHARE * numbers[0].min(span / LEAST_STEPS))
         }
         (None, _) if control => return None,
         (None, Some(longest)) => format!("{{{STEP_SHARE}*{}}}", expression(longest)?),
@@ -226,8 +232,8 @@ fn tightened_line(line: &str) -> Option<String> {
     let value = rest.trim_start().strip_prefix('=')?.trim_start();
     let word = words(value).into_iter().next()?;
     let smaller = match number(&word) {
-        Some(value) => format!("{:e}", TOLERANCE_SHARE * value),
-        None => format!("{{{TOLERANCE_SHARE}*{}}}", expression(&word)?),
+        Some(value) => written(value / TIGHTER),
+        None => format!("{{{}/{TIGHTER}}}", expression(&word)?),
     };
     Some(format!("{head}={smaller}{}", &value[word.len()..]))
 }
@@ -253,7 +259,7 @@ mod tests {
     fn reltol_is_a_tenth() {
         let of = |text: &str| finer(text, Path::new(".")).text;
         assert_eq!(of("t\n.options gmin=1e-12 RELTOL = 1e-5 x=1\n"), "t\n.options gmin=1e-12 RELTOL=1e-6 x=1\n");
-        assert_eq!(of("t\n.options a\n+ reltol={r}\n"), "t\n.options a  reltol={0.1*(r)}\n");
+        assert_eq!(of("t\n.options a\n+ reltol={r}\n"), "t\n.options a  reltol={(r)/10}\n");
         assert_eq!(of("t\nR1 a 0 1\n"), "t\n.options reltol=1e-4\nR1 a 0 1\n");
     }
 

@@ -106,7 +106,12 @@ fn facts(drawing: &Drawing, sink: &mut Sink) {
             Fact::Capacitor => (
                 "W021",
                 format!("capacitors are open here and left out ({elements})"),
-                "put them into the circuit that drives the ports",
+                "`bimorph cosim` runs the netlist's circuit as it is",
+            ),
+            Fact::ActiveCircuit => (
+                "W022",
+                format!("current sources, op-amps and controlled sources are left out here ({elements})"),
+                "`bimorph cosim` runs the netlist's circuit as it is",
             ),
         };
         sink.warning(code, noted.span, message, help);

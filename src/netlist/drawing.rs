@@ -56,6 +56,8 @@ pub(crate) enum Fact {
     OddRise,
     /// Capacitors, which are open in statics and are left out.
     Capacitor,
+    /// Current sources and amplifiers, which take no part in the model.
+    ActiveCircuit,
 }
 
 /// A fact with where it was first met, how often, and its number there (a temperature, a conductivity).

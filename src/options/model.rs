@@ -99,6 +99,10 @@ options! {
     /// whatever stress, heat and voltages are.
     as_sugar: bool = false, "as_sugar" = 13, [""], Range::Flag, "";
 
+    /// The mechanism without the circuit that is drawn around it (R, C, L, sources, amplifiers): its electrical nodes are ports by
+    /// their names, for a deck that has the circuit.
+    without_circuit: bool = false, "without_circuit" = 14, [""], Range::Flag, "";
+
     /// How bodies become equations. compliant: every body's own coordinates; rcr: joint coordinates on a tree, loops closed
     /// inside the recursion; rcr-elastic: the same, and beams' joints stay elastic with every method; auto: what suits.
     formulation: Formulation = Formulation::Compliant, "formulation" = 11, [""], Range::Names(&Formulation::NAMES), "";

@@ -6,8 +6,10 @@
 //! A node may be mechanical (it has a position), electrical (it has a potential), or both: as in SUGAR, one netlist name
 //! stands for the mechanical point and for the electrical net at that point.
 
+mod circuit;
 mod index;
 
+pub use circuit::{CircuitElement, CircuitKind};
 pub use index::NodeIndex;
 
 use serde::{Deserialize, Serialize};
@@ -346,6 +348,9 @@ pub struct Structure {
     pub voltage_sources: Vec<VoltageSource>,
     /// Nodes at electrical ground (SUGAR's `eground`).
     pub electrical_grounds: Vec<NodeId>,
+    /// The circuit drawn around the mechanism; its resistors and voltage sources are also among those above.
+    #[serde(default)]
+    pub circuit: Vec<CircuitElement>,
     /// Heated beams that can yield.
     #[serde(default)]
     pub yields: Vec<Yield>,

@@ -74,7 +74,11 @@ pub fn open_model(card: &mut ModelCard, directory: Option<&Path>) -> Result<Box<
     // Also where a server compiles the model: a netlist with errors is refused here, with file and line.
     let loaded = netlist::load(&bundle, &card.options.set)
         .map_err(|e| OpenError::Compile { file: card.file.clone(), source: CompileError::Netlist(e) })?;
-    names::respell(card, &loaded.structure);
+    let structure = match card.options.without_circuit {
+        true => loaded.structure.without_circuit(),
+        false => loaded.structure,
+    };
+    names::respell(card, &structure);
     match &card.remote {
         None => Ok(Box::new(LocalDevice::new(compiled(&card.file, bundle, &card.options)?))),
         Some(address) => connect(address, &bundle, card),

@@ -149,7 +149,8 @@ impl Site<'_, '_> {
         Ok(x)
     }
 
-    fn out_of_range(&mut self, name: &str, x: f64, wanted: &str) -> Reported {
+    /// The error for a number that cannot be.
+    pub(super) fn out_of_range(&mut self, name: &str, x: f64, wanted: &str) -> Reported {
         let span = self.span_of(name);
         let message = format!("`{name}` ({}) must be {wanted}, this is {}", meaning(name), short(x));
         self.sink.error("E060", span, message, "")

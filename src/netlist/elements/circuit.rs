@@ -1,10 +1,13 @@
-//! Circuit elements: resistors, voltage sources, electrical ground, ports.
+//! Circuit elements: resistors, capacitors, inductors, sources, amplifiers, electrical ground, ports.
+//!
+//! The model itself knows resistors and fixed voltages. The others are kept as drawn, for a deck around the device, and whoever reads
+//! the netlist for another purpose is told that they are left out.
 
 use super::super::drawing::Fact;
 use super::super::sink::Reported;
 use super::super::value::Value;
 use super::arguments::Site;
-use crate::structure::{Port, Resistor, VoltageSource};
+use crate::structure::{CircuitElement, CircuitKind, Port, Resistor, VoltageSource};
 
 pub(super) fn resistor(site: &mut Site<'_, '_>) -> Result<(), Reported> {
     let resistance = match (site.positive_if_any("R")?, site.positive_if_any("G")?) {
@@ -15,6 +18,7 @@ pub(super) fn resistor(site: &mut Site<'_, '_>) -> Result<(), Reported> {
     let (a, b) = (site.node(0), site.node(1));
     site.drawing.electrical(&[a, b]);
     site.drawing.structure.resistors.push(Resistor { name: site.name(), a, b, resistance });
+    draw(site, CircuitKind::Resistor, Some(resistance));
     Ok(())
 }
 
@@ -26,13 +30,50 @@ pub(super) fn voltage_source(site: &mut Site<'_, '_>) -> Result<(), Reported> {
         return Err(site.sink.error("E062", v.span, "a source of a netlist cannot change in time".into(), help));
     }
     let voltage = site.required("V")?;
+    draw(site, CircuitKind::VoltageSource, Some(voltage));
     source(site, voltage)
+}
+
+/// Keeps an element as drawn.
+fn draw(site: &mut Site<'_, '_>, kind: CircuitKind, value: Option<f64>) {
+    let nodes = site.instance.nodes.to_vec();
+    site.drawing.electrical(&nodes);
+    site.drawing.structure.circuit.push(CircuitElement { name: site.name(), kind, nodes, value });
+}
+
+/// A current source, from the first node through it to the second. It takes no part in the model.
+pub(super) fn current_source(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+    let current = site.required("I")?;
+    site.drawing.note(Fact::ActiveCircuit, site.instance.span);
+    draw(site, CircuitKind::CurrentSource, Some(current));
+    Ok(())
+}
+
+/// An ideal operational amplifier. It takes no part in the model.
+pub(super) fn op_amp(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+    site.drawing.note(Fact::ActiveCircuit, site.instance.span);
+    draw(site, CircuitKind::OpAmp, None);
+    Ok(())
+}
+
+/// A voltage source controlled by a voltage. It takes no part in the model.
+pub(super) fn amplifier(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+    let gain = site.required("A")?;
+    site.drawing.note(Fact::ActiveCircuit, site.instance.span);
+    draw(site, CircuitKind::Amplifier, Some(gain));
+    Ok(())
 }
 
 /// An inductor is a short circuit for the slow device: a source of 0 V.
 pub(super) fn inductor(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+    let inductance = site.number("L")?;
+    if let Some(value) = inductance.filter(|l| *l <= 0.0) {
+        return Err(site.out_of_range("L", value, "positive"));
+    }
     let message = "an inductor is taken as a short circuit".to_owned();
-    site.sink.warning("W021", site.instance.span, message, "put it into the circuit that drives the ports");
+    let help = "`bimorph cosim` runs the netlist's circuit as it is";
+    site.sink.warning("W021", site.instance.span, message, help);
+    draw(site, CircuitKind::Inductor, inductance);
     source(site, 0.0)
 }
 
@@ -45,8 +86,9 @@ fn source(site: &mut Site<'_, '_>, voltage: f64) -> Result<(), Reported> {
 
 /// A capacitor is open in statics and takes no part in the device.
 pub(super) fn capacitor(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+    let capacitance = site.positive_if_any("C")?;
     site.drawing.note(Fact::Capacitor, site.instance.span);
-    site.drawing.electrical(&[site.node(0), site.node(1)]);
+    draw(site, CircuitKind::Capacitor, capacitance);
     Ok(())
 }
 

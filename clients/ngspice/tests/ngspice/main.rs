@@ -2,6 +2,7 @@
 
 mod analyses;
 mod analytic;
+mod around;
 mod charge;
 mod check;
 mod export;

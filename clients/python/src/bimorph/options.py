@@ -48,6 +48,10 @@ class Options(TypedDict, total=False):
     """As SUGAR 2 computes, in one switch: linear, beams that meet in points (junctions=centreline), modes about
     the drawing whatever stress, heat and voltages are."""
 
+    without_circuit: bool | None
+    """The mechanism without the circuit that is drawn around it (R, C, L, sources, amplifiers): its electrical
+    nodes are ports by their names, for a deck that has the circuit."""
+
     formulation: Literal["auto", "compliant", "rcr", "rcr-elastic"] | None
     """How bodies become equations. compliant: every body's own coordinates; rcr: joint coordinates on a tree,
     loops closed inside the recursion; rcr-elastic: the same, and beams' joints stay elastic with every method;
@@ -66,6 +70,7 @@ WIRE = {
     "rotary_inertia": "rotary_inertia",
     "imperfection": "imperfection",
     "as_sugar": "as_sugar",
+    "without_circuit": "without_circuit",
     "formulation": "formulation",
 }
 """Field on the wire of each option."""

@@ -1,0 +1,77 @@
+//! The circuit that is drawn in a netlist around the mechanism: SUGAR's circuit elements, and the structure without them.
+
+use super::{GapVoltage, NodeId, Port, Structure};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
+
+/// What a circuit element does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum CircuitKind {
+    /// Resistance [Ω] between two nodes.
+    Resistor,
+    /// Capacitance [F] between two nodes.
+    Capacitor,
+    /// Inductance [H] between two nodes.
+    Inductor,
+    /// Voltage [V] of the first node over the second.
+    VoltageSource,
+    /// Current [A] that flows from the first node through the source to the second.
+    CurrentSource,
+    /// Four nodes: keeps the first two at one potential by what it drives between the third and the fourth. No value.
+    OpAmp,
+    /// Four nodes: the voltage of the third over the fourth is the value [1] times that of the first over the second.
+    Amplifier,
+}
+
+/// A circuit element as drawn.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CircuitElement {
+    /// Full element name.
+    pub name: String,
+    /// What it does.
+    pub kind: CircuitKind,
+    /// Its nodes.
+    pub nodes: Vec<NodeId>,
+    /// Its value, in the unit of its kind; none where the netlist gives none.
+    pub value: Option<f64>,
+}
+
+impl Structure {
+    /// Nodes whose potential acts on the mechanism: of beams that carry current, of resistors along beams, and of gaps.
+    fn electromechanical(&self) -> BTreeSet<NodeId> {
+        let beams = self.beams.iter().filter(|b| b.heater.is_some()).flat_map(|b| [b.a, b.b]);
+        let along = self.resistors.iter().filter(|r| !self.is_circuit(r)).flat_map(|r| [r.a, r.b]);
+        let gaps = (self.combs.iter().map(|c| &c.voltage))
+            .chain(self.plate_gaps.iter().map(|g| &g.voltage))
+            .chain(self.beam_gaps.iter().map(|g| &g.voltage));
+        let between =
+            gaps.filter_map(|v| if let GapVoltage::Nodes(a, b) = v { Some([*a, *b]) } else { None }).flatten();
+        beams.chain(along).chain(between).collect()
+    }
+
+    /// Whether a resistor is an element of the circuit, and not the resistance of a beam.
+    fn is_circuit(&self, resistor: &super::Resistor) -> bool {
+        self.circuit
+            .iter()
+            .any(|e| e.kind == CircuitKind::Resistor && e.name == resistor.name && e.nodes == [resistor.a, resistor.b])
+    }
+
+    /// The mechanism alone: without the circuit, and in the place of its ports one for each node that the circuit or a port touches and
+    /// whose potential acts on the mechanism, against ground, by the node's name and in the order of the nodes.
+    pub fn without_circuit(mut self) -> Self {
+        let own = self.electromechanical();
+        let touched: BTreeSet<NodeId> = (self.circuit.iter().flat_map(|e| e.nodes.iter().copied()))
+            .chain(self.ports.iter().flat_map(|p| [Some(p.plus), p.minus].into_iter().flatten()))
+            .collect();
+        let ports = touched.intersection(&own).filter(|node| !self.electrical_grounds.contains(node));
+        let ports =
+            ports.map(|node| Port { name: self.nodes[node.0].name.clone(), plus: *node, minus: None }).collect();
+        let outside: Vec<bool> = self.resistors.iter().map(|r| self.is_circuit(r)).collect();
+        let mut outside = outside.into_iter();
+        self.resistors.retain(|_| !outside.next().unwrap_or(false));
+        self.voltage_sources.clear();
+        self.circuit.clear();
+        self.ports = ports;
+        self
+    }
+}
