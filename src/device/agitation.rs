@@ -20,6 +20,8 @@ use serde::{Deserialize, Serialize};
 
 /// Band of what is not told, in lowest natural frequencies [1].
 const BAND: f64 = 20.0;
+/// Highest band [Hz]: beyond what any mechanism feels.
+const HIGHEST: f64 = 1e12;
 /// Cells that one step may cross: beyond, the mean of the force says too little.
 const MOST_CELLS: f64 = 2.0;
 
@@ -28,7 +30,7 @@ const MOST_CELLS: f64 = 2.0;
 pub struct Agitation {
     /// Names the random numbers.
     pub seed: u64,
-    /// Band of the force [Hz], positive; none: twenty times the lowest natural frequency, about the drawing.
+    /// Band of the force [Hz], above 0, at most 1e12; none: twenty times the lowest natural frequency, about the drawing.
     pub band: Option<f64>,
 }
 
@@ -71,8 +73,8 @@ impl Shaken {
                 BAND * lowest.frequencies_hz.first().copied().unwrap_or(0.0)
             }
         };
-        if !(band.is_finite() && band > 0.0) {
-            return Err(refused("a positive frequency in hertz", band.to_string()));
+        if !(band > 0.0 && band <= HIGHEST) {
+            return Err(refused("a frequency above 0 and at most 1e12 Hz", format!("{band:e}")));
         }
         let cell = 0.5 / band;
         let size = (2.0 * BOLTZMANN * temperature / cell).sqrt();
