@@ -1,7 +1,7 @@
 //! A run repeated with half the steps and a tenth of the tolerances: how far off it may be.
 
 use super::compare::{self, Plot, Printed};
-use super::finer::{TIGHTER, finer, keeping_plots};
+use super::finer::{TIGHTER, finer, keeping_plots, measuring};
 use super::{CosimError, CosimOptions, CosimReport, Scratch, io, run_whatever};
 use crate::results::raw;
 use crate::results::table::Table;
@@ -35,10 +35,11 @@ pub fn check(options: &CosimOptions, keep_going: &dyn Fn() -> bool) -> Result<Ch
     let one = |text: &str, name: &str, share: f64| {
         let kept = scratch.0.join(format!("{name}-kept.raw"));
         let raw = scratch.0.join(format!("{name}.raw"));
+        let measuring = if options.raw.is_none() { measuring(text, &kept) } else { None };
         let run_options = CosimOptions {
-            text: Some(keeping_plots(text, &kept)),
+            raw: measuring.is_none().then(|| raw.clone()),
+            text: Some(measuring.unwrap_or_else(|| keeping_plots(text, &kept))),
             tolerance_share: Some(share),
-            raw: Some(raw.clone()),
             capture: true,
             ..options.clone()
         };

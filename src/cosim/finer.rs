@@ -73,10 +73,7 @@ pub fn finer(deck: &str, folder: &Path) -> Rewritten {
 /// The deck with every plot of its `.control` sections appended to `raw` at their end, and before each `quit`. A deck without such a
 /// section stays as it is.
 pub fn keeping_plots(deck: &str, raw: &Path) -> String {
-    let keep = format!(
-        "set appendwrite\nforeach bimorph_plot $plots\nsetplot $bimorph_plot\nwrite {}\nend\nunset appendwrite",
-        raw.display()
-    );
+    let keep = keep(raw);
     let is = |line: &str, words: &[&str]| {
         let word = line.split_whitespace().next().unwrap_or("");
         words.iter().any(|w| word.eq_ignore_ascii_case(w))
@@ -106,6 +103,31 @@ fn included(line: &str, folder: &Path) -> Option<String> {
 fn decides(text: &str) -> bool {
     let text = text.to_ascii_lowercase();
     text.contains("reltol") || text.lines().any(|l| l.starts_with(".tran"))
+}
+
+/// Commands that append every plot there is to a file.
+fn keep(raw: &Path) -> String {
+    format!(
+        "set appendwrite\nforeach bimorph_plot $plots\nsetplot $bimorph_plot\nwrite {}\nend\nunset appendwrite",
+        raw.display()
+    )
+}
+
+/// The deck with a `.control` section that runs it and keeps its plots, where it has `.measure` lines and no such section: ngspice
+/// measures nothing while it writes a raw file by itself.
+pub fn measuring(deck: &str, raw: &Path) -> Option<String> {
+    let begins = |words: &[&str]| {
+        let of =
+            |line: &&str| words.iter().any(|w| line.get(..w.len()).is_some_and(|head| head.eq_ignore_ascii_case(w)));
+        deck.lines().any(|line| of(&line))
+    };
+    if !begins(&[".meas"]) || begins(&[".control"]) {
+        return None;
+    }
+    let lines: Vec<&str> = deck.lines().collect();
+    let end = lines.iter().rposition(|line| line.trim().eq_ignore_ascii_case(".end")).unwrap_or(lines.len());
+    let section = format!(".control\nrun\n{}\nquit\n.endc\n.end\n", keep(raw));
+    Some(lines[..end].join("\n") + "\n" + &section)
 }
 
 /// Lines with their continuations (`+`) put behind them.
@@ -281,6 +303,16 @@ mod tests {
         let text = keeping_plots("t\n.control\nop\nquit\n.endc\n.end\n", Path::new("/x/k.raw"));
         assert_eq!(text.matches("write /x/k.raw").count(), 2, "{text}");
         assert_eq!(keeping_plots("t\nquit\n.op\n.end\n", Path::new("k")), "t\nquit\n.op\n.end\n");
+    }
+
+    /// A deck that measures gets a section of its own before its end, unless it has one.
+    #[test]
+    fn decks_that_measure_are_run_by_a_section() {
+        let raw = Path::new("k.raw");
+        let text = measuring("t\n.tran 1 2\n.MEAS tran a max v(x)\n.end\n", raw).unwrap();
+        assert!(text.contains("max v(x)\n.control\nrun\n") && text.ends_with("quit\n.endc\n.end\n"), "{text}");
+        assert_eq!(measuring("t\n.meas tran a max v(x)\n.control\nrun\n.endc\n", raw), None);
+        assert_eq!(measuring("t\n.tran 1 2\n.end\n", raw), None);
     }
 
     /// Numbers are read as SPICE reads them.

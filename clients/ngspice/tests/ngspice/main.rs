@@ -7,6 +7,7 @@ mod charge;
 mod check;
 mod export;
 mod look;
+mod measure;
 mod models;
 mod noise;
 mod ports;
