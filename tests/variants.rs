@@ -308,3 +308,24 @@ fn sweeps_of_transients_are_runs_alone() {
     let broken = swept(&text, &["w=-1u,2u", "F=1u,2u"], transients, &options, Shard::default());
     assert_eq!(broken.failed(), 2, "{}", broken.to_csv());
 }
+
+/// What a linear model leaves out and gaps in too few pieces are told for each row, as `static` and `pullin` tell them: on the
+/// shared mesh, on one of the row's own, and on given segments. A cantilever pressed with up to half of Euler's load; one
+/// pulled in one piece.
+#[test]
+fn rows_tell_what_the_commands_tell() {
+    let pressed = "param F=1u\nprocess p = [Youngsmodulus=165e9 density=2300 h=2u]\nanchor p [a] []\n\
+                   beam2d p [a b] [l=200u w=2u]\nf2d * [b] [F=F oz=pi]\nf2d * [b] [F=1n oz=pi/2]\n";
+    let outputs = vec!["b.y".to_owned()];
+    let statics = SweepAnalysis::Static { outputs, voltages: Vec::new() };
+    for segments in [None, Some(3)] {
+        let options = CompileOptions { linear: true, segments, ..CompileOptions::default() };
+        let table = swept(pressed, &["F=0:6.7u:3"], statics.clone(), &options, Shard::default());
+        let told: Vec<bool> = table.rows.iter().map(|row| row.warning.contains("W041: the linear model")).collect();
+        assert_eq!(told, [false, true, true], "{:?}", table.rows);
+    }
+    let pulled = include_str!("netlists/accuracy/cantilever_gap.net").replacen("n = 8 ", "param n=8 ", 1);
+    let closing = SweepAnalysis::PullIn { port: None, max: 200.0 };
+    let table = swept(&pulled, &["n=1,2"], closing, &CompileOptions::default(), Shard::default());
+    assert!(table.rows.iter().all(|row| row.warning.contains("W042: ")), "{:?}", table.rows);
+}

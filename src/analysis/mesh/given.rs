@@ -7,10 +7,15 @@
 
 use super::super::modes::{ModesResult, modes};
 use super::super::pull_in::{PullInResult, pull_in};
-use super::super::statics::{StaticResult, result_at, static_equilibrium};
+use super::super::statics::{StaticResult, operating_point, result_at};
 use super::super::{AnalysisError, PortVoltages};
-use super::{Request, equilibrium, frequency_outputs, loaded, meshed, pull_in_outputs, worst};
+use super::warnings::of_pieces;
+use super::{
+    Request, equilibrium, fitted, frequency_outputs, loaded, meshed, points_of_pull_in, pull_in_outputs,
+    told_of_static, worst,
+};
 use crate::compile::Compiled;
+use crate::netlist::Diagnostic;
 use crate::refine::counted;
 use crate::refine::doubling::{self, Output};
 
@@ -32,6 +37,8 @@ pub(crate) struct Judged {
     pub(crate) answer: Answer,
     /// Largest estimated relative error by the mesh [1]; none without an estimate.
     pub(crate) estimated_error: Option<f64>,
+    /// What else is to be warned of, each with its code.
+    pub(crate) warnings: Vec<String>,
     /// A search for this variant's own mesh would have stopped here.
     pub(crate) holds: bool,
 }
@@ -48,16 +55,30 @@ pub(crate) fn judged(compiled: &Compiled, request: &Request<'_>) -> Result<Judge
     }
 }
 
-/// The result of a request on the mesh of `compiled`, whose estimate is known.
+/// The result of a request on a mesh of its own.
 ///
 /// # Errors
 /// What the analysis has against the model.
-pub(crate) fn answered(compiled: &Compiled, request: &Request<'_>) -> Result<Answer, AnalysisError> {
-    Ok(match *request {
-        Request::Static { voltages } => Answer::Static(static_equilibrium(compiled, voltages)?),
-        Request::Modes { count, voltages } => Answer::Modes(modes(compiled, count, voltages)?),
-        Request::PullIn { port, max } => Answer::PullIn(pull_in(compiled, port, max)?),
-    })
+pub(crate) fn searched(compiled: &Compiled, request: &Request<'_>) -> Result<Judged, AnalysisError> {
+    let own = fitted(compiled, request)?;
+    let (answer, told) = match *request {
+        Request::Static { voltages } => {
+            let (point, told) = told_of_static(&own, operating_point(&own, voltages)?);
+            (Answer::Static(result_at(&own, &point)), told)
+        }
+        Request::Modes { count, voltages } => (Answer::Modes(modes(&own, count, voltages)?), Vec::new()),
+        Request::PullIn { port, max } => {
+            let found = pull_in(&own, port, max)?;
+            let told = of_pieces(&own, &points_of_pull_in(&own, &found));
+            (Answer::PullIn(found), told.into_iter().collect())
+        }
+    };
+    Ok(Judged { answer, estimated_error: own.order.estimated_error, warnings: coded(told), holds: true })
+}
+
+/// Warnings as a table has them.
+fn coded(told: impl IntoIterator<Item = Diagnostic>) -> Vec<String> {
+    told.into_iter().map(|d| format!("{}: {}", d.code, d.message)).collect()
 }
 
 /// Within the share of the tolerance that a comparison with twice the segments may use.
@@ -67,8 +88,9 @@ fn within(compiled: &Compiled, error: Option<f64>) -> bool {
 
 fn still(compiled: &Compiled, voltages: &PortVoltages) -> Result<Judged, AnalysisError> {
     let (point, estimated_error) = equilibrium::judged(compiled, voltages)?;
+    let (point, told) = told_of_static(compiled, point);
     let answer = Answer::Static(result_at(compiled, &point));
-    Ok(Judged { answer, estimated_error, holds: within(compiled, estimated_error) })
+    Ok(Judged { answer, estimated_error, warnings: coded(told), holds: within(compiled, estimated_error) })
 }
 
 fn swinging(compiled: &Compiled, count: usize, voltages: &PortVoltages) -> Result<Judged, AnalysisError> {
@@ -85,7 +107,7 @@ fn swinging(compiled: &Compiled, count: usize, voltages: &PortVoltages) -> Resul
     let moved = if loaded { equilibrium::judged(compiled, voltages)?.1 } else { Some(0.0) };
     let estimated_error = moved.zip(own).map(|(a, b)| a.max(b));
     let holds = all && sure && within(compiled, moved);
-    Ok(Judged { answer: Answer::Modes(found), estimated_error, holds })
+    Ok(Judged { answer: Answer::Modes(found), estimated_error, warnings: Vec::new(), holds })
 }
 
 /// Frequencies compared with those of twice the segments.
@@ -116,5 +138,11 @@ fn closing(compiled: &Compiled, port: Option<&str>, max: f64) -> Result<Judged, 
         Ok::<_, AnalysisError>(pull_in_outputs(&pull_in(&*meshed(compiled, segments)?, port, max)?))
     })?;
     let estimated_error = order.estimated_error;
-    Ok(Judged { answer: Answer::PullIn(found), estimated_error, holds: within(compiled, estimated_error) })
+    let told = coded(of_pieces(compiled, &points_of_pull_in(compiled, &found)));
+    Ok(Judged {
+        answer: Answer::PullIn(found),
+        estimated_error,
+        warnings: told,
+        holds: within(compiled, estimated_error),
+    })
 }

@@ -25,11 +25,12 @@ use super::{AnalysisError, BeamMotions, PortVoltages};
 use crate::compile::Compiled;
 use crate::discretize::DiscretizeError;
 use crate::multibody::planar::Pose;
+use crate::netlist::Diagnostic;
 use crate::refine::counted;
 use crate::refine::doubling::{self, Output};
 use crate::refine::model_order::ModelOrder;
 use std::borrow::Cow;
-use warnings::{warn_of_pieces, warn_of_stress, warning};
+use warnings::{of_pieces, of_stress, warn_of_pieces, warn_of_stress, warning};
 
 pub use warnings::warnings;
 pub(crate) use warnings::{WARNING, beyond};
@@ -95,13 +96,8 @@ pub(crate) fn static_fitted(
 ) -> Result<(Compiled, OperatingPoint), AnalysisError> {
     let (order, point) = equilibrium::order(compiled, voltages, compiled.order.segments.clone())?;
     let mut fitted = on(compiled, order)?;
-    if fitted.options.linear {
-        let share = left_out(&fitted, &point, &point.q);
-        warn_of_stress(&mut fitted, share);
-    }
-    let points = [(point, OF_DEFLECTION)];
-    warn_of_pieces(&mut fitted, &points);
-    let [(point, _)] = points;
+    let (point, told) = told_of_static(&fitted, point);
+    fitted.warnings.items.extend(told);
     Ok((fitted, point))
 }
 
@@ -292,19 +288,32 @@ pub(crate) fn pull_in_fitted(
         Some((_, result)) => PullInResult { estimated_error: fitted.order.estimated_error, ..result },
         None => pull_in(&fitted, port, max)?,
     };
-    if fitted.structure.beam_gaps.is_empty() {
-        return Ok((fitted, result));
-    }
-    // next to the fold; and closed, where as much is left out as at release, but for V²
-    let release = result.release_v.map_or(0.0, |volts| (volts / result.pull_in_v).powi(2));
-    let points = [(0.98, OF_PULL_IN), (1.02, OF_DEFLECTION * release)];
-    let at = |(volts, times): (f64, f64)| {
-        let point = operating_point(&fitted, &[(result.port.clone(), volts * result.pull_in_v)]);
-        point.ok().map(|point| (point, times))
-    };
-    let points: Vec<_> = points.into_iter().filter_map(at).collect();
+    let points = points_of_pull_in(&fitted, &result);
     warn_of_pieces(&mut fitted, &points);
     Ok((fitted, result))
+}
+
+/// Where gaps along beams may have too few pieces for a pull-in, and how much that counts: next to the fold; and closed, where as
+/// much is left out as at release, but for V².
+fn points_of_pull_in(fitted: &Compiled, result: &PullInResult) -> Vec<(OperatingPoint, f64)> {
+    if fitted.structure.beam_gaps.is_empty() {
+        return Vec::new();
+    }
+    let release = result.release_v.map_or(0.0, |volts| (volts / result.pull_in_v).powi(2));
+    let at = |(volts, times): (f64, f64)| {
+        let point = operating_point(fitted, &[(result.port.clone(), volts * result.pull_in_v)]);
+        point.ok().map(|point| (point, times))
+    };
+    [(0.98, OF_PULL_IN), (1.02, OF_DEFLECTION * release)].into_iter().filter_map(at).collect()
+}
+
+/// What an equilibrium is warned of beside its mesh: what a linear model leaves out, and gaps in too few pieces.
+fn told_of_static(fitted: &Compiled, point: OperatingPoint) -> (OperatingPoint, Vec<Diagnostic>) {
+    let share = if fitted.options.linear { left_out(fitted, &point, &point.q) } else { None };
+    let points = [(point, OF_DEFLECTION)];
+    let told = of_stress(fitted, share).into_iter().chain(of_pieces(fitted, &points)).collect();
+    let [(point, _)] = points;
+    (point, told)
 }
 
 /// Pull-in on some meshes.

@@ -33,8 +33,13 @@ pub(crate) fn beyond(tol: f64, estimated_error: Option<f64>) -> Option<String> {
 
 /// Says so where a linear model leaves out more than the tolerance.
 pub(super) fn warn_of_stress(compiled: &mut Compiled, share: Option<f64>) {
-    let tol = compiled.options.tol;
-    let Some(share) = share.filter(|share| *share > tol) else { return };
+    let told = of_stress(compiled, share);
+    compiled.warnings.items.extend(told);
+}
+
+/// What a linear model leaves out, where that is more than the tolerance.
+pub(super) fn of_stress(compiled: &Compiled, share: Option<f64>) -> Option<Diagnostic> {
+    let share = share.filter(|share| *share > compiled.options.tol)?;
     let message = if share.is_finite() {
         format!(
             "the linear model leaves out what stress does to stiffness: it would change the deflection by {share:.1e}"
@@ -42,29 +47,30 @@ pub(super) fn warn_of_stress(compiled: &mut Compiled, share: Option<f64>) {
     } else {
         "the linear model leaves out what stress does to stiffness: the part would buckle".into()
     };
-    let help = "leave --linear away; modes have the stiffness of stress with it too";
-    compiled.warnings.items.push(warning(STRESS, message, help));
+    Some(warning(STRESS, message, "leave --linear away; modes have the stiffness of stress with it too"))
 }
 
 /// Says so where a gap along beams has too few pieces at one of these equilibria, whose results are off by so many times the share of
 /// its distance that is left out.
 pub(super) fn warn_of_pieces(compiled: &mut Compiled, points: &[(OperatingPoint, f64)]) {
+    let told = of_pieces(compiled, points);
+    compiled.warnings.items.extend(told);
+}
+
+/// The same for who keeps no warnings in a model.
+pub(super) fn of_pieces(compiled: &Compiled, points: &[(OperatingPoint, f64)]) -> Option<Diagnostic> {
     let tol = compiled.options.tol;
     let one = |(point, times): &(OperatingPoint, f64)| {
         let (name, share) = gap_pieces::left_out(compiled, &point.q, &point.volts)?;
         Some((name.to_owned(), times * share))
     };
     let worst = points.iter().filter_map(one).max_by(|a, b| a.1.total_cmp(&b.1));
-    let Some((name, error)) = worst.filter(|(_, error)| *error > tol) else { return };
+    let (name, error) = worst.filter(|(_, error)| *error > tol)?;
     let message = format!(
         "`{name}` acts on the ends of its beams, which would bend between them too: it may be off by {error:.1e}, more than the \
          tolerance {tol:e}"
     );
-    compiled.warnings.items.push(warning(
-        PIECES,
-        message,
-        "divide the beams: draw several gaps in a row between further nodes",
-    ));
+    Some(warning(PIECES, message, "divide the beams: draw several gaps in a row between further nodes"))
 }
 
 pub(super) fn warning(code: &str, message: String, help: &str) -> Diagnostic {

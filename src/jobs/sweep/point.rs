@@ -2,7 +2,7 @@
 
 use super::family::Family;
 use super::{SweepAnalysis, SweepError, SweepSpec};
-use crate::analysis::mesh::given::{Answer, answered, judged};
+use crate::analysis::mesh::given::{Answer, judged, searched};
 use crate::analysis::mesh::{self, Request};
 use crate::analysis::signal::Signal;
 use crate::analysis::{AnalysisError, statics};
@@ -148,22 +148,19 @@ fn solve(
         SweepAnalysis::Transient { .. } => return Err("a transient is no request for a mesh".to_owned()),
     };
     let shared = family.solve(&drawn, &request).map_err(said)?;
-    let (answer, estimated_error) = match shared {
-        Some(judged) => (judged.answer, judged.estimated_error),
+    let judged = match shared {
+        Some(judged) => judged,
         None => {
             let compiled = drawn.compile().map_err(|error| brief(&error))?;
-            if options.segments.is_some() {
-                let judged = judged(&compiled, &request).map_err(said)?;
-                (judged.answer, judged.estimated_error)
-            } else {
-                let own = mesh::fitted(&compiled, &request).map_err(said)?;
-                (answered(&own, &request).map_err(said)?, own.order.estimated_error)
-            }
+            let judge = if options.segments.is_some() { judged } else { searched };
+            judge(&compiled, &request).map_err(said)?
         }
     };
-    let warning = mesh::beyond(options.tol, estimated_error).map(|message| format!("{}: {message}", mesh::WARNING));
-    let values = values(&answer, &spec.analysis)?;
-    Ok(Found { values, estimated_error, warning: warning.unwrap_or_default() })
+    let estimated_error = judged.estimated_error;
+    let beyond = mesh::beyond(options.tol, estimated_error).map(|message| format!("{}: {message}", mesh::WARNING));
+    let warnings: Vec<String> = beyond.into_iter().chain(judged.warnings).collect();
+    let values = values(&judged.answer, &spec.analysis)?;
+    Ok(Found { values, estimated_error, warning: warnings.join("; ") })
 }
 
 /// A table has one line for an error: of a netlist's, the first with its place.
