@@ -7,7 +7,7 @@ use super::{progress, report, value};
 use bimorph::compile::Compiled;
 use bimorph::export::compare::{Fitted, fit};
 use bimorph::export::names::{self, Pins};
-use bimorph::export::{ExportError, Request, spice, verilog_a};
+use bimorph::export::{ExportError, Request, lumped, lumped_spice, lumped_verilog_a, spice, verilog_a};
 use bimorph::results::plot::axis::quantity;
 use clap::Args;
 use serde::Serialize;
@@ -38,6 +38,10 @@ pub(crate) struct Export {
     /// Write a Verilog-A module
     #[arg(long)]
     verilog_a: bool,
+
+    /// Write the whole nonlinear model instead, without an operating point: of rigid parts that only slide on linear springs
+    #[arg(long, conflicts_with_all = ["bias", "to", "count", "json"])]
+    nonlinear: bool,
 
     /// Operating point: hold a port at a voltage [V]; others are at 0 V. Repeatable
     #[arg(long = "port", short = 'p', value_name = "NAME=VOLTS", value_parser = value::volts)]
@@ -103,11 +107,14 @@ impl Export {
             None => names::from_file(stem.rsplit_once('.').map_or(stem.as_str(), |(stem, _)| stem)),
         };
         let compiled = Arc::new(self.model.compile()?);
+        if self.nonlinear {
+            return self.whole(&compiled, &request, &name);
+        }
         let busy = progress::spinner("export");
         let fitted = fit(&compiled, &request);
         busy.finish_and_clear();
         let fitted = fitted?;
-        let pins = Pins::of(&fitted.model)?;
+        let pins = Pins::of(&fitted.model.ports, &fitted.model.signals)?;
         if fitted.error > self.within {
             let (error, within) = (fitted.error, self.within);
             eprintln!(
@@ -144,6 +151,27 @@ impl Export {
         };
         let json = serde_json::to_string(&document).map_err(|e| Failure::Stdout(e.into()))?;
         print(&(json + "\n"))
+    }
+
+    /// Writes the nonlinear model.
+    fn whole(&self, compiled: &Compiled, request: &Request, name: &str) -> Result<(), Failure> {
+        let model = lumped::lump(compiled, request)?;
+        let pins = Pins::of(&model.ports, &model.signals)?;
+        let version = env!("CARGO_PKG_VERSION");
+        let (parts, gaps) = (model.coordinates.len(), model.gaps.len());
+        let mut about = vec![
+            format!("{}, the whole nonlinear model, written by bimorph {version} export", self.model.title()),
+            format!("{parts} direction(s) in which parts slide, {gaps} gap(s)"),
+        ];
+        about.extend(model.signals.iter().map(|s| format!("signal {}: 1 V is {:e} {}", s.name, 1.0 / s.scale, s.unit)));
+        let text = match self.spice {
+            true => lumped_spice::write(&model, &pins, name, &about),
+            false => lumped_verilog_a::write(&model, &pins, name, &about),
+        };
+        let Some(path) = &self.out else { return print(&text) };
+        write_page(path, &text)?;
+        let all = pins.all().collect::<Vec<_>>().join(" ");
+        print(&format!("{name} {all}\n{parts} direction(s) in which parts slide, {gaps} gap(s), nonlinear\n"))
     }
 
     /// The request, each option within its range.

@@ -27,8 +27,8 @@ pub struct Port {
     pub kind: PortKind,
     /// Volts per unit of what lies across one that is not electrical.
     pub across: f64,
-    /// Voltage at the operating point of a port that is given one [V]; 0 where a flow is given.
-    pub bias: f64,
+    /// Voltage at the operating point of a port that is given one [V]; none where a flow is given, or there is no such point.
+    pub bias: Option<f64>,
 }
 
 impl Port {
@@ -38,7 +38,7 @@ impl Port {
         let ((_, given), (_, answered)) = (self.kind.given(), self.kind.answered());
         let flow = if matches!(self.kind, PortKind::Moment | PortKind::MomentRate) { "1e-3" } else { "1" };
         match self.kind {
-            PortKind::Electrical => format!("{:e} V at the operating point", self.bias),
+            PortKind::Electrical => self.bias.map_or("a voltage".into(), |v| format!("{v:e} V at the operating point")),
             kind if kind.given_flow() => {
                 format!("1 A is {flow} {}, 1 V is {:e} {}", plain(given), 1.0 / self.across, plain(answered))
             }

@@ -7,13 +7,22 @@
 //! | [`compare`] | how far it is from the exact small-signal answer, and how many modes that takes |
 //! | [`spice`] | it as a subcircuit |
 //! | [`verilog_a`] | it as a Verilog-A module |
+//! | [`lumped`] | the whole nonlinear model of rigid parts that only slide |
+//! | `laws` | gap functions as text |
+//! | [`lumped_spice`], [`lumped_verilog_a`] | that model as a subcircuit and as a module |
+//! | [`names`], `parts` | pins, and parts of a subcircuit |
 //!
 //! What lies across a port, and what flows into it, have the scales of the ngspice plug-in ([`crate::device::scale`]), so
 //! that a subcircuit takes the place of an instance pin by pin.
 
 pub mod compare;
+mod laws;
 pub mod linear;
+pub mod lumped;
+pub mod lumped_spice;
+pub mod lumped_verilog_a;
 pub mod names;
+mod parts;
 pub mod reduce;
 pub mod spice;
 pub mod verilog_a;
@@ -88,6 +97,15 @@ pub enum ExportError {
         to: f64,
         /// What was asked for [1].
         within: f64,
+    },
+    /// The nonlinear form is one of rigid parts that slide.
+    #[error(
+        "--nonlinear writes rigid parts that only slide, on linear springs, but {why}; leave --nonlinear out for the linear \
+         model about an operating point, or use the plug-in"
+    )]
+    NotLumped {
+        /// What stands against it.
+        why: String,
     },
     /// Two names would be the same in the file.
     #[error("\"{first}\" and \"{second}\" would both be called {name} in the file; leave one out")]

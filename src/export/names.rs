@@ -1,7 +1,7 @@
 //! Names of pins: those of ports and signals with the characters that simulators take.
 
 use super::ExportError;
-use super::linear::Reduced;
+use super::linear::{Port, SignalShown};
 
 /// Pins of a written model, in order.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -17,9 +17,10 @@ impl Pins {
     ///
     /// # Errors
     /// [`ExportError::SameName`] where two become one.
-    pub fn of(model: &Reduced) -> Result<Self, ExportError> {
-        let ports: Vec<String> = model.ports.iter().map(|p| plain(&p.name)).collect();
-        let signals: Vec<String> = model.signals.iter().map(|s| plain(&s.name)).collect();
+    pub fn of(ports: &[Port], signals: &[SignalShown]) -> Result<Self, ExportError> {
+        let (all_ports, all_signals) = (ports, signals);
+        let ports: Vec<String> = ports.iter().map(|p| plain(&p.name)).collect();
+        let signals: Vec<String> = signals.iter().map(|s| plain(&s.name)).collect();
         let named = |plain: &[String], full: &dyn Fn(usize) -> String| {
             for (k, name) in plain.iter().enumerate() {
                 if let Some(j) = plain[..k].iter().position(|n| n == name) {
@@ -28,8 +29,8 @@ impl Pins {
             }
             Ok(())
         };
-        named(&ports, &|k| model.ports[k].name.clone())?;
-        named(&signals, &|k| model.signals[k].name.clone())?;
+        named(&ports, &|k| all_ports[k].name.clone())?;
+        named(&signals, &|k| all_signals[k].name.clone())?;
         Ok(Self {
             ports: ports.iter().map(|n| [format!("p_{n}"), format!("n_{n}")]).collect(),
             signals: signals.iter().map(|n| format!("s_{n}")).collect(),

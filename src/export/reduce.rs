@@ -419,7 +419,7 @@ impl<'a> Mechanism<'a> {
         let kind = self.ports.kinds[k];
         let scale = Scale::new(kind, self.across[k]);
         let across = if kind.given_flow() { scale.answered } else { 1.0 / scale.given };
-        let bias = if kind == PortKind::Electrical { self.sources[self.ports.sources[k]] } else { 0.0 };
+        let bias = (kind == PortKind::Electrical).then(|| self.sources[self.ports.sources[k]]);
         Port { name: self.names[k].clone(), kind, across, bias }
     }
 

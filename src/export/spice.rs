@@ -13,6 +13,7 @@
 use super::compare::Fitted;
 use super::linear::Reduced;
 use super::names::Pins;
+use super::parts::Parts;
 use crate::device::PortKind;
 use std::fmt::Write;
 
@@ -27,14 +28,14 @@ pub fn write(fitted: &Fitted, pins: &Pins, name: &str, about: &[String]) -> Stri
         let _ = writeln!(text, "* {line}");
     }
     let _ = writeln!(text, ".subckt {name} {}", pins.all().collect::<Vec<_>>().join(" "));
-    let mut deck = Deck { model: &fitted.model, pins, text, counts: [0; 3] };
+    let mut deck = Deck { model: &fitted.model, pins, parts: Parts::after(text) };
     deck.inputs();
     deck.lags();
     deck.modes();
     for row in 0..fitted.model.rows() {
         deck.row(row);
     }
-    let mut text = deck.text;
+    let mut text = deck.parts.text;
     let _ = writeln!(text, ".ends {name}");
     text
 }
@@ -43,48 +44,25 @@ pub fn write(fitted: &Fitted, pins: &Pins, name: &str, about: &[String]) -> Stri
 struct Deck<'a> {
     model: &'a Reduced,
     pins: &'a Pins,
-    text: String,
-    /// Sources named so far: G, F, I.
-    counts: [usize; 3],
+    parts: Parts,
 }
 
 impl Deck<'_> {
-    fn line(&mut self, line: &str) {
-        self.text.push_str(line);
-        self.text.push('\n');
-    }
-
-    /// A current of `gain` times the voltage of `node` from `from` to `to`.
-    fn by_voltage(&mut self, (from, to): (&str, &str), node: &str, gain: f64) {
-        if gain != 0.0 {
-            self.counts[0] += 1;
-            let _ = writeln!(self.text, "G{} {from} {to} {node} 0 {gain:e}", self.counts[0]);
-        }
-    }
-
-    /// A current of `gain` times that through the source `through`.
-    fn by_current(&mut self, (from, to): (&str, &str), through: &str, gain: f64) {
-        if gain != 0.0 {
-            self.counts[1] += 1;
-            let _ = writeln!(self.text, "F{} {from} {to} {through} {gain:e}", self.counts[1]);
-        }
-    }
-
     /// A current of `gain` times input `port`.
     fn by_input(&mut self, places: (&str, &str), port: usize, gain: f64) {
         if self.model.ports[port].kind.given_flow() {
-            self.by_current(places, &format!("Vf{}", port + 1), gain);
+            self.parts.by_current(places, &format!("Vf{}", port + 1), gain);
         } else {
-            self.by_voltage(places, &format!("u{}", port + 1), gain);
+            self.parts.by_voltage(places, &format!("u{}", port + 1), gain);
         }
     }
 
     /// A current of `gain` times the rate of change of input `port`.
     fn by_change(&mut self, places: (&str, &str), port: usize, gain: f64) {
         if self.model.ports[port].kind.given_flow() {
-            self.by_voltage(places, &format!("d{}", port + 1), gain / INDUCTOR);
+            self.parts.by_voltage(places, &format!("d{}", port + 1), gain / INDUCTOR);
         } else {
-            self.by_current(places, &format!("Vd{}", port + 1), gain / CAPACITOR);
+            self.parts.by_current(places, &format!("Vd{}", port + 1), gain / CAPACITOR);
         }
     }
 
@@ -97,22 +75,22 @@ impl Deck<'_> {
     fn inputs(&mut self) {
         for k in 0..self.model.ports.len() {
             let (port, [plus, minus], q) = (&self.model.ports[k], &self.pins.ports[k], k + 1);
-            let bias = port.bias;
+            let bias = port.bias.unwrap_or(0.0);
             let changes = self.changes(k);
-            self.line(&format!("* port {}: {}", port.name, port.meaning()));
+            self.parts.line(&format!("* port {}: {}", port.name, port.meaning()));
             if port.kind.given_flow() {
-                self.line(&format!("Vf{q} {plus} f{q} 0"));
-                self.line(&format!("Ef{q} f{q} {minus} y{q} 0 1"));
+                self.parts.line(&format!("Vf{q} {plus} f{q} 0"));
+                self.parts.line(&format!("Ef{q} f{q} {minus} y{q} 0 1"));
                 if changes {
-                    self.line(&format!("Fd{q} 0 d{q} Vf{q} 1"));
-                    self.line(&format!("Ld{q} d{q} 0 {INDUCTOR:e}"));
+                    self.parts.line(&format!("Fd{q} 0 d{q} Vf{q} 1"));
+                    self.parts.line(&format!("Ld{q} d{q} 0 {INDUCTOR:e}"));
                 }
             } else {
-                self.line(&format!("Eu{q} e{q} 0 {plus} {minus} 1"));
-                self.line(&format!("Vu{q} e{q} u{q} {bias:e}"));
+                self.parts.line(&format!("Eu{q} e{q} 0 {plus} {minus} 1"));
+                self.parts.line(&format!("Vu{q} e{q} u{q} {bias:e}"));
                 if changes {
-                    self.line(&format!("Vd{q} u{q} d{q} 0"));
-                    self.line(&format!("Cd{q} d{q} 0 {CAPACITOR:e}"));
+                    self.parts.line(&format!("Vd{q} u{q} d{q} 0"));
+                    self.parts.line(&format!("Cd{q} d{q} 0 {CAPACITOR:e}"));
                 }
             }
         }
@@ -122,9 +100,9 @@ impl Deck<'_> {
         for l in 0..self.model.lags.len() {
             let lag = self.model.lags[l];
             let h = format!("h{}", l + 1);
-            self.line(&format!("* lag of heat behind port {}: {:e} s", self.model.ports[lag.port].name, lag.tau));
-            self.line(&format!("Ch{} {h} 0 {:e}", l + 1, lag.tau));
-            self.line(&format!("Rh{} {h} 0 1", l + 1));
+            self.parts.line(&format!("* lag of heat behind port {}: {:e} s", self.model.ports[lag.port].name, lag.tau));
+            self.parts.line(&format!("Ch{} {h} 0 {:e}", l + 1, lag.tau));
+            self.parts.line(&format!("Rh{} {h} 0 1", l + 1));
             self.by_input(("0", &h), lag.port, 1.0);
         }
     }
@@ -136,19 +114,19 @@ impl Deck<'_> {
             let quality = mode.omega / self.model.damping[(j, j)];
             let hertz = mode.omega / std::f64::consts::TAU;
             let title = mode.number.map_or_else(|| "static correction".to_owned(), |n| format!("mode {n}"));
-            self.line(&format!("* {title} at {hertz:.6e} Hz, Q {quality:.4e}"));
-            self.line(&format!("Cx{k} {x} 0 {:e}", 1.0 / mode.omega));
-            self.line(&format!("Cw{k} {w} 0 {:e}", 1.0 / mode.omega));
-            self.by_voltage(("0", &x), &w, 1.0);
-            self.by_voltage(("0", &w), &x, -1.0);
+            self.parts.line(&format!("* {title} at {hertz:.6e} Hz, Q {quality:.4e}"));
+            self.parts.line(&format!("Cx{k} {x} 0 {:e}", 1.0 / mode.omega));
+            self.parts.line(&format!("Cw{k} {w} 0 {:e}", 1.0 / mode.omega));
+            self.parts.by_voltage(("0", &x), &w, 1.0);
+            self.parts.by_voltage(("0", &w), &x, -1.0);
             for i in 0..self.model.modes.len() {
-                self.by_voltage(("0", &w), &format!("w{}", i + 1), -self.model.damping[(j, i)] / mode.omega);
+                self.parts.by_voltage(("0", &w), &format!("w{}", i + 1), -self.model.damping[(j, i)] / mode.omega);
             }
             for q in 0..self.model.ports.len() {
                 self.by_input(("0", &w), q, self.model.push[(j, q)]);
             }
             for l in 0..self.model.lags.len() {
-                self.by_voltage(("0", &w), &format!("h{}", l + 1), self.model.push_lagged[(j, l)]);
+                self.parts.by_voltage(("0", &w), &format!("h{}", l + 1), self.model.push_lagged[(j, l)]);
             }
         }
     }
@@ -167,44 +145,43 @@ impl Deck<'_> {
         } else {
             ("0", sum.as_str())
         };
-        self.line(&format!(
+        self.parts.line(&format!(
             "* {}",
             if electrical { "current into port " } else { "across " }.to_owned() + model.row_name(row)
         ));
         let mut constant = model.at_rest[row];
         if electrical {
             // what the port's own voltage drives, in plain parts that need no operating point
-            let (own, bias) = (model.direct[(row, row)], model.ports[row].bias);
+            let (own, bias) = (model.direct[(row, row)], model.ports[row].bias.unwrap_or(0.0));
             if own != 0.0 {
-                self.line(&format!("R{} {from} {to} {:e}", row + 1, 1.0 / own));
+                self.parts.line(&format!("R{} {from} {to} {:e}", row + 1, 1.0 / own));
                 constant -= own * bias;
                 if constant.abs() < 1e-12 * (own * bias).abs() {
                     constant = 0.0;
                 }
             }
             if model.change[(row, row)] != 0.0 {
-                self.line(&format!("C{} {from} {to} {:e}", row + 1, model.change[(row, row)]));
+                self.parts.line(&format!("C{} {from} {to} {:e}", row + 1, model.change[(row, row)]));
             }
         } else {
-            self.line(&format!("R{} {sum} 0 1", row + 1));
+            self.parts.line(&format!("R{} {sum} 0 1", row + 1));
         }
         if constant != 0.0 {
-            self.counts[2] += 1;
-            self.line(&format!("I{} {from} {to} {constant:e}", self.counts[2]));
+            self.parts.constant((from, to), constant);
         }
         for j in 0..model.modes.len() {
-            self.by_voltage((from, to), &format!("x{}", j + 1), model.place[(row, j)]);
-            self.by_voltage((from, to), &format!("w{}", j + 1), model.rate[(row, j)]);
+            self.parts.by_voltage((from, to), &format!("x{}", j + 1), model.place[(row, j)]);
+            self.parts.by_voltage((from, to), &format!("w{}", j + 1), model.rate[(row, j)]);
         }
         for l in 0..model.lags.len() {
-            self.by_voltage((from, to), &format!("h{}", l + 1), model.lagged[(row, l)]);
+            self.parts.by_voltage((from, to), &format!("h{}", l + 1), model.lagged[(row, l)]);
         }
         for q in (0..model.ports.len()).filter(|q| !electrical || *q != row) {
             self.by_input((from, to), q, model.direct[(row, q)]);
             self.by_change((from, to), q, model.change[(row, q)]);
         }
         if let Some(k) = row.checked_sub(model.ports.len()) {
-            self.line(&format!("Es{} {} 0 {sum} 0 1", k + 1, self.pins.signals[k]));
+            self.parts.line(&format!("Es{} {} 0 {sum} 0 1", k + 1, self.pins.signals[k]));
         }
     }
 }

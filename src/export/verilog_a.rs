@@ -5,7 +5,7 @@
 //! each row of the model's equations ([`super::linear`]).
 
 use super::compare::Fitted;
-use super::linear::Reduced;
+use super::linear::{Port, Reduced};
 use super::names::Pins;
 use crate::device::PortKind;
 use std::fmt::Write;
@@ -13,25 +13,11 @@ use std::fmt::Write;
 /// The file: a header that tells what it is, and the module `name`.
 pub fn write(fitted: &Fitted, pins: &Pins, name: &str, about: &[String]) -> String {
     let model = &fitted.model;
-    let mut text = String::new();
-    for line in about {
-        let _ = writeln!(text, "// {line}");
-    }
-    let all: Vec<&str> = pins.all().collect();
-    let _ = writeln!(text, "`include \"disciplines.vams\"\n\nmodule {name}({});", all.join(", "));
-    let _ = writeln!(text, "  inout {};\n  electrical {};", all.join(", "), all.join(", "));
     let inner: Vec<String> = (1..=model.modes.len())
         .flat_map(|k| [format!("x{k}"), format!("w{k}")])
         .chain((1..=model.lags.len()).map(|l| format!("h{l}")))
         .collect();
-    if !inner.is_empty() {
-        let _ = writeln!(text, "  electrical {};", inner.join(", "));
-    }
-    for (k, port) in model.ports.iter().enumerate() {
-        let [plus, minus] = &pins.ports[k];
-        let _ = writeln!(text, "  branch ({plus}, {minus}) b{}; // {}: {}", k + 1, port.name, model.ports[k].meaning());
-    }
-    let _ = writeln!(text, "\n  analog begin");
+    let mut text = head(name, pins, &inner, &model.ports, about);
     for (l, lag) in model.lags.iter().enumerate() {
         let h = format!("h{}", l + 1);
         let _ = writeln!(text, "    I({h}) <+ ddt({:e} * V({h})) + V({h}) - {};", lag.tau, input(model, lag.port));
@@ -80,9 +66,29 @@ pub fn write(fitted: &Fitted, pins: &Pins, name: &str, about: &[String]) -> Stri
     text
 }
 
+/// All up to the first contribution: what the file is, pins, inner nodes and branches.
+pub(super) fn head(name: &str, pins: &Pins, inner: &[String], ports: &[Port], about: &[String]) -> String {
+    let mut text = String::new();
+    for line in about {
+        let _ = writeln!(text, "// {line}");
+    }
+    let all = pins.all().collect::<Vec<_>>().join(", ");
+    let _ = writeln!(text, "`include \"disciplines.vams\"\n\nmodule {name}({all});");
+    let _ = writeln!(text, "  inout {all};\n  electrical {all};");
+    if !inner.is_empty() {
+        let _ = writeln!(text, "  electrical {};", inner.join(", "));
+    }
+    for (k, port) in ports.iter().enumerate() {
+        let [plus, minus] = &pins.ports[k];
+        let _ = writeln!(text, "  branch ({plus}, {minus}) b{}; // {}: {}", k + 1, port.name, port.meaning());
+    }
+    let _ = writeln!(text, "\n  analog begin");
+    text
+}
+
 /// The deviation of an input from the operating point.
 fn input(model: &Reduced, port: usize) -> String {
-    let (branch, bias) = (format!("b{}", port + 1), model.ports[port].bias);
+    let (branch, bias) = (format!("b{}", port + 1), model.ports[port].bias.unwrap_or(0.0));
     if model.ports[port].kind.given_flow() {
         format!("I({branch})")
     } else if bias == 0.0 {
@@ -93,26 +99,26 @@ fn input(model: &Reduced, port: usize) -> String {
 }
 
 /// A contribution being written, a term a line.
-struct Sum(String);
+pub(super) struct Sum(String);
 
 impl Sum {
-    fn begin(start: &str) -> Self {
+    pub(super) fn begin(start: &str) -> Self {
         Self(format!("    {start}"))
     }
 
-    fn add(&mut self, gain: f64, what: &str) {
+    pub(super) fn add(&mut self, gain: f64, what: &str) {
         if gain != 0.0 {
             self.term(&format!("{gain:e} * {what}"));
         }
     }
 
-    fn term(&mut self, term: &str) {
+    pub(super) fn term(&mut self, term: &str) {
         let sign = if term.starts_with('-') { "" } else { "+ " };
         let term = term.strip_prefix('-').map_or_else(|| term.to_owned(), |rest| format!("- {rest}"));
         let _ = write!(self.0, "\n      {sign}{term}");
     }
 
-    fn end(self, text: &mut String) {
+    pub(super) fn end(self, text: &mut String) {
         let _ = writeln!(text, "{};", self.0);
     }
 }

@@ -106,6 +106,26 @@ fn a_module_without_hidden_state() {
     }
 }
 
+/// The nonlinear form of a plate: the field of two plates, and contact, in B-sources; and as a module, without hidden state.
+#[test]
+fn the_nonlinear_form() {
+    let bench = bench();
+    let spice = bench.run("export plate.net --spice --nonlinear --signals m.x:1M");
+    assert_eq!(spice.status, 0, "{}", spice.stderr);
+    assert!(
+        spice.stdout.is_ascii() && spice.stdout.contains("Bq1 ") && spice.stdout.contains("Bf1 "),
+        "{}",
+        spice.stdout
+    );
+    let module = bench.run("export plate.net --verilog-a --nonlinear --signals m.x:1M --name cell");
+    assert_eq!(module.status, 0, "{}", module.stderr);
+    assert!(module.stdout.contains("module cell(p_drive, n_drive, s_m_x);"), "{}", module.stdout);
+    for word in ["@", "$", "idt", "bound_step", "real ", "integer", " if"] {
+        assert!(!module.stdout.contains(word), "\"{word}\" stands in the module");
+    }
+    assert_eq!(module.stdout.matches('(').count(), module.stdout.matches(')').count());
+}
+
 /// Where no voltage couples motion and circuit, that is told, and what is left is the circuit's part: R = 2400 Ω of two beams of 60
 /// squares of 20 Ω.
 #[test]
@@ -134,6 +154,9 @@ fn refusals() {
         ("export chevron.net --spice --count 0", "--count"),
         ("export chevron.net --spice --name 2a", "--name"),
         ("export chevron.net --spice --out gone/a.lib", "gone"),
+        ("export chevron.net --spice --nonlinear", "beam \"left\" heats"),
+        ("export c.net --verilog-a --nonlinear --ports b.y", "can turn"),
+        ("export plate.net --spice --nonlinear --ports frame.wz", "frame.wz"),
     ] {
         let before = bench.files();
         let ran = bench.run(words);
@@ -141,7 +164,12 @@ fn refusals() {
         assert_eq!((ran.stdout.as_str(), bench.files()), ("", before), "{words}");
         assert!(ran.stderr.contains(expected) && ran.stderr.matches("error").count() == 1, "{words}: {}", ran.stderr);
     }
-    for words in ["export chevron.net", "export chevron.net --spice --verilog-a", "export chevron.net --spice --json"] {
+    for words in [
+        "export plate.net --spice --nonlinear --port drive=1",
+        "export chevron.net",
+        "export chevron.net --spice --verilog-a",
+        "export chevron.net --spice --json",
+    ] {
         assert_eq!(bench.run(words).status, 2, "{words}");
     }
 }

@@ -5,7 +5,7 @@ use bimorph::compile::{CompileOptions, Compiled, compile};
 use bimorph::cosim::CosimOptions;
 use bimorph::export::compare::{Fitted, fit};
 use bimorph::export::names::Pins;
-use bimorph::export::{Request, spice};
+use bimorph::export::{Request, lumped, lumped_spice, spice};
 use bimorph::netlist::Bundle;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -20,6 +20,8 @@ struct Scene {
     forces: &'static [&'static str],
     /// Signals, volts per unit.
     signals: &'static [(&'static str, f64)],
+    /// Tolerance of the full model.
+    tol: f64,
 }
 
 /// The bank of bimorphs, heated by 1 V and sensed by a comb at 10 V.
@@ -28,6 +30,7 @@ const BANK: Scene = Scene {
     electrical: &[("heat", 1.0), ("sense", 10.0)],
     forces: &["yoke.y"],
     signals: &[("yoke.y", 1e6), ("b1.hot.T", 1.0), ("low.vy", 1.0)],
+    tol: 1e-3,
 };
 
 /// The comb resonator, driven at 20 V and sensed at 10 V.
@@ -36,6 +39,34 @@ const COMB: Scene = Scene {
     electrical: &[("drive", 20.0), ("sense", 10.0)],
     forces: &["shuttle.vx"],
     signals: &[("shuttle.x", 1e6), ("drive_comb.q", 1e15)],
+    tol: 1e-3,
+};
+
+/// One mass between two combs, at voltages far from small: 5 V and 10 V.
+const LUMPED_COMB: Scene = Scene {
+    file: "tests/decks/comb.net",
+    electrical: &[("drive", 5.0), ("sense", 10.0)],
+    forces: &["m.x"],
+    signals: &[("m.x", 1e6), ("m.vx", 1.0), ("right.q", 1e15), ("right.gap", 1e6), ("left.C", 1e15), ("right.F", 1e6)],
+    tol: 1e-5,
+};
+
+/// A plate below its pull-in voltage of 5.1741 V.
+const PLATE: Scene = Scene {
+    file: "tests/decks/damped_plate.net",
+    electrical: &[("drive", 5.0)],
+    forces: &["m.vx"],
+    signals: &[("m.x", 1e6), ("gap.q", 1e15), ("gap.gap", 1e6)],
+    tol: 1e-5,
+};
+
+/// An accelerometer: one mass between two plates on three electrodes, on a frame.
+const ACCELEROMETER: Scene = Scene {
+    file: "tests/decks/accelerometer.net",
+    electrical: &[("frame.ax", 100.0), ("top", 1.0), ("bottom", -1.0), ("middle", 0.3)],
+    forces: &["m.x"],
+    signals: &[("m.x", 1e6), ("m.vx", 1.0)],
+    tol: 1e-5,
 };
 
 fn netlist(file: &str) -> PathBuf {
@@ -52,23 +83,38 @@ impl Scene {
         self.electrical.iter().map(|(name, _)| *name).chain(self.forces.iter().copied()).collect()
     }
 
-    fn exported(&self) -> Fitted {
-        let request = Request {
+    fn request(&self) -> Request {
+        Request {
             ports: self.ports().into_iter().map(|name| (name.to_owned(), None)).collect(),
             signals: self.signals.iter().map(|(name, scale)| ((*name).to_owned(), *scale)).collect(),
             bias: self.electrical.iter().map(|(name, volts)| ((*name).to_owned(), *volts)).collect(),
             count: None,
             to: None,
             within: 1e-4,
-        };
-        fit(&self.compiled(), &request).unwrap_or_else(|e| panic!("{}: {e}", self.file))
+        }
+    }
+
+    fn exported(&self) -> Fitted {
+        fit(&self.compiled(), &self.request()).unwrap_or_else(|e| panic!("{}: {e}", self.file))
+    }
+
+    /// The subcircuit of a reduced model.
+    fn linear(fitted: &Fitted) -> String {
+        let pins = Pins::of(&fitted.model.ports, &fitted.model.signals).unwrap();
+        spice::write(fitted, &pins, "part", &["a test".to_owned()])
+    }
+
+    /// The subcircuit of the nonlinear model.
+    fn whole(&self) -> String {
+        let model = lumped::lump(&self.compiled(), &self.request()).unwrap_or_else(|e| panic!("{}: {e}", self.file));
+        let pins = Pins::of(&model.ports, &model.signals).unwrap();
+        lumped_spice::write(&model, &pins, "part", &["a test".to_owned()])
     }
 
     /// A deck with the full model on nodes that end in 1 and the written one on nodes that end in 2, both driven by the same; `driven` is
     /// what stands behind the source at a port.
-    fn deck(&self, fitted: &Fitted, driven: impl Fn(&str) -> String, analysis: &str) -> String {
-        let pins = Pins::of(&fitted.model).unwrap();
-        let mut deck = format!("* {}\n{}", self.file, spice::write(fitted, &pins, "part", &["a test".to_owned()]));
+    fn deck(&self, part: &str, driven: impl Fn(&str) -> String, analysis: &str) -> String {
+        let mut deck = format!("* {}\n{part}", self.file);
         let (mut electrical, mut forces, mut plain) = (String::new(), String::new(), String::new());
         for (k, name) in self.ports().into_iter().enumerate() {
             let bias = self.electrical.get(k).map(|(_, volts)| *volts);
@@ -87,12 +133,14 @@ impl Scene {
         let ports = quoted(self.ports().iter().map(|n| (*n).to_owned()).collect());
         let monitors = quoted(self.signals.iter().map(|(n, scale)| format!("{n}:{scale:e}")).collect());
         let file = netlist(self.file);
+        let forces = if forces.is_empty() { forces } else { format!("%hd {forces}") };
         let _ = write!(
             deck,
-            "A1 [%gd {electrical}%hd {forces}] %v [{}] full\n.model full bimorph(file=\"{}\" ports=[{ports}] \
-             monitors=[{monitors}])\nX2 {plain}{}part\n{analysis}\n.end\n",
+            "A1 [%gd {electrical}{forces}] %v [{}] full\n.model full bimorph(file=\"{}\" ports=[{ports}] \
+             monitors=[{monitors}] tol={:e})\nX2 {plain}{}part\n{analysis}\n.end\n",
             shown(1),
             file.canonicalize().unwrap().display(),
+            self.tol,
             shown(2),
         );
         deck
@@ -129,10 +177,11 @@ fn small_signals_are_those_of_the_full_model() {
         let around = format!(".ac lin 401 {:e} {:e}", 0.98 * first, 1.02 * first);
         let all = format!(".ac dec 200 {:e} {end:e}", 1e-3 * first);
         for (version, ngspice) in versions() {
+            let mut largest_of_all = (0.0f64, String::new());
             for port in scene.ports() {
                 let driven = |name: &str| if name == port { "AC 1".to_owned() } else { "AC 0".to_owned() };
                 for sweep in [&all, &around] {
-                    let run = scene.run(&scene.deck(&fitted, driven, sweep), &ngspice);
+                    let run = scene.run(&scene.deck(&Scene::linear(&fitted), driven, sweep), &ngspice);
                     let plot = run.plot("AC");
                     for ((name, full), (_, written)) in scene.read(1).iter().zip(&scene.read(2)) {
                         let (full, written) = (complex(plot, full), complex(plot, written));
@@ -145,15 +194,69 @@ fn small_signals_are_those_of_the_full_model() {
                             continue;
                         }
                         let worst = off.zip(full).map(|(off, a)| off / size(a)).fold(0.0, f64::max);
-                        println!(
-                            "ngspice {version}, {}, {} modes, {name} over {port}, {sweep}: {worst:.2e}",
-                            scene.file,
-                            fitted.model.modes.len()
-                        );
+                        if worst > largest_of_all.0 {
+                            largest_of_all = (worst, format!("{name} over {port}"));
+                        }
                         assert!(worst < 1e-3, "ngspice {version}, {} {name} over {port}: {worst:e}", scene.file);
                     }
                 }
             }
+            let (worst, place) = largest_of_all;
+            let modes = fitted.model.modes.len();
+            println!("ngspice {version}, {}, {modes} modes: .ac within {worst:.1e}, {place}", scene.file);
+        }
+    }
+}
+
+/// The nonlinear subcircuit in `.ac` and `.op` is the full model to 1e-6 of each value (rounding, and ngspice's tolerance at the
+/// operating point), and in `.tran` after large steps to 1e-3 of range at equal steps.
+#[test]
+fn the_nonlinear_form_is_the_full_model() {
+    let steps = [
+        (LUMPED_COMB, "drive", "PULSE(5 15 2u 1u 1u 60u 200u)", ".tran 20n 90u 0 20n", 90e-6),
+        (PLATE, "drive", "PULSE(0 4.9 2u 1u 1u 300u 1)", ".tran 200n 600u 0 200n", 600e-6),
+        (ACCELEROMETER, "frame.ax", "PULSE(100 -300 2u 1u 1u 1 1)", ".tran 1u 1m 0 1u", 1e-3),
+    ];
+    let exact = ".options reltol=1e-9 vntol=1e-12 abstol=1e-18";
+    for (scene, port, pulse, analysis, end) in steps {
+        let part = scene.whole();
+        for (version, ngspice) in versions() {
+            let mut worst = [0.0f64; 3];
+            let still = scene.run(&scene.deck(&part, |_| String::new(), &format!("{exact}\n.op")), &ngspice);
+            let plot = still.plot("Operating");
+            for ((name, full), (_, written)) in scene.read(1).iter().zip(&scene.read(2)) {
+                let (full, written) = (real(plot, full)[0], real(plot, written)[0]);
+                worst[0] = worst[0].max((full - written).abs() / (full.abs() + 1e-6));
+                assert!(worst[0] < 1e-6, "ngspice {version}, {} {name}: {full:e} {written:e}", scene.file);
+            }
+            for port in scene.ports() {
+                let driven = |name: &str| if name == port { "AC 1".to_owned() } else { "AC 0".to_owned() };
+                let run = scene.run(&scene.deck(&part, driven, &format!("{exact}\n.ac dec 50 10 100k")), &ngspice);
+                let plot = run.plot("AC");
+                for ((name, full), (_, written)) in scene.read(1).iter().zip(&scene.read(2)) {
+                    for (a, b) in complex(plot, full).iter().zip(complex(plot, written)) {
+                        let (off, size) = ((a[0] - b[0]).hypot(a[1] - b[1]), a[0].hypot(a[1]));
+                        if size > 1e-18 {
+                            worst[1] = worst[1].max(off / size);
+                        }
+                        assert!(off < 1e-6 * size + 1e-18, "ngspice {version}, {} {name} over {port}", scene.file);
+                    }
+                }
+            }
+            let driven = |name: &str| if name == port { pulse.to_owned() } else { String::new() };
+            let options = ".options reltol=1e-6 vntol=1e-9 abstol=1e-18 chgtol=1e-20";
+            let run = scene.run(&scene.deck(&part, driven, &format!("{options}\n{analysis}")), &ngspice);
+            let plot = run.plot("Transient");
+            let t = real(plot, "time");
+            let signals = scene.ports().len();
+            for ((name, full), (_, written)) in scene.read(1).iter().zip(&scene.read(2)).skip(signals) {
+                let off = deviation((t, real(plot, written)), (t, real(plot, full)), 0.0, end);
+                println!("ngspice {version}, {} {name}: {off:.2e} of range", scene.file);
+                worst[2] = worst[2].max(off);
+            }
+            let [op, ac, tran] = worst;
+            println!("ngspice {version}, {}: .op {op:.1e}, .ac {ac:.1e}, .tran {tran:.1e}", scene.file);
+            assert!(tran < 1e-3, "ngspice {version}, {}: {tran:e}", scene.file);
         }
     }
 }
@@ -164,7 +267,7 @@ fn the_operating_point_is_that_of_the_full_model() {
     for scene in [BANK, COMB] {
         let fitted = scene.exported();
         for (version, ngspice) in versions() {
-            let run = scene.run(&scene.deck(&fitted, |_| String::new(), ".op"), &ngspice);
+            let run = scene.run(&scene.deck(&Scene::linear(&fitted), |_| String::new(), ".op"), &ngspice);
             let plot = run.plot("Operating");
             for ((name, full), (_, written)) in scene.read(1).iter().zip(&scene.read(2)) {
                 let (full, written) = (real(plot, full)[0], real(plot, written)[0]);
@@ -189,7 +292,7 @@ fn a_small_step_moves_both_alike() {
         let fitted = scene.exported();
         let driven = |name: &str| if name == port { pulse.to_owned() } else { String::new() };
         for (version, ngspice) in versions() {
-            let text = scene.deck(&fitted, driven, &format!(".options reltol=1e-6\n{analysis}"));
+            let text = scene.deck(&Scene::linear(&fitted), driven, &format!(".options reltol=1e-6\n{analysis}"));
             let run = scene.run(&text, &ngspice);
             let plot = run.plot("Transient");
             let t = real(plot, "time");
