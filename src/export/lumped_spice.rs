@@ -99,12 +99,12 @@ impl Deck<'_> {
         let gap = &self.model.gaps[g];
         let (n, u, e) = (g + 1, format!("g{}", g + 1), format!("e{}", g + 1));
         self.parts.line(&format!("* gap {}", gap.name));
-        self.parts.line(&format!("Rg{n} {u} 0 1"));
+        self.parts.sum(&u);
         self.sum(("0", &u), "x", &gap.along, 1.0);
         let approach = format!("V({u})");
         let mut force = Vec::new();
         if let Law::Field(capacitor, _) = &gap.law {
-            self.parts.line(&format!("Re{n} {e} 0 1"));
+            self.parts.sum(&e);
             for (q, share) in gap.by_port.iter().enumerate() {
                 let [plus, minus] = &self.pins.ports[q];
                 self.parts.between(("0", &e), (plus, minus), *share);
@@ -178,7 +178,7 @@ impl Deck<'_> {
             }
             Reading::Constant(value) => self.parts.constant(places, value * scale),
         }
-        self.parts.line(&format!("Ry{n} {sum} 0 1"));
+        self.parts.sum(&sum);
         if let Some(k) = row.checked_sub(ports) {
             self.parts.line(&format!("Es{} {} 0 {sum} 0 1", k + 1, self.pins.signals[k]));
         }

@@ -44,6 +44,11 @@ impl Parts {
         }
     }
 
+    /// Makes a node show the sum of the currents into it, 1 V for 1 A: a conductance of 1 S that makes no noise.
+    pub(super) fn sum(&mut self, node: &str) {
+        self.by_voltage((node, "0"), node, 1.0);
+    }
+
     /// A constant current [A]; none where it is 0.
     pub(super) fn constant(&mut self, (from, to): (&str, &str), current: f64) {
         if current != 0.0 {

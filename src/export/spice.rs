@@ -5,10 +5,12 @@
 //! |---|---|
 //! | `x1` … | share of a mode: a capacitor of 1/ω farads that the rate charges |
 //! | `w1` … | its rate over ω: a capacitor of 1/ω farads that spring, damping and ports charge |
-//! | `h1` … | the lag of heat behind a port: R·C = τ |
+//! | `h1` … | the lag of heat behind a port: τ farads against 1 S |
 //! | `u1` … | what a port with a voltage is given, less its value at the operating point |
 //! | `d1` … | its rate of change: behind a capacitor, and for a force or heat across an inductor |
-//! | `y1` … | what lies across a port that a flow is given to, and the signals: sums of currents in 1 Ω |
+//! | `y1` … | what lies across a port that a flow is given to, and the signals: sums of currents into 1 S |
+//!
+//! Conductances that stand for no resistance of the part are controlled sources, which make no noise.
 
 use super::compare::Fitted;
 use super::linear::Reduced;
@@ -102,7 +104,7 @@ impl Deck<'_> {
             let h = format!("h{}", l + 1);
             self.parts.line(&format!("* lag of heat behind port {}: {:e} s", self.model.ports[lag.port].name, lag.tau));
             self.parts.line(&format!("Ch{} {h} 0 {:e}", l + 1, lag.tau));
-            self.parts.line(&format!("Rh{} {h} 0 1", l + 1));
+            self.parts.sum(&h);
             self.by_input(("0", &h), lag.port, 1.0);
         }
     }
@@ -164,7 +166,7 @@ impl Deck<'_> {
                 self.parts.line(&format!("C{} {from} {to} {:e}", row + 1, model.change[(row, row)]));
             }
         } else {
-            self.parts.line(&format!("R{} {sum} 0 1", row + 1));
+            self.parts.sum(&sum);
         }
         if constant != 0.0 {
             self.parts.constant((from, to), constant);

@@ -261,6 +261,24 @@ fn the_nonlinear_form_is_the_full_model() {
     }
 }
 
+/// The nonlinear plate pulls in at √(8·k·g³/(27·ε·A)) = 5.1741 V, within the 1 mV of the sweep, and rests where contact begins, 0.1 µm
+/// from the electrode, a nanometre further at most.
+#[test]
+fn the_nonlinear_plate_pulls_in() {
+    let exact = (8.0f64 * 2e-6f64.powi(3) / (27.0 * 8.854e-12 * 1e-8)).sqrt();
+    let part = PLATE.whole();
+    for (version, ngspice) in versions() {
+        let text = format!("* plate\n{part}V1 a 0 0\nX1 a 0 v 0 x q d part\n.dc V1 5 5.3 1m\n.end\n");
+        let run = PLATE.run(&text, &ngspice);
+        let plot = run.plot("DC");
+        let (volts, x) = (real(plot, "v-sweep"), real(plot, "v(x)"));
+        let jump = x.iter().position(|x| *x > 1.0).unwrap();
+        println!("ngspice {version}: pulls in at {} V, rests at {} um", volts[jump], x[x.len() - 1]);
+        assert!((0.0..1.1e-3).contains(&(volts[jump] - exact)), "ngspice {version}: {} V", volts[jump]);
+        assert!((1.9..1.901).contains(&x[x.len() - 1]), "ngspice {version}");
+    }
+}
+
 /// At the operating point currents, places and temperatures are those of the full model, to 1e-6 of each.
 #[test]
 fn the_operating_point_is_that_of_the_full_model() {
