@@ -271,7 +271,7 @@ fn the_nonlinear_plate_pulls_in() {
         let text = format!("* plate\n{part}V1 a 0 0\nX1 a 0 v 0 x q d part\n.dc V1 5 5.3 1m\n.end\n");
         let run = PLATE.run(&text, &ngspice);
         let plot = run.plot("DC");
-        let (volts, x) = (real(plot, "v-sweep"), real(plot, "v(x)"));
+        let (volts, x) = (real(plot, "v(a)"), real(plot, "v(x)"));
         let jump = x.iter().position(|x| *x > 1.0).unwrap();
         println!("ngspice {version}: pulls in at {} V, rests at {} um", volts[jump], x[x.len() - 1]);
         assert!((0.0..1.1e-3).contains(&(volts[jump] - exact)), "ngspice {version}: {} V", volts[jump]);
