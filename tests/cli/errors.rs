@@ -95,6 +95,12 @@ fn options_that_mean_nothing() {
         ("serve --listen ftp://x", "unix:///path"),
         ("serve --listen 0.0.0.0:0", "--insecure"),
         ("cosim gone.cir", "gone.cir"),
+        ("cosim gone.cir --op", "a netlist (.net)"),
+        ("cosim gone.net --op", "gone.net"),
+        ("cosim c.net", "nothing drives the mechanism"),
+        ("cosim p.net --port heat=1", "drive"),
+        ("cosim p.net --drive heat=SIN(0,1,1k)", "drive"),
+        ("cosim p.net --emit there/p.cir", "there"),
     ] {
         let message = fails(&bench, words);
         assert!(message.contains(expected), "{words}: {message}");

@@ -25,6 +25,37 @@ fn every_format() {
     }
 }
 
+/// A netlist's deck is written whole and not run, beside the netlist by its name; with what was asked for in it.
+#[test]
+fn a_netlist_becomes_a_deck() {
+    let netlist = "anchor * [f] [l=1u w=1u h=1u]\nmass2d * [m] [m=1e-10]\nguide2d * [m] []\nspring2d * [f m] [kx=1]\n\
+        param g=2u\nanchor * [e] [l=1u w=1u h=1u]\nplategap2d * [m e] [A=1e-8 gap=g]\neground * [e] []\n\
+        bias Vsrc * [s e] [V=4]\nR * [s m] [R=1k]\nC * [m e] [C=1p]\n";
+    let bench = Bench::new(&[("Plate.net", netlist)]);
+    let words = "cosim Plate.net --emit plate.cir --op --signals m.x --tol 1e-4 --set g=3u --drive bias=SIN(1,1,1k)";
+    let ran = bench.run(words);
+    assert_eq!((ran.status, ran.stdout.as_str(), ran.stderr.as_str()), (0, "", ""));
+    assert_eq!(bench.files(), ["Plate.net", "plate.cir"]);
+    let deck = std::fs::read_to_string(bench.path("plate.cir")).expect("the deck");
+    let lines: Vec<&str> = deck.lines().collect();
+    for line in [
+        "v_bias s 0 dc 4e0 ac 1 SIN(1,1,1k)",
+        "A1 %gd [m 0] %v [m_x] device",
+        ".model device bimorph(file=\"Plate.net\" without_circuit=true",
+        "+ ports=[\"m\"]",
+        "+ monitors=[\"m.x:1e6\"]",
+        "+ tol=1e-4",
+        "+ set=[\"g=3e-6\"]",
+        ".op",
+        ".end",
+    ] {
+        assert!(lines.contains(&line), "{line} in\n{deck}");
+    }
+    // every other analysis says what it leaves out, and sees none of it
+    let ran = bench.run("static Plate.net");
+    assert!(ran.status == 0 && ran.stderr.contains("W021"), "{}", ran.stderr);
+}
+
 /// The raw file of a transient holds the samples of its JSON, bit by bit, and `plot` draws and converts it.
 #[test]
 fn raw_csv_and_json_agree() {
