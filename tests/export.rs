@@ -107,6 +107,17 @@ fn an_undamped_mechanism() {
     assert!(deviation(&compiled, &request, &fitted) < 1e-3);
 }
 
+/// A linear model is written as `.ac` has it, without what stress adds to its stiffness: heated and biased.
+#[test]
+fn a_linear_model() {
+    let compiled = compiled("examples/bank/bank.net", CompileOptions { linear: true, ..CompileOptions::default() });
+    let request = request(&["heat", "sense"], &["yoke.y", "b1.hot.T"], &[("heat", 2.0), ("sense", 20.0)]);
+    let fitted = fit(&compiled, &request).unwrap();
+    let off = deviation(&compiled, &request, &fitted);
+    println!("{} modes, own check {:.1e}, here {off:.1e}", fitted.model.modes.len(), fitted.error);
+    assert!(fitted.error <= 1e-4 && off < 1e-3, "{off:e}");
+}
+
 /// More modes than named are not kept, and the error is told, not hidden.
 #[test]
 fn a_count_is_kept() {

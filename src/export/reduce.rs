@@ -25,6 +25,7 @@ use crate::multibody::planar::Pose;
 use crate::solve::SolveError;
 use crate::solve::eigen::{Modes, RELIABLE, lowest_modes, mass_product};
 use crate::solve::frequency::refined::{ROUNDING, Refined};
+use crate::solve::subspace;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 /// Displacement that a volt of a mode's share stands for where the mode moves most [m].
@@ -32,6 +33,9 @@ const MICROMETRE: f64 = 1e-6;
 /// A coupling below this share of the largest of its kind is rounding.
 const NONE: f64 = 1e-10;
 
+/// Modes beyond those asked for that an iteration of a block takes along, and the change of λ at which it ends [1].
+const GUARDS: usize = 6;
+const SETTLED: f64 = 1e-14;
 /// Share of its energy below which a direction of the static correction depends on others.
 const DEPENDENT: f64 = 1e-9;
 
@@ -225,7 +229,7 @@ impl<'a> Mechanism<'a> {
                 system.drive_force(&self.q, &self.drive, &change, &mut force);
                 force.iter_mut().for_each(|f| *f = -*f);
                 let mut yielded = force.clone();
-                refined.solve(&self.factor, 0.0, &mut yielded, ROUNDING);
+                self.yielded(&mut refined, &mut yielded);
                 pushes.push(Push { port, tau, force, yielded, volts: change.volts, rise });
             }
         }
@@ -237,6 +241,9 @@ impl<'a> Mechanism<'a> {
     /// # Errors
     /// [`AnalysisError::NotConverged`] rather than modes that cannot be trusted.
     pub fn modes(&self, count: usize) -> Result<Modes, ExportError> {
+        if self.system().model.linear {
+            return self.linear_modes(count);
+        }
         let found =
             lowest_modes(self.system(), (&self.q, &self.drive), &self.tangent, count).map_err(AnalysisError::from)?;
         let bad = found.residuals.iter().any(|r| r.is_nan() || *r > RELIABLE) || found.missed;
@@ -247,6 +254,39 @@ impl<'a> Mechanism<'a> {
             return Err(AnalysisError::NotConverged { detail }.into());
         }
         Ok(found)
+    }
+
+    /// The same for small displacements about the drawing, whose small signals leave out what stress adds to the stiffness: those of the
+    /// tangent as it is.
+    fn linear_modes(&self, count: usize) -> Result<Modes, ExportError> {
+        let model = &self.system().model;
+        let mut block = count + GUARDS;
+        while block > 0 {
+            let start = subspace::start(model.bodies.len(), block, self.system().length_scale);
+            if let Some(found) = subspace::iterate(model, (&self.factor, 0.0), start, count.min(block), SETTLED) {
+                let (mut lambda, mut shapes) = (found.lambda, found.shapes);
+                lambda.truncate(count);
+                shapes.truncate(count);
+                let residuals = vec![0.0; lambda.len()];
+                return Ok(Modes { lambda, shapes, residuals, missed: false, rounding: 0.0 });
+            }
+            // there are fewer
+            block -= 1;
+        }
+        let detail = format!("the {count} lowest modes at the operating point do not settle; --count fewer");
+        Err(AnalysisError::NotConverged { detail }.into())
+    }
+
+    /// K⁻¹ times a force, in place.
+    fn yielded(&self, refined: &mut Refined<'_>, force: &mut [Pose]) {
+        let model = &self.system().model;
+        if model.linear {
+            model.project(force);
+            self.factor.solve(&model.pattern, force);
+            model.project(force);
+        } else {
+            refined.solve(&self.factor, 0.0, force, ROUNDING);
+        }
     }
 
     /// What a push yields at rest in all directions but those of a basis.
@@ -285,7 +325,7 @@ impl<'a> Mechanism<'a> {
                 let weigh = |(j, z): (usize, &Pose)| model.mass(j).component_mul(z);
                 let force: Vec<Pose> = columns[k].iter().enumerate().map(weigh).collect();
                 let mut yielded = force.clone();
-                refined.solve(&self.factor, 0.0, &mut yielded, ROUNDING);
+                self.yielded(&mut refined, &mut yielded);
                 let scale = 1.0 / dot(&force, &yielded).sqrt();
                 if scale.is_finite() {
                     columns.push(yielded.iter().map(|z| z * scale).collect());
