@@ -6,8 +6,8 @@
 use crate::abi::{self, Model, code};
 use crate::call::{self, Call, Wanted};
 use crate::circuit::Circuit;
-use crate::instance::Outcome;
 use crate::opening::open_all;
+use crate::question::Outcome;
 use crate::registry::{close, registry};
 use crate::respond::{respond, settle};
 use crate::table::{DEVICE, LAYOUT};

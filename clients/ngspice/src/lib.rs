@@ -40,6 +40,8 @@ mod noise;
 pub mod opener;
 mod opening;
 mod panics;
+mod parameters;
+pub mod question;
 mod registry;
 mod respond;
 pub mod settings;

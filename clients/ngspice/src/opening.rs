@@ -6,7 +6,7 @@ use crate::instance::Instance;
 use crate::model_card::ModelCard;
 use crate::registry::register;
 use crate::table::LAYOUT;
-use crate::{host, opener, trace};
+use crate::{host, opener, parameters, trace};
 use bimorph::device::Agitation;
 use std::ffi::c_void;
 use std::path::{Path, PathBuf};
@@ -31,7 +31,7 @@ pub(crate) unsafe fn open_all(model: *mut Model, circuit: *mut c_void) -> Result
             (
                 call::text(instance.name).unwrap_or_default(),
                 call::text(model.name).unwrap_or_default(),
-                call::card(model.param, model.num_param),
+                parameters::card(model.param, model.num_param),
                 call::branches(instance.conn),
                 call::size(instance.conn, MONITORS),
                 deck_directory(instance.conn, circuit),

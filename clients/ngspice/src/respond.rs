@@ -3,7 +3,8 @@
 use crate::call::{Call, MONITORS, PORTS};
 use crate::circuit::Circuit;
 use crate::history;
-use crate::instance::{Instance, Outcome, Question};
+use crate::instance::Instance;
+use crate::question::{Outcome, Question};
 use crate::registry::{Entry, Registry};
 use crate::{host, trace};
 use std::ffi::c_int;

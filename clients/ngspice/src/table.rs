@@ -54,7 +54,7 @@ const OWN: [(&str, c_int, c_int, Option<f64>, &str); OWN_COUNT] = [
 /// How many they are.
 pub(crate) const OWN_COUNT: usize = 9;
 
-/// Parameters of a `.model` line, in the order of [`crate::call::card`].
+/// Parameters of a `.model` line, in the order of [`crate::parameters::card`].
 fn parameters() -> Vec<Declaration> {
     let real = |x| Value { complex: Complex { re: x, im: 0.0 } };
     let text = |text: &str| CString::new(text).unwrap_or_default();

@@ -1,0 +1,55 @@
+//! What ngspice asks of an instance, and what it is told.
+
+use crate::history::Base;
+use bimorph::device::Token;
+
+/// What ngspice asks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Question {
+    /// Operating point or sweep: equilibrium.
+    Static,
+    /// A step of `dt` [s] that ends at `t` [s].
+    Transient {
+        /// End of the step [s].
+        t: f64,
+        /// Length [s], positive.
+        dt: f64,
+    },
+    /// Small-signal answer at `omega` [rad/s].
+    SmallSignal {
+        /// Angular frequency [rad/s].
+        omega: f64,
+    },
+}
+
+/// What becomes of a question.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Outcome {
+    /// The instance holds the answer.
+    Solved,
+    /// No answer for this step: ngspice shall try a shorter one, or another way to the operating point.
+    Retry,
+    /// The analysis must end; the text says why.
+    Stop(String),
+}
+
+/// Currents, conductances and monitors as ngspice wants them. p ports, s monitors; matrices row-major.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Answer {
+    /// State reached.
+    pub token: Option<Token>,
+    /// Step that led to it [s]; 0 for equilibrium.
+    pub step: f64,
+    /// Current into each port [A], or the voltage across one whose current is given [V] (p).
+    pub currents: Vec<f64>,
+    /// ∂current/∂voltage [S], or of what else is answered and given (p×p).
+    pub conductances: Vec<f64>,
+    /// Charges [C] (p).
+    pub charges: Vec<f64>,
+    /// What the next step's charges will be differentiated from, if this point is accepted.
+    pub base: Base,
+    /// Scaled monitors [V] (s).
+    pub monitors: Vec<f64>,
+    /// ∂monitor/∂voltage [1] (s×p).
+    pub monitor_gains: Vec<f64>,
+}
