@@ -22,15 +22,15 @@ pub(crate) struct NetlistArgs {
     op: bool,
 
     /// Transient, as SPICE writes it: 'STEP STOP [START [LONGEST]]'
-    #[arg(long, value_name = "TIMES")]
+    #[arg(long, value_name = "TIMES", value_parser = times)]
     tran: Option<String>,
 
     /// Small signals, as SPICE writes it: 'dec POINTS FROM TO'
-    #[arg(long, value_name = "SWEEP")]
+    #[arg(long, value_name = "SWEEP", value_parser = frequencies)]
     ac: Option<String>,
 
     /// Sweep, as SPICE writes it: 'v_NAME FROM TO STEP'
-    #[arg(long, value_name = "SWEEP")]
+    #[arg(long, value_name = "SWEEP", value_parser = levels)]
     dc: Option<String>,
 
     /// What a source or a port gives over time, as SPICE writes it: 'NAME=PULSE(0 4 1u 1u)'. Repeatable
@@ -145,6 +145,30 @@ impl NetlistArgs {
     }
 }
 
+/// Checks the words of an analysis: `form` is how they are written, `fit` whether these are.
+fn analysis(text: &str, form: &str, fit: impl Fn(&[&str]) -> bool) -> Result<String, String> {
+    let words: Vec<&str> = text.split_whitespace().collect();
+    if fit(&words) { Ok(words.join(" ")) } else { Err(format!("expected '{form}', got \"{text}\"")) }
+}
+
+fn times(text: &str) -> Result<String, String> {
+    analysis(text, "STEP STOP [START [LONGEST]] [uic]", |words| {
+        let uic = words.last().is_some_and(|word| word.eq_ignore_ascii_case("uic"));
+        (2..=4).contains(&(words.len() - usize::from(uic)))
+    })
+}
+
+fn frequencies(text: &str) -> Result<String, String> {
+    let kinds = ["dec", "oct", "lin"];
+    analysis(text, "dec POINTS FROM TO", |words| {
+        words.len() == 4 && kinds.iter().any(|kind| words[0].eq_ignore_ascii_case(kind))
+    })
+}
+
+fn levels(text: &str) -> Result<String, String> {
+    analysis(text, "v_NAME FROM TO STEP", |words| matches!(words.len(), 4 | 8))
+}
+
 /// Reads `NAME=WAVE`.
 fn wave(text: &str) -> Result<(String, String), String> {
     match text.split_once('=') {
@@ -160,4 +184,21 @@ pub(crate) fn is_netlist(file: &Path) -> bool {
     let called = file.extension().is_some_and(|e| e.eq_ignore_ascii_case("net"));
     let bytes = if called { std::fs::read(file).unwrap_or_default() } else { Vec::new() };
     called && !String::from_utf8_lossy(&bytes).lines().any(|line| line.trim_start().starts_with('.'))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An analysis is checked before anything is written or run, and its message shows the form.
+    #[test]
+    fn analyses_have_a_form() {
+        assert_eq!(times(" 1u  100u 0 50n"), Ok("1u 100u 0 50n".to_owned()));
+        assert_eq!(times("1u 100u UIC"), Ok("1u 100u UIC".to_owned()));
+        assert_eq!(times("100u"), Err("expected 'STEP STOP [START [LONGEST]] [uic]', got \"100u\"".to_owned()));
+        assert!(times("").is_err() && times("uic").is_err() && times("1 2 3 4 5").is_err());
+        assert_eq!(frequencies("DEC 10 1k 1meg"), Ok("DEC 10 1k 1meg".to_owned()));
+        assert!(frequencies("1k:1M").is_err() && frequencies("10 1k 1meg 5").is_err());
+        assert!(levels("v_v1 0 5 0.1").is_ok() && levels("v_v1 0 5").is_err());
+    }
 }
