@@ -7,8 +7,9 @@
 //! Kept are the modes up to the end of the band that show there; then, as far as the tolerance takes it, the static correction
 //! swings, one direction after the other; then modes above the band are added.
 
+use super::basis::Basis;
 use super::linear::Reduced;
-use super::reduce::{Basis, Mechanism, port_names};
+use super::reduce::{Mechanism, port_names};
 use super::{ExportError, Request};
 use crate::compile::Compiled;
 use crate::device::local::LocalDevice;

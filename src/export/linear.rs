@@ -8,8 +8,8 @@
 //! ḣ_l = (u_q(l) − h_l)/τ_l                                              l: lags of heaters
 //! y   = y₀ + X·x + W·w + H·h + E·u + F·u̇
 //! ```
-//! x_j is the share of mode j, in micrometres of its largest displacement shown as volts, and w_j its rate over ω_j. D is the whole damping
-//! matrix between the modes that are kept, not only its diagonal. E, F and H hold, beside conductance and capacitance, the
+//! x_j is the share of mode j, in micrometres of its largest displacement shown as volts, and w_j its rate over ω_j. D is the
+//! whole damping matrix between the modes that are kept, not only its diagonal. E, F and H hold, beside conductance and capacitance, the
 //! static correction: what all the modes that are left out yield at rest. So the model is exact at DC, and near every
 //! resonance that is kept. Directions of the static correction may be among the modes: [`super::reduce`].
 //!

@@ -1,5 +1,5 @@
-//! The nonlinear lumped model as a Verilog-A module, by the rules of [`super::verilog_a`]: every state is a node, and nothing but `ddt` acts
-//! in time.
+//! The nonlinear lumped model as a Verilog-A module, by the rules of [`super::verilog_a`]: every state is a node, and nothing but
+//! `ddt` acts in time.
 
 use super::laws::{bearing, capacitance, slope};
 use super::lumped::{Law, Lumped, Reading};

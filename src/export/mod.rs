@@ -3,7 +3,7 @@
 //! | file | what it holds |
 //! |---|---|
 //! | [`linear`] | the reduced linear model: modes, static correction, lags of heaters, ports; its response |
-//! | [`reduce`] | how it is made of a mechanism at an operating point |
+//! | [`reduce`], [`basis`] | how it is made of a mechanism at an operating point, and in which directions it moves |
 //! | [`compare`] | how far it is from the exact small-signal answer, and how many modes that takes |
 //! | [`spice`] | it as a subcircuit |
 //! | [`verilog_a`] | it as a Verilog-A module |
@@ -15,6 +15,7 @@
 //! What lies across a port, and what flows into it, have the scales of the ngspice plug-in ([`crate::device::scale`]), so
 //! that a subcircuit takes the place of an instance pin by pin.
 
+pub mod basis;
 pub mod compare;
 mod laws;
 pub mod linear;

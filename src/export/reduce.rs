@@ -4,11 +4,11 @@
 //! ```text
 //! M·q̈ + C·q̇ + K·q = Σ b_q·u_q,     q ≈ Σ_j φ_j·η_j + Σ_q z_q·u_q,     z_q = K⁻¹·b_q − Σ_j φ_j·(φ_jᵀ·b_q)/λ_j
 //! ```
-//! φ_j are undamped modes with φᵀMφ = 1. z_q, the static correction, is what the modes that are left out yield at rest. It may
-//! swing, too: its directions are taken for further modes with the mass and damping that they have (Ritz vectors that depend on the
-//! load: Wilson, Yuan, Dickens, Earthquake Eng. Struct. Dyn. 10 (1982)), as many as the tolerance takes. What heats at once pushes by b_q; a heater with a time constant pushes behind its lag, and all heaters with the same time constant that
-//! one port heats share one lag: their rises are in proportion to it.
+//! φ_j are undamped modes with φᵀMφ = 1. z_q, the static correction, is what the modes that are left out yield at rest; directions of
+//! it may swing, too ([`super::basis`]). What heats at once pushes by b_q; a heater with a time constant pushes behind its lag, and all
+//! heaters with the same time constant that one port heats share one lag: their rises are in proportion to it.
 
+use super::basis::Basis;
 use super::linear::{Lag, Mode, Port, Reduced, SignalShown};
 use super::{ExportError, Request};
 use crate::analysis::AnalysisError;
@@ -23,21 +23,13 @@ use crate::multibody::BlockMatrix;
 use crate::multibody::forces::add_damping;
 use crate::multibody::planar::Pose;
 use crate::solve::SolveError;
-use crate::solve::eigen::{Modes, RELIABLE, lowest_modes, mass_product};
 use crate::solve::frequency::refined::{ROUNDING, Refined};
-use crate::solve::subspace;
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use nalgebra::{DMatrix, DVector};
 
 /// Displacement that a volt of a mode's share stands for where the mode moves most [m].
 const MICROMETRE: f64 = 1e-6;
 /// A coupling below this share of the largest of its kind is rounding.
 const NONE: f64 = 1e-10;
-
-/// Modes beyond those asked for that an iteration of a block takes along, and the change of λ at which it ends [1].
-const GUARDS: usize = 6;
-const SETTLED: f64 = 1e-14;
-/// Share of its energy below which a direction of the static correction depends on others.
-const DEPENDENT: f64 = 1e-9;
 
 /// What is read in a row of y.
 #[derive(Debug, Clone, Copy)]
@@ -54,50 +46,15 @@ enum Row {
     Nothing,
 }
 
-/// Directions in which a model moves, φᵀMφ = 1 and φᵀKφ = λ, orthogonal to each other.
-#[derive(Debug, Clone, Default)]
-pub struct Basis {
-    /// Number of each among the modes, from 1; none for one of the static correction.
-    numbers: Vec<Option<usize>>,
-    lambda: Vec<f64>,
-    shapes: Vec<Vec<Pose>>,
-}
-
-impl Basis {
-    /// Of the modes `kept`, indices in `found`.
-    pub fn of(found: &Modes, kept: &[usize]) -> Self {
-        Self {
-            numbers: kept.iter().map(|j| Some(j + 1)).collect(),
-            lambda: kept.iter().map(|&j| found.lambda[j]).collect(),
-            shapes: kept.iter().map(|&j| found.shapes[j].clone()).collect(),
-        }
-    }
-
-    /// How many of the static correction are in it.
-    pub fn corrections(&self) -> usize {
-        self.numbers.iter().filter(|n| n.is_none()).count()
-    }
-
-    /// The first `count` directions.
-    #[must_use]
-    pub fn first(&self, count: usize) -> Self {
-        Self {
-            numbers: self.numbers[..count].to_vec(),
-            lambda: self.lambda[..count].to_vec(),
-            shapes: self.shapes[..count].to_vec(),
-        }
-    }
-}
-
 /// A unit of one input, at once or behind a lag: what it does to a mechanism that does not swing.
 #[derive(Debug)]
-struct Push {
+pub(super) struct Push {
     port: usize,
     /// Time constant that it comes with [s]; none: at once.
     tau: Option<f64>,
-    force: Vec<Pose>,
+    pub(super) force: Vec<Pose>,
     /// K⁻¹ times the force.
-    yielded: Vec<Pose>,
+    pub(super) yielded: Vec<Pose>,
     volts: Vec<f64>,
     rise: Vec<f64>,
 }
@@ -110,13 +67,13 @@ pub struct Mechanism<'a> {
     names: Vec<String>,
     across: Vec<Option<f64>>,
     shown: Vec<(Signal, SignalShown)>,
-    q: Vec<Pose>,
+    pub(super) q: Vec<Pose>,
     sources: Vec<f64>,
     rise: Vec<f64>,
-    drive: Drive,
-    tangent: BlockMatrix<f64, 3>,
-    factor: BlockMatrix<f64, 3>,
-    pushes: Vec<Push>,
+    pub(super) drive: Drive,
+    pub(super) tangent: BlockMatrix<f64, 3>,
+    pub(super) factor: BlockMatrix<f64, 3>,
+    pub(super) pushes: Vec<Push>,
 }
 
 /// The ports of a request by name: those asked for, or every electrical one.
@@ -184,7 +141,7 @@ impl<'a> Mechanism<'a> {
         Ok(mechanism)
     }
 
-    fn system(&self) -> &System {
+    pub(super) fn system(&self) -> &System {
         self.ports.system.as_deref().unwrap_or(&self.compiled.parts.system)
     }
 
@@ -236,49 +193,8 @@ impl<'a> Mechanism<'a> {
         pushes
     }
 
-    /// The `count` lowest modes, or all there are.
-    ///
-    /// # Errors
-    /// [`AnalysisError::NotConverged`] rather than modes that cannot be trusted.
-    pub fn modes(&self, count: usize) -> Result<Modes, ExportError> {
-        if self.system().model.linear {
-            return self.linear_modes(count);
-        }
-        let found =
-            lowest_modes(self.system(), (&self.q, &self.drive), &self.tangent, count).map_err(AnalysisError::from)?;
-        let bad = found.residuals.iter().any(|r| r.is_nan() || *r > RELIABLE) || found.missed;
-        if bad || found.lambda.is_empty() || found.lambda.iter().any(|l| *l <= 0.0) {
-            let detail = format!(
-                "the {count} lowest modes at the operating point cannot be told apart from rounding; --count fewer"
-            );
-            return Err(AnalysisError::NotConverged { detail }.into());
-        }
-        Ok(found)
-    }
-
-    /// The same for small displacements about the drawing, whose small signals leave out what stress adds to the stiffness: those of the
-    /// tangent as it is.
-    fn linear_modes(&self, count: usize) -> Result<Modes, ExportError> {
-        let model = &self.system().model;
-        let mut block = count + GUARDS;
-        while block > 0 {
-            let start = subspace::start(model.bodies.len(), block, self.system().length_scale);
-            if let Some(found) = subspace::iterate(model, (&self.factor, 0.0), start, count.min(block), SETTLED) {
-                let (mut lambda, mut shapes) = (found.lambda, found.shapes);
-                lambda.truncate(count);
-                shapes.truncate(count);
-                let residuals = vec![0.0; lambda.len()];
-                return Ok(Modes { lambda, shapes, residuals, missed: false, rounding: 0.0 });
-            }
-            // there are fewer
-            block -= 1;
-        }
-        let detail = format!("the {count} lowest modes at the operating point do not settle; --count fewer");
-        Err(AnalysisError::NotConverged { detail }.into())
-    }
-
     /// K⁻¹ times a force, in place.
-    fn yielded(&self, refined: &mut Refined<'_>, force: &mut [Pose]) {
+    pub(super) fn yielded(&self, refined: &mut Refined<'_>, force: &mut [Pose]) {
         let model = &self.system().model;
         if model.linear {
             model.project(force);
@@ -287,87 +203,6 @@ impl<'a> Mechanism<'a> {
         } else {
             refined.solve(&self.factor, 0.0, force, ROUNDING);
         }
-    }
-
-    /// What a push yields at rest in all directions but those of a basis.
-    fn left(&self, push: &Push, basis: &Basis) -> Vec<Pose> {
-        let mut rest = push.yielded.clone();
-        for (x, lambda) in basis.shapes.iter().zip(&basis.lambda) {
-            let share = dot(x, &push.force) / lambda;
-            rest.iter_mut().zip(x).for_each(|(z, x)| *z -= x * share);
-        }
-        rest
-    }
-
-    /// A basis with the directions of its static correction behind it, each as one that swings: the z of all pushes, at `depth` 2 with
-    /// the K⁻¹·M·z that their inertia yields, and so on, made orthogonal in K and then in M. They are orthogonal to the basis in both
-    /// already.
-    #[must_use]
-    pub fn corrected(&self, basis: &Basis, depth: usize) -> Basis {
-        let model = &self.system().model;
-        let mut out = basis.clone();
-        let mut columns: Vec<Vec<Pose>> = Vec::new();
-        let mut forces: Vec<Vec<Pose>> = Vec::new();
-        for push in &self.pushes {
-            let (whole, mut rest) = (dot(&push.force, &push.yielded), self.left(push, basis));
-            let energy = dot(&push.force, &rest);
-            if energy > DEPENDENT * whole {
-                let scale = 1.0 / energy.sqrt();
-                rest.iter_mut().for_each(|z| *z *= scale);
-                columns.push(rest);
-                forces.push(push.force.iter().map(|f| f * scale).collect());
-            }
-        }
-        let mut refined = Refined::new(self.system(), &self.q, &self.drive);
-        let mut last = 0..columns.len();
-        for _ in 1..depth {
-            for k in last.clone() {
-                let weigh = |(j, z): (usize, &Pose)| model.mass(j).component_mul(z);
-                let force: Vec<Pose> = columns[k].iter().enumerate().map(weigh).collect();
-                let mut yielded = force.clone();
-                self.yielded(&mut refined, &mut yielded);
-                let scale = 1.0 / dot(&force, &yielded).sqrt();
-                if scale.is_finite() {
-                    columns.push(yielded.iter().map(|z| z * scale).collect());
-                    forces.push(force.iter().map(|f| f * scale).collect());
-                }
-            }
-            last = last.end..columns.len();
-        }
-        let m = columns.len();
-        if m == 0 {
-            return out; // every push is in the basis
-        }
-        let stiff = SymmetricEigen::new(DMatrix::from_fn(m, m, |i, j| {
-            0.5 * (dot(&columns[i], &forces[j]) + dot(&columns[j], &forces[i]))
-        }));
-        let kept: Vec<usize> = (0..m).filter(|&k| stiff.eigenvalues[k] > DEPENDENT).collect();
-        let blend = |weights: &dyn Fn(usize) -> f64, of: &[Vec<Pose>]| -> Vec<Pose> {
-            let mut sum = vec![Pose::zeros(); self.q.len()];
-            for (k, x) in of.iter().enumerate() {
-                let weight = weights(k);
-                sum.iter_mut().zip(x).for_each(|(s, x)| *s += x * weight);
-            }
-            sum
-        };
-        let upright: Vec<Vec<Pose>> = (kept.iter())
-            .map(|&k| blend(&|i| stiff.eigenvectors[(i, k)] / stiff.eigenvalues[k].sqrt(), &columns))
-            .collect();
-        let n = upright.len();
-        if n == 0 {
-            return out;
-        }
-        let mass = DMatrix::from_fn(n, n, |i, j| mass_product(model, &upright[i], &upright[j]));
-        let heavy = SymmetricEigen::new((&mass + mass.transpose()) * 0.5);
-        let mut order: Vec<usize> = (0..n).filter(|&k| heavy.eigenvalues[k] > 0.0).collect();
-        order.sort_by(|&i, &j| heavy.eigenvalues[j].total_cmp(&heavy.eigenvalues[i]));
-        for k in order {
-            let inertia = heavy.eigenvalues[k];
-            out.numbers.push(None);
-            out.lambda.push(1.0 / inertia);
-            out.shapes.push(blend(&|i| heavy.eigenvectors[(i, k)] / inertia.sqrt(), &upright));
-        }
-        out
     }
 
     /// The model with these directions. Values at rest are left at 0.
@@ -509,7 +344,7 @@ impl<'a> Mechanism<'a> {
     }
 }
 
-fn dot(a: &[Pose], b: &[Pose]) -> f64 {
+pub(super) fn dot(a: &[Pose], b: &[Pose]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a.dot(b)).sum()
 }
 

@@ -1,8 +1,8 @@
 //! The reduced linear model as a Verilog-A module.
 //!
 //! Every state is a node of the module, which the simulator sees and solves for: no variable keeps a value from one point to
-//! the next, no event is watched and no step is bounded. `ddt` acts on voltages and branch currents alone. One contribution for each node and
-//! each row of the model's equations ([`super::linear`]).
+//! the next, no event is watched and no step is bounded. `ddt` acts on voltages and branch currents alone. One contribution for
+//! each node and each row of the model's equations ([`super::linear`]).
 
 use super::compare::Fitted;
 use super::linear::{Port, Reduced};

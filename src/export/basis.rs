@@ -1,0 +1,179 @@
+//! The directions in which a reduced model moves: modes, and behind them the static correction.
+//!
+//! What the modes of a basis do not yield at rest, z_q = K⁻¹·b_q − Σ_j φ_j·(φ_jᵀ·b_q)/λ_j, is orthogonal to them in K and in M. Its
+//! directions may be taken for further modes with the mass and damping that they have: Ritz vectors that depend on the load (Wilson,
+//! Yuan, Dickens, Earthquake Eng. Struct. Dyn. 10 (1982)).
+
+use super::ExportError;
+use super::reduce::{Mechanism, Push, dot};
+use crate::analysis::AnalysisError;
+use crate::multibody::planar::Pose;
+use crate::solve::eigen::{Modes, RELIABLE, lowest_modes, mass_product};
+use crate::solve::frequency::refined::Refined;
+use crate::solve::subspace;
+use nalgebra::{DMatrix, SymmetricEigen};
+
+/// Modes beyond those asked for that an iteration of a block takes along, and the change of λ at which it ends [1].
+const GUARDS: usize = 6;
+const SETTLED: f64 = 1e-14;
+/// Share of its energy below which a direction of the static correction depends on others.
+const DEPENDENT: f64 = 1e-9;
+
+/// Directions in which a model moves, φᵀMφ = 1 and φᵀKφ = λ, orthogonal to each other.
+#[derive(Debug, Clone, Default)]
+pub struct Basis {
+    /// Number of each among the modes, from 1; none for one of the static correction.
+    pub(super) numbers: Vec<Option<usize>>,
+    pub(super) lambda: Vec<f64>,
+    pub(super) shapes: Vec<Vec<Pose>>,
+}
+
+impl Basis {
+    /// Of the modes `kept`, indices in `found`.
+    pub fn of(found: &Modes, kept: &[usize]) -> Self {
+        Self {
+            numbers: kept.iter().map(|j| Some(j + 1)).collect(),
+            lambda: kept.iter().map(|&j| found.lambda[j]).collect(),
+            shapes: kept.iter().map(|&j| found.shapes[j].clone()).collect(),
+        }
+    }
+
+    /// How many of the static correction are in it.
+    pub fn corrections(&self) -> usize {
+        self.numbers.iter().filter(|n| n.is_none()).count()
+    }
+
+    /// The first `count` directions.
+    #[must_use]
+    pub fn first(&self, count: usize) -> Self {
+        Self {
+            numbers: self.numbers[..count].to_vec(),
+            lambda: self.lambda[..count].to_vec(),
+            shapes: self.shapes[..count].to_vec(),
+        }
+    }
+}
+
+impl Mechanism<'_> {
+    /// The `count` lowest modes, or all there are.
+    ///
+    /// # Errors
+    /// [`AnalysisError::NotConverged`] rather than modes that cannot be trusted.
+    pub fn modes(&self, count: usize) -> Result<Modes, ExportError> {
+        if self.system().model.linear {
+            return self.linear_modes(count);
+        }
+        let found =
+            lowest_modes(self.system(), (&self.q, &self.drive), &self.tangent, count).map_err(AnalysisError::from)?;
+        let bad = found.residuals.iter().any(|r| r.is_nan() || *r > RELIABLE) || found.missed;
+        if bad || found.lambda.is_empty() || found.lambda.iter().any(|l| *l <= 0.0) {
+            let detail = format!(
+                "the {count} lowest modes at the operating point cannot be told apart from rounding; --count fewer"
+            );
+            return Err(AnalysisError::NotConverged { detail }.into());
+        }
+        Ok(found)
+    }
+
+    /// The same for small displacements about the drawing, whose small signals leave out what stress adds to the stiffness: those of the
+    /// tangent as it is.
+    fn linear_modes(&self, count: usize) -> Result<Modes, ExportError> {
+        let model = &self.system().model;
+        let mut block = count + GUARDS;
+        while block > 0 {
+            let start = subspace::start(model.bodies.len(), block, self.system().length_scale);
+            if let Some(found) = subspace::iterate(model, (&self.factor, 0.0), start, count.min(block), SETTLED) {
+                let (mut lambda, mut shapes) = (found.lambda, found.shapes);
+                lambda.truncate(count);
+                shapes.truncate(count);
+                let residuals = vec![0.0; lambda.len()];
+                return Ok(Modes { lambda, shapes, residuals, missed: false, rounding: 0.0 });
+            }
+            // there are fewer
+            block -= 1;
+        }
+        let detail = format!("the {count} lowest modes at the operating point do not settle; --count fewer");
+        Err(AnalysisError::NotConverged { detail }.into())
+    }
+
+    /// What a push yields at rest in all directions but those of a basis.
+    pub(super) fn left(&self, push: &Push, basis: &Basis) -> Vec<Pose> {
+        let mut rest = push.yielded.clone();
+        for (x, lambda) in basis.shapes.iter().zip(&basis.lambda) {
+            let share = dot(x, &push.force) / lambda;
+            rest.iter_mut().zip(x).for_each(|(z, x)| *z -= x * share);
+        }
+        rest
+    }
+
+    /// A basis with the directions of its static correction behind it, each as one that swings: the z of all pushes, at `depth` 2 with
+    /// the K⁻¹·M·z that their inertia yields, and so on, made orthogonal in K and then in M. They are orthogonal to the basis in both
+    /// already.
+    #[must_use]
+    pub fn corrected(&self, basis: &Basis, depth: usize) -> Basis {
+        let model = &self.system().model;
+        let mut out = basis.clone();
+        let mut columns: Vec<Vec<Pose>> = Vec::new();
+        let mut forces: Vec<Vec<Pose>> = Vec::new();
+        for push in &self.pushes {
+            let (whole, mut rest) = (dot(&push.force, &push.yielded), self.left(push, basis));
+            let energy = dot(&push.force, &rest);
+            if energy > DEPENDENT * whole {
+                let scale = 1.0 / energy.sqrt();
+                rest.iter_mut().for_each(|z| *z *= scale);
+                columns.push(rest);
+                forces.push(push.force.iter().map(|f| f * scale).collect());
+            }
+        }
+        let mut refined = Refined::new(self.system(), &self.q, &self.drive);
+        let mut last = 0..columns.len();
+        for _ in 1..depth {
+            for k in last.clone() {
+                let weigh = |(j, z): (usize, &Pose)| model.mass(j).component_mul(z);
+                let force: Vec<Pose> = columns[k].iter().enumerate().map(weigh).collect();
+                let mut yielded = force.clone();
+                self.yielded(&mut refined, &mut yielded);
+                let scale = 1.0 / dot(&force, &yielded).sqrt();
+                if scale.is_finite() {
+                    columns.push(yielded.iter().map(|z| z * scale).collect());
+                    forces.push(force.iter().map(|f| f * scale).collect());
+                }
+            }
+            last = last.end..columns.len();
+        }
+        let m = columns.len();
+        if m == 0 {
+            return out; // every push is in the basis
+        }
+        let stiff = SymmetricEigen::new(DMatrix::from_fn(m, m, |i, j| {
+            0.5 * (dot(&columns[i], &forces[j]) + dot(&columns[j], &forces[i]))
+        }));
+        let kept: Vec<usize> = (0..m).filter(|&k| stiff.eigenvalues[k] > DEPENDENT).collect();
+        let blend = |weights: &dyn Fn(usize) -> f64, of: &[Vec<Pose>]| -> Vec<Pose> {
+            let mut sum = vec![Pose::zeros(); self.q.len()];
+            for (k, x) in of.iter().enumerate() {
+                let weight = weights(k);
+                sum.iter_mut().zip(x).for_each(|(s, x)| *s += x * weight);
+            }
+            sum
+        };
+        let upright: Vec<Vec<Pose>> = (kept.iter())
+            .map(|&k| blend(&|i| stiff.eigenvectors[(i, k)] / stiff.eigenvalues[k].sqrt(), &columns))
+            .collect();
+        let n = upright.len();
+        if n == 0 {
+            return out;
+        }
+        let mass = DMatrix::from_fn(n, n, |i, j| mass_product(model, &upright[i], &upright[j]));
+        let heavy = SymmetricEigen::new((&mass + mass.transpose()) * 0.5);
+        let mut order: Vec<usize> = (0..n).filter(|&k| heavy.eigenvalues[k] > 0.0).collect();
+        order.sort_by(|&i, &j| heavy.eigenvalues[j].total_cmp(&heavy.eigenvalues[i]));
+        for k in order {
+            let inertia = heavy.eigenvalues[k];
+            out.numbers.push(None);
+            out.lambda.push(1.0 / inertia);
+            out.shapes.push(blend(&|i| heavy.eigenvectors[(i, k)] / inertia.sqrt(), &upright));
+        }
+        out
+    }
+}
