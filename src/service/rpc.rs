@@ -161,6 +161,7 @@ impl proto::bimorph_server::Bimorph for Calls {
     async fn linearize(&self, request: Request<proto::LinearizeRequest>) -> Reply<proto::LinearizeResponse> {
         let request = request.into_inner();
         let session = self.0.sessions.get(&request.session)?;
+        session.bound_small_signals(request.omega.len(), request.noise, &self.0.limits)?;
         let turn = session.turn().await?;
         let job = move || {
             let _turn = turn;

@@ -215,6 +215,27 @@ impl Session {
         }
     }
 
+    /// Checks that so many small-signal answers make a message that may be sent.
+    ///
+    /// # Errors
+    /// RESOURCE_EXHAUSTED.
+    pub(super) fn bound_small_signals(&self, count: usize, noise: bool, limits: &Limits) -> Result<(), Status> {
+        /// What an answer takes beside its numbers.
+        const HEAD: usize = 64;
+        let (ports, signals) = {
+            let opened = self.description.lock().unwrap_or_else(PoisonError::into_inner);
+            (opened.ports.len(), opened.signals.len())
+        };
+        let answers = ports + signals;
+        let numbers = answers.saturating_mul(if noise { answers } else { ports });
+        let bytes = count.saturating_mul(numbers.saturating_mul(2 * size_of::<f64>()).saturating_add(HEAD));
+        if bytes > limits.message_bytes {
+            let got = format!("{bytes} for {count} small-signal answers of {ports} ports and {signals} signals");
+            return Err(status::limit("message_bytes", limits.message_bytes, got));
+        }
+        Ok(())
+    }
+
     /// What the last open said; an empty description before any.
     pub(super) fn opened(&self) -> proto::OpenResponse {
         let device = self.description.lock().unwrap_or_else(PoisonError::into_inner).clone();

@@ -53,7 +53,14 @@ impl TrialStream {
             Some(RequestKind::Attach(attach)) => return Some(self.attach(&attach.session)),
             Some(RequestKind::Trial(trial)) => Question::Trial(trial),
             Some(RequestKind::Accept(accept)) => Question::Accept(Token(accept.token)),
-            Some(RequestKind::Linearize(request)) => Question::Linearize(request),
+            Some(RequestKind::Linearize(request)) => {
+                let limits = &self.shared.limits;
+                let bound = |session: &Arc<Session>| session.bound_small_signals(1, request.noise, limits);
+                if let Some(Err(status)) = self.session.as_ref().map(bound) {
+                    return Some(refused(&status));
+                }
+                Question::Linearize(request)
+            }
             None => return Some(refused(&Status::invalid_argument("a request without a kind"))),
         };
         self.ask(question)

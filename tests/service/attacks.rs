@@ -345,6 +345,32 @@ fn many_ports() {
     });
 }
 
+/// Cross-spectra of thousands of signals, and millions of frequencies in one request: refused before any of it is computed.
+#[test]
+fn many_spectra() {
+    Victim::attacked("noise of 5 000 signals, 4 000 000 frequencies", async |wire| {
+        let model = compiled(wire, chain(40)).await;
+        let open = proto::OpenRequest { model, signals: vec!["n9.y".into(); 5_000], ..Default::default() };
+        let session = wire.open(open).await.expect("opens").into_inner().session;
+        let still = Ask::Trial(proto::TrialRequest { mode: 1, voltages: vec![0.0], ..Default::default() });
+        let attach = Ask::Attach(proto::Attach { session: session.clone() });
+        let noise = |token: u64| Ask::Linearize(proto::SmallSignalRequest { token, omega: 1e5, noise: true });
+        let asked = [attach, still, noise(1)].map(|kind| proto::DeviceRequest { kind: Some(kind) });
+        let mut replies = wire.trial(tokio_stream::iter(asked)).await.expect("a stream").into_inner();
+        let mut last = None;
+        while let Some(reply) = replies.next().await {
+            last = reply.expect("a reply").kind;
+        }
+        let Some(proto::device_reply::Kind::Fault(fault)) = last else { panic!("{last:?}") };
+        assert!(fault.message.starts_with("message_bytes"), "{}", fault.message);
+
+        let request = proto::LinearizeRequest { session, token: 1, omega: vec![1e5; 4_000_000], noise: false };
+        let status = wire.linearize(request).await.expect_err("too many");
+        assert_eq!(status.code(), Code::ResourceExhausted);
+        assert!(status.message().starts_with("message_bytes"), "{}", status.message());
+    });
+}
+
 /// A log that nobody reads, or whose reader is gone, stops nothing.
 #[test]
 fn unread_logs() {

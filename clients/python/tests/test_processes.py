@@ -86,7 +86,9 @@ def test_a_forked_child_does_not_keep_the_server(program: str) -> None:
 
 def test_an_interrupt_in_the_terminal_leaves_the_server(program: str) -> None:
     """Ctrl-C goes to every process of the terminal's group; the owner may catch it and go on."""
+    # where the tests run in the background, interrupts are ignored from the start
     ending = """
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         os.killpg(os.getpgrp(), signal.SIGINT)
         time.sleep(30)

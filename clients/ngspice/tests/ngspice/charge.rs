@@ -67,6 +67,39 @@ fn an_island_keeps_its_charge_for_long() {
     assert!(off < 1e-8, "{off:e}");
 }
 
+/// A ring oscillator that nothing clocks, of two plates and the switches that they move: how often it came round in `stop`
+/// seconds, and the largest departure of the plates' common charge from what was there at the first points, over that.
+fn ring(ngspice: &Path, stop: f64) -> (usize, f64) {
+    let text = std::fs::read_to_string(deck_file("ring_oscillator.cir")).unwrap();
+    assert!(text.contains(".tran 1u 1m uic"));
+    let run = run_text(&text.replace(".tran 1u 1m uic", &format!(".tran 1u {stop:e} uic")), ngspice).unwrap();
+    let plot = run.plot("Transient");
+    let [first, second, behind] = ["v(q1)", "v(q2)", "v(n)"].map(|name| real(plot, name));
+    let start = first[10] + second[10];
+    let off = first[10..].iter().zip(&second[10..]).map(|(a, b)| ((a + b) / start - 1.0).abs()).fold(0.0, f64::max);
+    (behind.windows(2).filter(|v| v[0] < 1.5 && v[1] >= 1.5).count(), off)
+}
+
+/// It oscillates by itself, and keeps its charge within 1e-9 at ngspice's default tolerances, over 100 cycles.
+#[test]
+fn a_ring_oscillator_keeps_its_charge() {
+    for (version, ngspice) in versions() {
+        let (cycles, off) = ring(&ngspice, 3.8e-3);
+        println!("ngspice {version}: {cycles} cycles, charge kept within {off:e}");
+        assert!((95..110).contains(&cycles) && off < 1e-9, "ngspice {version}: {cycles} {off:e}");
+    }
+}
+
+/// The same over ten thousand cycles, 1e-8: takes minutes.
+#[test]
+#[ignore = "takes minutes"]
+fn a_ring_oscillator_keeps_its_charge_for_long() {
+    let (version, ngspice) = versions().swap_remove(0);
+    let (cycles, off) = ring(&ngspice, 0.3772);
+    println!("ngspice {version}: {cycles} cycles, charge kept within {off:e}");
+    assert!(cycles > 10_000 && off < 1e-8, "{cycles} {off:e}");
+}
+
 /// A voltage that `.ic` gives with `uic` stands on the port from the first point on, and the plate begins in equilibrium
 /// there: 4 V behind 1 PΩ stay 4 V, and k·x = ½εAV²/(g − x)² holds to ngspice's tolerance.
 #[test]

@@ -91,7 +91,7 @@ fn difference(a: &Run, b: &Run) -> (f64, String) {
 
 /// Decks of few points, or of a switch that opens within a step: ngspice's own integration differs between versions by more than what
 /// is compared here. They run here; tests of their own measure them on every version (`steps`, `charge`).
-const OF_THEIR_OWN: [&str; 2] = ["charge_ring.cir", "comb_oscillator.cir"];
+const OF_THEIR_OWN: [&str; 3] = ["charge_ring.cir", "ring_oscillator.cir", "comb_oscillator.cir"];
 
 /// Every deck runs on every version, and the waveforms agree with those of the first.
 #[test]
