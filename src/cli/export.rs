@@ -1,7 +1,7 @@
 //! `bimorph export`: the model as a file for other simulators.
 
 use super::failure::Failure;
-use super::model::{Context, ModelArgs, Named};
+use super::model::{Context, ModelArgs, Named, warn_of};
 use super::output::{check_folder, print, write_page};
 use super::{progress, report, value};
 use bimorph::compile::Compiled;
@@ -115,19 +115,8 @@ impl Export {
         busy.finish_and_clear();
         let fitted = fitted?;
         let pins = Pins::of(&fitted.model.ports, &fitted.model.signals)?;
-        if fitted.error > self.within {
-            let (error, within) = (fitted.error, self.within);
-            eprintln!(
-                "warning: {} modes deviate by {error:.1e}, more than --within {within:.1e}",
-                fitted.model.modes.len()
-            );
-        }
-        if fitted.model.modes.is_empty() {
-            eprintln!(
-                "warning: at this operating point ports and signals see no motion; give a --port voltage, or name NODE.x with \
-                 --ports or --signals"
-            );
-        }
+        let warnings = self.warnings(&fitted);
+        warn_of(&warnings);
         let about = self.about(&compiled, &fitted);
         let text = match self.spice {
             true => spice::write(&fitted, &pins, &name, &about),
@@ -147,10 +136,34 @@ impl Export {
             band_hz: fitted.band,
             unknowns: fitted.unknowns,
             port_voltages_v: Named(&self.bias),
-            context: self.model.context(&compiled),
+            context: self.model.context(&compiled).with(&warnings),
         };
         let json = serde_json::to_string(&document).map_err(|e| Failure::Stdout(e.into()))?;
         print(&(json + "\n"))
+    }
+
+    /// What the file does not say by its numbers.
+    fn warnings(&self, fitted: &Fitted) -> Vec<String> {
+        let mut warnings = Vec::new();
+        if fitted.error > self.within {
+            let (modes, error, within) = (fitted.model.modes.len(), fitted.error, self.within);
+            warnings.push(format!("{modes} modes deviate by {error:.1e}, more than --within {within:.1e}"));
+        }
+        if fitted.model.modes.is_empty() {
+            warnings.push(
+                "at this operating point ports and signals see no motion; give a --port voltage, or name NODE.x with --ports or \
+                 --signals"
+                    .to_owned(),
+            );
+        }
+        if fitted.jumped {
+            warnings.push(
+                "the part pulled in, snapped or buckled on the way to this operating point: the file is about where it went, \
+                 and knows no way back"
+                    .to_owned(),
+            );
+        }
+        warnings
     }
 
     /// Writes the nonlinear model.
@@ -224,6 +237,7 @@ impl Export {
         if fitted.error > 0.0 {
             about.push(format!("  found at {hertz:.4e} Hz from port {port} to {row}"));
         }
+        about.extend(self.warnings(fitted).iter().map(|warning| format!("warning: {warning}")));
         about.extend(model.signals.iter().map(|s| format!("signal {}: 1 V is {:e} {}", s.name, 1.0 / s.scale, s.unit)));
         about
     }

@@ -51,6 +51,8 @@ struct Exact {
     signals: Vec<f64>,
     /// Ports of the device: those of the model, then those that only have a bias.
     opened: usize,
+    /// It jumped on the way to the operating point.
+    jumped: bool,
 }
 
 /// The model, and how good it is.
@@ -68,6 +70,8 @@ pub struct Fitted {
     pub compared: usize,
     /// Mechanical unknowns of the full model.
     pub unknowns: usize,
+    /// The part pulled in, snapped or buckled on the way to the operating point.
+    pub jumped: bool,
 }
 
 /// The reduced model that a request asks for.
@@ -105,7 +109,7 @@ pub fn fit(compiled: &Arc<Compiled>, request: &Request) -> Result<Fitted, Export
             let (error, worst) = deviation(&model, &all, &grid, &answers);
             let band = [grid[0] / TAU, to];
             let unknowns = compiled.parts.system.model.unknowns();
-            Fitted { model, error, worst, band, compared: grid.len(), unknowns }
+            Fitted { model, error, worst, band, compared: grid.len(), unknowns, jumped: exact.jumped }
         };
         let within: Vec<usize> = showing.iter().copied().filter(|&j| hertz(j) <= 1.01 * to).collect();
         let above: Vec<usize> = every.iter().copied().filter(|&j| hertz(j) > 1.01 * to).collect();
@@ -230,7 +234,7 @@ impl Exact {
         let shown = signals.iter().zip(&reply.outputs).map(|(scale, x)| scale * x);
         // −0 is written as 0
         let at_rest = DVector::from_iterator(scales.len() + signals.len(), answered.chain(shown).map(|x| x + 0.0));
-        Ok((Self { device, token, scales, signals, opened: ports.len() }, at_rest))
+        Ok((Self { device, token, scales, signals, opened: ports.len(), jumped: reply.jumped }, at_rest))
     }
 
     /// The exact Δy/Δu in the scales of the circuit.

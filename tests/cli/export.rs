@@ -137,6 +137,17 @@ fn no_motion_is_told() {
     assert!((r / 2400.0 - 1.0).abs() < 1e-9, "{r}");
 }
 
+/// A bias at which the plate has pulled in is told, on the terminal and in the file.
+#[test]
+fn a_jump_is_told() {
+    let bench = bench();
+    let ran = bench.run("export plate.net --spice --port drive=12");
+    assert_eq!(ran.status, 0, "{}", ran.stderr);
+    let told = "the part pulled in, snapped or buckled on the way to this operating point";
+    assert!(ran.stderr.contains(told) && ran.stdout.contains(&format!("* warning: {told}")), "{}", ran.stderr);
+    assert!(!bench.run("export plate.net --spice --port drive=1").stderr.contains(told));
+}
+
 /// What cannot be written is refused with one message that names it and a way out.
 #[test]
 fn refusals() {
