@@ -5,7 +5,7 @@
 //! ```text
 //! S_F(f) = 4·k_B·T·C·sinc²(f·τ)        sinc x = sin πx/(πx)
 //! ```
-//! flat to 1 % up to an eighth of the band, half of it at 0.89 times the band. Over a step that crosses cells the mean of the
+//! flat to 1 % up to a tenth of the band, half of it at 0.89 times the band. Over a step that crosses cells the mean of the
 //! force acts, which is the same push. The numbers of a cell follow from the seed and the cell's place alone: a
 //! step that is taken again, in other pieces, in another process, meets the same force, and trials stay pure.
 
@@ -44,6 +44,9 @@ pub(super) struct Shaken {
     size: f64,
     /// Force of one cell.
     force: Vec<Pose>,
+    /// Mean force over the step that begins and lasts so: Newton's iteration asks for one step several times.
+    mean: Vec<Pose>,
+    over: Option<(f64, f64)>,
 }
 
 /// A normally distributed number of variance 1 (G. E. P. Box, M. E. Muller, Ann. Math. Statist. 29, 1958), to 2⁻⁵³ of a turn.
@@ -78,22 +81,31 @@ impl Shaken {
         }
         let cell = 0.5 / band;
         let size = (2.0 * BOLTZMANN * temperature / cell).sqrt();
-        Ok(Self { seed: asked.seed, cell, size, force: vec![Pose::zeros(); compiled.parts.system.bodies()] })
+        let still = vec![Pose::zeros(); compiled.parts.system.bodies()];
+        Ok(Self { seed: asked.seed, cell, size, force: still.clone(), mean: still, over: None })
     }
 
-    /// The mean force over the `dt` seconds from `start` goes to `out`; or the longest step that may be taken.
+    /// The mean force over the last step that [`Shaken::over`] was told.
+    pub(super) fn mean(&self) -> &[Pose] {
+        &self.mean
+    }
+
+    /// Finds the mean force over the `dt` seconds from `start`; or the longest step that may be taken.
     ///
     /// # Errors
     /// That step [s].
-    pub(super) fn mean(&mut self, compiled: &Compiled, start: f64, dt: f64, out: &mut Vec<Pose>) -> Result<(), f64> {
+    pub(super) fn over(&mut self, compiled: &Compiled, start: f64, dt: f64) -> Result<(), f64> {
+        if self.over == Some((start, dt)) {
+            return Ok(());
+        }
         // times are sums of steps: what a rounding is over the end of a cell is none of the next
         let rounding = 1e-9;
         let (from, to) = (start / self.cell, (start + dt) / self.cell);
         if to - from > MOST_CELLS * (1.0 + rounding) {
             return Err(self.cell);
         }
-        out.clear();
-        out.resize(self.force.len(), Pose::zeros());
+        self.over = None;
+        self.mean.fill(Pose::zeros());
         let (first, last) = ((from + rounding).floor(), (to - rounding).floor());
         let mut cell = first;
         while cell <= last.max(first) {
@@ -103,11 +115,12 @@ impl Shaken {
             numbers.set_stream(cell as u64);
             let system = &compiled.parts.system;
             agitation::force(&system.model, || normal(&mut numbers), &mut self.force);
-            for (out, force) in out.iter_mut().zip(&self.force) {
-                *out += force * (share * self.size);
+            for (mean, force) in self.mean.iter_mut().zip(&self.force) {
+                *mean += force * (share * self.size);
             }
             cell += 1.0;
         }
+        self.over = Some((start, dt));
         Ok(())
     }
 }

@@ -6,7 +6,7 @@
 
 use super::agitation::Shaken;
 use super::look;
-use super::noise::surroundings;
+use super::noise::{Seen, surroundings};
 use super::ports::Ports;
 use super::saved;
 use super::states::{Snapshot, States};
@@ -46,9 +46,8 @@ pub(super) struct Session {
     pub(super) states: States,
     pub(super) first_step: f64,
     pub(super) equilibrium: Equilibrium,
-    /// Thermal agitation, if it was asked for, and its force in this step.
+    /// Thermal agitation, if it was asked for.
     pub(super) shaken: Option<Shaken>,
-    pub(super) push: Vec<Pose>,
     /// Carries ∂motion/∂(final voltage), one for each opened port.
     pub(super) stepper: Adaptive<Formulated>,
     pub(super) motion: Motion,
@@ -61,6 +60,8 @@ pub(super) struct Session {
     pub(super) zeros: Vec<Pose>,
     pub(super) linear: Option<(Token, BlockMatrix<f64, 3>)>,
     pub(super) harmonic: Harmonic,
+    /// What each answer sees of a displacement, about the state that was asked for its noise last.
+    pub(super) seen: Option<(Token, Vec<Seen>)>,
     pub(super) response: Vec<ComplexPose>,
 }
 
@@ -214,7 +215,6 @@ impl Session {
         let session = Self {
             opened: request.clone(),
             shaken,
-            push: Vec::new(),
             stepper: Adaptive::new(system, Formulated::new(system, joints.as_ref(), first_step, &ports.sources)),
             ports,
             signals,
@@ -231,6 +231,7 @@ impl Session {
             zeros: vec![Pose::zeros(); n],
             linear: None,
             harmonic: Harmonic::new(system),
+            seen: None,
             response: vec![ComplexPose::zeros(); n],
         };
         Ok((session, description))

@@ -36,6 +36,25 @@ pub(super) fn surroundings(compiled: &Compiled) -> f64 {
     ambient.into_iter().find(|t| *t > 0.0).unwrap_or(ROOM)
 }
 
+/// What an answer sees of a displacement of each body, and of its rate of change: the same at every frequency.
+#[derive(Debug, Clone)]
+pub(super) struct Seen {
+    place: Vec<Pose>,
+    change: Vec<Pose>,
+}
+
+impl Seen {
+    fn nothing(bodies: usize) -> Self {
+        Self { place: vec![Pose::zeros(); bodies], change: vec![Pose::zeros(); bodies] }
+    }
+
+    /// Of a displacement that swings at `omega` [rad/s].
+    fn at(&self, omega: f64) -> Vec<ComplexPose> {
+        let one = |(place, change): (&Pose, &Pose)| place.zip_map(change, |p, c| Complex::new(p, omega * c));
+        self.place.iter().zip(&self.change).map(one).collect()
+    }
+}
+
 impl Session {
     /// Spectral densities of ports, then signals, about a state: row-major, complex.
     pub(super) fn noise(
@@ -47,18 +66,24 @@ impl Session {
     ) -> Result<(), DeviceError> {
         let own = self.ports.system.clone();
         let system = Self::system(&own, compiled);
-        let electrics = &system.electrics;
-        electrics.apply(&state.sources, &state.rise, &mut self.drive);
         self.factor_about(system, token, state, omega)?;
         let rate = system.frame(&self.drive).map_or(0.0, |frame| frame.rate);
         let (ports, n) = (self.ports.len(), system.bodies());
         let answers = ports + self.signals.len();
         budget::lay_out_matrix(answers, 12 * n + 2 * answers);
 
+        if self.seen.as_ref().is_none_or(|(t, _)| *t != token) {
+            let seen = (0..answers).map(|i| {
+                budget::check();
+                self.seen_by(compiled, system, state, i)
+            });
+            self.seen = Some((token, seen.collect()));
+        }
+        let Some((_, seen)) = &self.seen else { return Err(DeviceError::NotOpen) };
         let mut adjoint: Vec<Vec<ComplexPose>> = Vec::with_capacity(answers);
-        for i in 0..answers {
+        for seen in seen {
             budget::check();
-            let mut h = self.seen(compiled, system, state, i, omega);
+            let mut h = seen.at(omega);
             for (h, body) in h.iter_mut().zip(&system.model.bodies) {
                 if let Some(free) = &body.free {
                     *h = free.map(Complex::from) * *h;
@@ -86,48 +111,43 @@ impl Session {
         Ok(())
     }
 
-    /// What answer `i` sees of a displacement of each body.
-    fn seen(
-        &mut self,
-        compiled: &Compiled,
-        system: &System,
-        state: &Snapshot,
-        i: usize,
-        omega: f64,
-    ) -> Vec<ComplexPose> {
+    /// What answer `i` sees.
+    fn seen_by(&self, compiled: &Compiled, system: &System, state: &Snapshot, i: usize) -> Seen {
+        let mut seen = Seen::nothing(system.bodies());
         let signal = match i.checked_sub(self.ports.len()) {
             Some(signal) => self.signals[signal],
             None => match self.ports.answers[i] {
-                Answer::Current => return self.charge_seen(system, state, self.ports.sources[i], omega),
+                Answer::Current => {
+                    seen.change = self.charge_seen(system, state, self.ports.sources[i]);
+                    return seen;
+                }
                 Answer::Motion(signal) => signal,
-                Answer::Rise(_) | Answer::Nothing => return vec![ComplexPose::zeros(); system.bodies()],
+                Answer::Rise(_) | Answer::Nothing => return seen,
             },
         };
         if matches!(signal, Signal::Temperature(_) | Signal::Prescribed(_)) {
-            return vec![ComplexPose::zeros(); system.bodies()];
+            return seen;
         }
         let (heaters, gaps) = (state.rise.len(), self.drive.volts.len());
         let view = View { q: &state.q, v: &state.v, rise: &state.rise, volts: &self.drive.volts };
         let (cold, off) = (vec![0.0; heaters], vec![0.0; gaps]);
         let mut unit = vec![Pose::zeros(); system.bodies()];
         let still = unit.clone();
-        let mut seen = vec![ComplexPose::zeros(); system.bodies()];
-        for (k, seen) in seen.iter_mut().enumerate() {
+        for k in 0..unit.len() {
             for d in 0..3 {
                 unit[k][d] = 1.0;
                 let place = View { q: &unit, v: &still, rise: &cold, volts: &off };
                 let motion = View { q: &still, v: &unit, rise: &cold, volts: &off };
-                let of = |change: &View<'_>| signal.slope(compiled, &view, change);
-                // rates are iω times displacements
-                seen[d] = Complex::new(of(&place), omega * of(&motion));
+                seen.place[k][d] = signal.slope(compiled, &view, &place);
+                seen.change[k][d] = signal.slope(compiled, &view, &motion);
                 unit[k][d] = 0.0;
             }
         }
         seen
     }
 
-    /// What the current of source `source` sees: iω times the change of its charge, which is minus the force of a volt there.
-    fn charge_seen(&mut self, system: &System, state: &Snapshot, source: usize, omega: f64) -> Vec<ComplexPose> {
+    /// What the charge of source `source` sees of a displacement: minus the force of a volt there.
+    fn charge_seen(&self, system: &System, state: &Snapshot, source: usize) -> Vec<Pose> {
         let mut change = system.electrics.drive();
         change.load = 0.0;
         for (g, volts) in change.volts.iter_mut().enumerate() {
@@ -135,7 +155,8 @@ impl Session {
         }
         let mut force = vec![Pose::zeros(); system.bodies()];
         system.drive_force(&state.q, &self.drive, &change, &mut force);
-        force.iter().map(|f| f.map(|x| Complex::new(0.0, -omega * x))).collect()
+        force.iter_mut().for_each(|f| *f = -*f);
+        force
     }
 
     /// Σ rise·R·I·I of two answers [K·S].

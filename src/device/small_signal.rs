@@ -13,7 +13,7 @@ use crate::solve::frequency::gyroscopic;
 use crate::solve::time::gyration::{held_out, skew};
 
 impl Session {
-    /// Factors the dynamic stiffness about a state, whose drive has been set.
+    /// Sets the drive of a state and factors the dynamic stiffness about it.
     pub(super) fn factor_about(
         &mut self,
         system: &System,
@@ -21,6 +21,7 @@ impl Session {
         state: &Snapshot,
         omega: f64,
     ) -> Result<(), DeviceError> {
+        system.electrics.apply(&state.sources, &state.rise, &mut self.drive);
         if self.linear.as_ref().is_none_or(|(t, _)| *t != token) {
             let mut tangent = BlockMatrix::new(&system.model.pattern);
             system.tangent(&state.q, &self.drive, &mut tangent, &mut self.motion.q);
@@ -46,7 +47,6 @@ impl Session {
         let own = self.ports.system.clone();
         let system = Self::system(&own, compiled);
         let electrics = &system.electrics;
-        electrics.apply(&state.sources, &state.rise, &mut self.drive);
         self.factor_about(system, token, state, omega)?;
         let rate = system.frame(&self.drive).map_or(0.0, |frame| frame.rate);
         let (ports, gaps, heaters) = (self.ports.len(), self.drive.volts.len(), state.rise.len());

@@ -1,6 +1,7 @@
 //! How a trial is answered: a static one by following the parent's equilibrium, a transient one by integrating from the
 //! parent's state; then currents, charges, outputs and their partials from what came out.
 
+use super::agitation::Shaken;
 use super::local::Session;
 use super::ports::Answer;
 use super::shown::Shown;
@@ -103,13 +104,13 @@ impl Session {
         let electrics = &system.electrics;
         if let Some(shaken) = &mut self.shaken {
             let start = parent.map_or(0.0, |p| p.elapsed);
-            if let Err(longest) = shaken.mean(compiled, start, request.dt, &mut self.push) {
+            if let Err(longest) = shaken.over(compiled, start, request.dt) {
                 reply.status = Status::NeedDt(longest);
                 return;
             }
         }
-        let push = std::mem::take(&mut self.push);
-        let ramp = Ramp { electrics, from: &from, to: &self.sources, rise: &self.rise, dt: request.dt, push: &push };
+        let push = self.shaken.as_ref().map_or(&[][..], Shaken::mean);
+        let ramp = Ramp { electrics, from: &from, to: &self.sources, rise: &self.rise, dt: request.dt, push };
         let mut h = parent.map_or(self.first_step, |p| p.next_step);
         let advanced = self.stepper.advance(
             system,
@@ -142,7 +143,6 @@ impl Session {
         ramp.at(request.dt, &mut self.drive);
         self.rise.copy_from_slice(&self.rise_slope);
         let rest = Snapshot::default();
-        self.push = push;
         self.answer(compiled, request, Some((&from, parent.unwrap_or(&rest))), h, reply);
         let cell = self.shaken.as_ref().map_or(f64::INFINITY, |shaken| shaken.cell);
         reply.dt_next = reply.dt_next.min(PROPOSED_STEPS * h).min(cell);
