@@ -234,6 +234,9 @@ impl Device for RemoteDevice {
             return Err(self.closed());
         }
         let answer = self.small_signal(proto::SmallSignalRequest { token: token.0, omega, noise: true })?;
+        if !answer.admittance_re.is_empty() {
+            return Err(self.remote("it is of an earlier version, which knows no noise".into()));
+        }
         wire::noise_from_wire(&answer, reply);
         Ok(())
     }

@@ -185,6 +185,8 @@ class Session:
         by default the accepted one, and their cross-spectra: each with nothing else changed, as the current [A²/Hz] of a port
         whose voltage is held, or the displacement [m²/Hz] of ``NODE.x``."""
         answer = self._small_signal(omega, reply, noise=True)
+        if answer.admittance_re:
+            raise BimorphError("the server is of an earlier version, which knows no noise")
         values = [complex(re, im) for re, im in zip(answer.noise_re, answer.noise_im)]
         names = (*self.ports, *self.signals)
         return _matrix(names, names, values)
