@@ -125,7 +125,7 @@ impl Export {
         let Some(path) = &self.out else { return print(&text) };
         write_page(path, &text)?;
         if !self.json {
-            return print(&summary(&fitted, &pins, &name));
+            return print(&(summary(&fitted, &pins, &name) + &mesh(&compiled) + "\n"));
         }
         let document = Document {
             name: &name,
@@ -224,6 +224,7 @@ impl Export {
             format!("{}, linear about the operating point, written by bimorph {version} export", self.model.title()),
             format!("operating point: {at}"),
             format!("full model: {} unknowns, {}", fitted.unknowns, report::options(compiled).trim_end()),
+            mesh(compiled),
             format!(
                 "kept: {} modes, {} lags of heat, static correction for the rest",
                 model.modes.len(),
@@ -248,6 +249,14 @@ fn quality(fitted: &Fitted, mode: usize) -> f64 {
 }
 
 /// What was written, for a person.
+/// How far the full model itself may be off by its mesh.
+fn mesh(compiled: &Compiled) -> String {
+    match compiled.order.estimated_error {
+        Some(error) => format!("frequencies of the full model: off by {error:.1e} at most in the band, by its mesh"),
+        None => "frequencies of the full model: nothing tells how far its mesh is off; --band HZ does".to_owned(),
+    }
+}
+
 fn summary(fitted: &Fitted, pins: &Pins, name: &str) -> String {
     let model = &fitted.model;
     let row = |(j, mode): (usize, &bimorph::export::linear::Mode)| {
