@@ -1,7 +1,7 @@
 //! Bimorph: behavioural device models of electro-mechanical microsystems, for circuits.
 //!
 //! # Layout
-//! Data flows one way. A [`netlist`] describes what was drawn; it becomes a [`structure`] (materials, beams, plates,
+//! Data flows one way. A [`netlist`] describes what was drawn ([`layout`] reads masks); it becomes a [`structure`] (materials, beams, plates,
 //! anchors, gaps, combs, ports, all in SI). [`options`] is the one table of what a model may be told. `discretize` turns beams into rigid bodies and flexible joints;
 //! `multibody` holds those bodies and the O(n+m) recursion over them; `gaps` are the forces and rest offsets that
 //! heat and voltage cause. `solve` advances or balances a model, [`refine`] chooses how fine it must be, [`analysis`]
@@ -23,6 +23,7 @@ pub mod equations;
 pub mod export;
 pub mod gaps;
 pub mod jobs;
+pub mod layout;
 pub mod multibody;
 pub mod netlist;
 pub mod options;

@@ -1,0 +1,391 @@
+//! What the layers of a drawing are: the process file.
+//!
+//! TOML, all numbers SI; docs/layout.md describes it. Two processes travel inside the program ([`Process::builtin`]).
+
+use serde::Deserialize;
+use std::collections::BTreeMap;
+
+/// Processes inside the program, by name.
+const BUILTIN: [(&str, &str); 2] =
+    [("polymumps", include_str!("processes/polymumps.toml")), ("soi", include_str!("processes/soi.toml"))];
+
+/// Longest process file [bytes].
+const LONGEST: usize = 1 << 20;
+/// Most layers of one process.
+const MOST_LAYERS: usize = 256;
+/// A layer thicker than this was not written in metres [m].
+const THICKEST: f64 = 1e-2;
+
+/// A layer stack.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Process {
+    /// Its name.
+    pub name: String,
+    /// One line about it.
+    pub about: String,
+    /// Layers that move, in file order.
+    pub layers: Vec<Layer>,
+    /// Layers that hold still: wiring and electrodes under the others.
+    pub fixed: Vec<Fixed>,
+    /// Metal on top of layers; none: the process has none.
+    pub metal: Option<Metal>,
+    /// Drawn layers that do not change a model.
+    pub ignored: Vec<String>,
+}
+
+/// A layer that moves.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Layer {
+    /// Name of the netlist's `process` that is made of it.
+    pub name: String,
+    /// Drawn layers it consists of, by any of their names.
+    pub drawn: Vec<String>,
+    /// Thickness [m].
+    pub thickness: f64,
+    /// Constants of its material under the names that netlists have (`Youngsmodulus`, `density` …), SI.
+    pub material: BTreeMap<String, f64>,
+    /// Thickness of the gas film under it [m]; none: no damping.
+    pub fluid: Option<f64>,
+    /// What holds it.
+    pub anchoring: Anchoring,
+    /// Drawn layers where it is taken away (etch holes drawn as such).
+    pub holes: Vec<String>,
+    /// Drawn layers of metal on it.
+    pub metal: Vec<String>,
+    /// Largest hole that is an etch hole and is filled for the model, with its share kept as porosity [m].
+    pub largest_hole: f64,
+}
+
+/// What holds a layer. Where one of the `drawn` layers is in the drawing, it alone counts; else what is not `released`; else what
+/// an `undercut` leaves.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Anchoring {
+    /// Drawn layers under which it is fixed to the wafer.
+    pub drawn: Vec<String>,
+    /// Drawn layers over which it is free (a trench from behind); the rest of it is held.
+    pub released: Vec<String>,
+    /// How far the etchant reaches under an edge [m]: what is wider than twice this is held.
+    pub undercut: Option<f64>,
+}
+
+/// A layer that holds still.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Fixed {
+    /// Its name.
+    pub name: String,
+    /// Drawn layers it consists of.
+    pub drawn: Vec<String>,
+    /// Sheet resistance [Ω/square].
+    #[serde(default)]
+    pub sheetresistance: Option<f64>,
+}
+
+/// Metal on top.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Metal {
+    /// Thickness [m].
+    pub thickness: f64,
+    /// Sheet resistance [Ω/square].
+    pub sheetresistance: f64,
+}
+
+/// Why there is no process.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ProcessError {
+    /// Neither a file nor one of those inside.
+    #[error(
+        "there is no process `{name}`: the known ones are {known}; a file of your own is named by its path (ending in .toml)"
+    )]
+    Unknown {
+        /// What was asked for.
+        name: String,
+        /// Names of those inside.
+        known: String,
+    },
+    /// Not TOML, or not a process.
+    #[error("{file}: {message}")]
+    Malformed {
+        /// Name of the file.
+        file: String,
+        /// What is wrong, with line and column.
+        message: String,
+    },
+    /// A number that cannot be.
+    #[error("{file}: {what} is {value}: {expected}")]
+    OutOfRange {
+        /// Name of the file.
+        file: String,
+        /// Which number.
+        what: String,
+        /// Its value.
+        value: f64,
+        /// What it must be.
+        expected: &'static str,
+    },
+    /// A name that leads nowhere, or that is there twice.
+    #[error("{file}: {message}")]
+    Inconsistent {
+        /// Name of the file.
+        file: String,
+        /// What does not fit.
+        message: String,
+    },
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    name: String,
+    #[serde(default)]
+    about: String,
+    material: BTreeMap<String, BTreeMap<String, f64>>,
+    layer: Vec<FileLayer>,
+    #[serde(default)]
+    fixed: Vec<Fixed>,
+    metal: Option<Metal>,
+    #[serde(default)]
+    ignored: Ignored,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(deny_unknown_fields)]
+struct Ignored {
+    #[serde(default)]
+    layers: Vec<String>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FileLayer {
+    name: String,
+    drawn: Vec<String>,
+    thickness: f64,
+    material: String,
+    fluid: Option<f64>,
+    #[serde(default)]
+    anchors: Vec<String>,
+    #[serde(default)]
+    released: Vec<String>,
+    undercut: Option<f64>,
+    #[serde(default)]
+    holes: Vec<String>,
+    #[serde(default)]
+    metal: Vec<String>,
+    largest_hole: Option<f64>,
+}
+
+/// Holes up to this size are etch holes unless the process says otherwise [m]: those of PolyMUMPs and SOI are 3 to 10 µm.
+const LARGEST_HOLE: f64 = 12e-6;
+
+impl Process {
+    /// Names of the processes inside the program.
+    pub fn builtin_names() -> impl Iterator<Item = &'static str> {
+        BUILTIN.iter().map(|(name, _)| *name)
+    }
+
+    /// A process inside the program.
+    ///
+    /// # Errors
+    /// There is none of that name; the message lists them.
+    pub fn builtin(name: &str) -> Result<Self, ProcessError> {
+        let found = BUILTIN.iter().find(|(known, _)| *known == name);
+        let (_, text) = found.ok_or_else(|| ProcessError::Unknown {
+            name: name.to_owned(),
+            known: Self::builtin_names().collect::<Vec<_>>().join(", "),
+        })?;
+        Self::parse(text, name)
+    }
+
+    /// Reads a process file; `file` is its name in messages.
+    ///
+    /// # Errors
+    /// It is not TOML, lacks something, has something unknown, or a number or name that cannot be.
+    pub fn parse(text: &str, file: &str) -> Result<Self, ProcessError> {
+        let malformed = |message: String| ProcessError::Malformed { file: file.to_owned(), message };
+        if text.len() > LONGEST {
+            return Err(malformed(format!("a process file has at most {LONGEST} bytes, this one {}", text.len())));
+        }
+        let read: File = toml::from_str(text).map_err(|e| malformed(e.to_string().trim_end().to_owned()))?;
+        if read.layer.is_empty() || read.layer.len() > MOST_LAYERS {
+            return Err(malformed(format!("expected 1 to {MOST_LAYERS} [[layer]], found {}", read.layer.len())));
+        }
+        let materials = read.material;
+        let layers = read.layer.into_iter().map(|layer| layer.complete(&materials, file));
+        let process = Self {
+            layers: layers.collect::<Result<_, _>>()?,
+            name: read.name,
+            about: read.about,
+            fixed: read.fixed,
+            metal: read.metal,
+            ignored: read.ignored.layers,
+        };
+        process.check(file)?;
+        Ok(process)
+    }
+
+    fn check(&self, file: &str) -> Result<(), ProcessError> {
+        let inconsistent = |message: String| ProcessError::Inconsistent { file: file.to_owned(), message };
+        let mut owners = BTreeMap::new();
+        let drawn =
+            self.layers.iter().map(|l| (&l.name, &l.drawn)).chain(self.fixed.iter().map(|f| (&f.name, &f.drawn)));
+        for (owner, names) in drawn {
+            if !is_name(owner) {
+                return Err(inconsistent(format!(
+                    "a layer is called `{owner}`: expected letters, digits and _, a letter first"
+                )));
+            }
+            for name in names {
+                if let Some(other) = owners.insert(canonical(name), owner) {
+                    return Err(inconsistent(format!(
+                        "the drawn layer `{name}` is both in `{other}` and in `{owner}`"
+                    )));
+                }
+            }
+        }
+        let mut names: Vec<&String> = self.layers.iter().map(|l| &l.name).collect();
+        names.sort();
+        if let Some(twice) = names.windows(2).find(|pair| pair[0] == pair[1]) {
+            return Err(inconsistent(format!("two layers are called `{}`", twice[0])));
+        }
+        Ok(())
+    }
+
+    /// The layer that moves and consists of the drawn layer of that name.
+    pub fn layer_of(&self, drawn: &str) -> Option<&Layer> {
+        self.layers.iter().find(|layer| names(&layer.drawn, drawn))
+    }
+
+    /// What a drawn layer is for, in words; none: the process does not know it.
+    pub fn role_of(&self, drawn: &str) -> Option<&'static str> {
+        let roles = self.layers.iter().flat_map(|l| {
+            [
+                (&l.drawn, "moves"),
+                (&l.anchoring.drawn, "anchors"),
+                (&l.anchoring.released, "releases"),
+                (&l.holes, "holes"),
+                (&l.metal, "metal"),
+            ]
+        });
+        let fixed = self.fixed.iter().map(|f| (&f.drawn, "holds still"));
+        let ignored = [(&self.ignored, "changes nothing")];
+        roles.chain(fixed).chain(ignored).find(|(list, _)| names(list, drawn)).map(|(_, role)| role)
+    }
+}
+
+/// True when a list of layer names has this one in any of its spellings ("L4D0" is "4/0"; CIF names have no case).
+pub fn names(list: &[String], drawn: &str) -> bool {
+    let wanted = canonical(drawn);
+    list.iter().any(|name| canonical(name) == wanted)
+}
+
+/// One spelling for all of a layer's: "L4D0" (how KLayout writes a number as CIF name) and "4" are "4/0", letters are capitals.
+pub fn canonical(layer: &str) -> String {
+    let upper = layer.trim().to_uppercase();
+    let digits = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
+    if digits(&upper) {
+        return format!("{upper}/0");
+    }
+    if let Some((number, datatype)) = upper.strip_prefix('L').and_then(|rest| rest.split_once('D'))
+        && digits(number)
+        && digits(datatype)
+    {
+        return format!("{number}/{datatype}");
+    }
+    upper
+}
+
+fn is_name(text: &str) -> bool {
+    text.starts_with(|c: char| c.is_ascii_alphabetic()) && text.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_')
+}
+
+impl FileLayer {
+    fn complete(self, materials: &BTreeMap<String, BTreeMap<String, f64>>, file: &str) -> Result<Layer, ProcessError> {
+        let Some(material) = materials.get(&self.material) else {
+            let known: Vec<&str> = materials.keys().map(String::as_str).collect();
+            let message = format!(
+                "layer `{}` is of `{}`, which is no [material.NAME] of this file; there are: {}",
+                self.name,
+                self.material,
+                known.join(", ")
+            );
+            return Err(ProcessError::Inconsistent { file: file.to_owned(), message });
+        };
+        let length = |what: &str, value: Option<f64>| match value {
+            Some(v) if !(v > 0.0 && v <= THICKEST) => Err(ProcessError::OutOfRange {
+                file: file.to_owned(),
+                what: format!("{what} of layer `{}`", self.name),
+                value: v,
+                expected: "expected metres, above 0 and at most 1e-2 (2 um are 2e-6)",
+            }),
+            other => Ok(other),
+        };
+        let finite = |(name, value): (&String, &f64)| match value.is_finite() {
+            true if is_name(name) => Ok(()),
+            true => Err(ProcessError::Inconsistent {
+                file: file.to_owned(),
+                message: format!("material `{}` has an entry `{name}`: expected a name as in netlists", self.material),
+            }),
+            false => Err(ProcessError::OutOfRange {
+                file: file.to_owned(),
+                what: format!("{name} of material `{}`", self.material),
+                value: *value,
+                expected: "expected a finite number",
+            }),
+        };
+        material.iter().try_for_each(finite)?;
+        length("thickness", Some(self.thickness))?;
+        let (fluid, undercut) = (length("fluid", self.fluid)?, length("undercut", self.undercut)?);
+        let largest_hole = length("largest_hole", self.largest_hole)?.unwrap_or(LARGEST_HOLE);
+        Ok(Layer {
+            name: self.name,
+            drawn: self.drawn,
+            thickness: self.thickness,
+            material: material.clone(),
+            fluid,
+            anchoring: Anchoring { drawn: self.anchors, released: self.released, undercut },
+            holes: self.holes,
+            metal: self.metal,
+            largest_hole,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! Process files say what layers are, in every spelling of their names; a wrong one is one error with its place.
+    use super::*;
+
+    #[test]
+    fn those_inside_are_right() {
+        for name in Process::builtin_names() {
+            assert_eq!(Process::builtin(name).unwrap().name, name);
+        }
+        let p = Process::builtin("polymumps").unwrap();
+        for spelling in ["POLY1", "poly1", "45/0", "45", "L45D0", "CPS"] {
+            assert_eq!(p.layer_of(spelling).unwrap().name, "p1", "{spelling}");
+        }
+        assert_eq!(p.role_of("L43D0"), Some("anchors"));
+        assert_eq!(p.role_of("99/0"), None);
+        let error = Process::builtin("mumps").unwrap_err().to_string();
+        assert!(error.contains("polymumps, soi"), "{error}");
+    }
+
+    #[test]
+    fn errors_say_what_and_where() {
+        let text = BUILTIN[1].1;
+        let cases = [
+            (text.replace("thickness = 25e-6", "thickness = 25"), "2 um are 2e-6"),
+            (text.replace("material = \"silicon\"", "material = \"poly\""), "there are: silicon"),
+            (text.replace("undercut = 6e-6", "undercot = 6e-6"), "undercot"),
+            (text.replace("\"DEVICE\"", "\"soi\""), "both in"),
+            (text.replace("name = \"soi\"", "name = "), "line 3"),
+        ];
+        for (changed, expected) in cases {
+            let error = Process::parse(&changed, "x.toml").unwrap_err().to_string();
+            assert!(error.contains(expected) && error.starts_with("x.toml"), "{error}");
+        }
+    }
+}
