@@ -65,11 +65,13 @@ pub struct Placement {
 }
 
 impl Polygon {
-    /// A polygon without holes, turned counter-clockwise.
+    /// A polygon without holes, turned counter-clockwise and beginning with its leftmost, then lowest point.
     pub fn from_contour(mut contour: Vec<Point>) -> Self {
         if twice_area(&contour) < 0 {
             contour.reverse();
         }
+        let first = (0..contour.len()).min_by_key(|k| contour[*k]).unwrap_or(0);
+        contour.rotate_left(first);
         Self { contours: vec![contour] }
     }
 
@@ -137,7 +139,7 @@ mod tests {
         assert_eq!(ring.twice_area(), 2 * (100 - 4));
         let m = LARGEST_COORDINATE;
         assert_eq!(Polygon::rectangle([-m, -m], [m, m]).twice_area(), 8 * i128::from(m) * i128::from(m));
-        assert_eq!(Polygon::from_contour(vec![[0, 0], [0, 1], [1, 0]]).contours[0][0], [1, 0]);
+        assert_eq!(Polygon::from_contour(vec![[1, 0], [0, 0], [0, 1]]).contours[0], [[0, 0], [1, 0], [0, 1]]);
         assert_eq!(ring.extent(), Some([[0, 0], [10, 10]]));
     }
 }

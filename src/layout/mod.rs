@@ -4,9 +4,17 @@
 //! set operations on such polygons. A [`Process`] says what the layers are: which ones move, how thick they are and of
 //! what, and what holds them.
 
+mod cells;
+pub mod cif;
 pub mod drawing;
+pub mod flatten;
+pub mod gds;
+mod outline;
 pub mod process;
+pub mod read;
 pub mod regions;
+mod simple;
 
 pub use drawing::{Drawing, Label, Placement, Polygon};
 pub use process::{Anchoring, Layer, Process, ProcessError};
+pub use read::{Format, LayoutError, from_bytes, from_file};

@@ -9,6 +9,7 @@ use i_overlay::core::fill_rule::FillRule;
 use i_overlay::core::overlay::{Overlay, ShapeType};
 use i_overlay::core::overlay_rule::OverlayRule;
 use i_overlay::i_float::int::point::IntPoint;
+use i_overlay::i_shape::int::shape::IntShapes;
 
 /// All that lies in at least one of the polygons.
 pub fn union(polygons: &[Polygon]) -> Vec<Polygon> {
@@ -35,14 +36,25 @@ pub fn area(polygons: &[Polygon]) -> f64 {
     twice_area_of(polygons) as f64 / 2.0
 }
 
+/// What one contour encloses, whatever its direction and crossings.
+pub(super) fn enclosed(contour: &[Point], rule: FillRule) -> Vec<Polygon> {
+    let mut overlay = Overlay::<i32>::new(contour.len());
+    overlay.add_path_iter(contour.iter().map(|[x, y]| IntPoint::new(*x, *y)), ShapeType::Subject);
+    in_order(overlay.overlay(OverlayRule::Subject, rule))
+}
+
 fn combine(a: &[Polygon], b: &[Polygon], rule: OverlayRule) -> Vec<Polygon> {
     let points = a.iter().chain(b).flat_map(|p| &p.contours).map(Vec::len).sum();
     let mut overlay = Overlay::<i32>::new(points);
     add(&mut overlay, a, ShapeType::Subject);
     add(&mut overlay, b, ShapeType::Clip);
+    in_order(overlay.overlay(rule, FillRule::NonZero))
+}
+
+/// Directions, first points and the order of shapes are made one whatever the order of input.
+fn in_order(shapes: IntShapes<i32>) -> Vec<Polygon> {
     let point = |p: &IntPoint<i32>| -> Point { [p.x, p.y] };
-    let mut shapes: Vec<Polygon> = overlay
-        .overlay(rule, FillRule::NonZero)
+    let mut shapes: Vec<Polygon> = shapes
         .into_iter()
         .map(|shape| Polygon { contours: shape.iter().map(|contour| contour.iter().map(point).collect()).collect() })
         .collect();
