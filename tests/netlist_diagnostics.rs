@@ -113,8 +113,8 @@ fn element_heads() {
     error("anchor parent [a] []", "E031", (1, 8), 6, message, "`parent` is known inside subnets only");
     let message = "`beam2d` takes 2 nodes, 3 given";
     error("anchor p1 [a] []\nbeam2d p1 [a b c] [l=1u w=1u]", "E054", (2, 11), 7, message, "write `beam2d LAYER [a b]`");
-    let reason = "draw the curved beam as a chain of short `beam2d`";
-    error("circbeam * [a b] []", "E056", (1, 1), 8, "the element `circbeam` is not supported", reason);
+    let reason = "it is in SUGAR's manual only; use `gap2d` or `gap2dforce`";
+    error("gapV2 * [a b] []", "E056", (1, 1), 5, "the element `gapV2` is not supported", reason);
 }
 
 /// Variables, functions, types and whole numbers.

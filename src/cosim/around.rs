@@ -200,6 +200,8 @@ fn sources(structure: &Structure, wanted: &Around) -> Result<Option<String>, Aro
     match &wanted.source {
         Some(name) if all.contains(&name.as_str()) => Ok(Some(name.clone())),
         Some(name) => Err(AroundError::Unknown { what: "source", name: name.clone(), available: listed(&all) }),
+        // what the netlist itself says of small signals holds
+        None if structure.circuit.iter().any(|e| e.small_signal.is_some()) => Ok(None),
         None => Ok(all.first().map(|name| (*name).to_owned())),
     }
 }
@@ -226,8 +228,13 @@ fn line(
     };
     let at = |n: usize| node(element.nodes[n]);
     let name = names.take(&format!("{letter}_{}", element.name));
+    let small = match element.small_signal {
+        Some([amplitude, phase]) => format!(" ac {amplitude:e} {:e}", phase.to_degrees()),
+        None if ac => " ac 1".to_owned(),
+        None => String::new(),
+    };
     let (dc, ac) = match element.kind {
-        CircuitKind::VoltageSource | CircuitKind::CurrentSource => ("dc ", if ac { " ac 1" } else { "" }),
+        CircuitKind::VoltageSource | CircuitKind::CurrentSource => ("dc ", small.as_str()),
         _ => ("", ""),
     };
     Ok(match element.kind {

@@ -56,7 +56,7 @@ fn facts(drawing: &Drawing, sink: &mut Sink) {
             Fact::OutOfPlane => (
                 "W030",
                 format!("the model is planar: out-of-plane bending and torsion are left out ({elements})"),
-                "write `beam2d` to say that this is meant",
+                "write `beam2d` (of arcs, `arc2d`) to say that this is meant",
             ),
             Fact::StrainGradient => (
                 "W031",
@@ -107,6 +107,49 @@ fn facts(drawing: &Drawing, sink: &mut Sink) {
                 "W021",
                 format!("capacitors are open here and left out ({elements})"),
                 "`bimorph cosim` runs the netlist's circuit as it is",
+            ),
+            Fact::Switch => (
+                "W021",
+                format!("switches are open here and left out, as SUGAR's, which have no equation ({elements})"),
+                "replace a closed one by `short`",
+            ),
+            Fact::BetweenAnchors => (
+                "W038",
+                format!("members out of the drawing plane between anchored nodes are left out ({elements})"),
+                "they hold nothing that moves in the plane",
+            ),
+            Fact::Post => (
+                "W038",
+                format!(
+                    "posts normal to the drawing plane are taken as rigid; across, this one has {number} N/m ({elements})"
+                ),
+                "what lies above each other moves together; compare with the stiffness of what it carries",
+            ),
+            Fact::TrialGap => (
+                "W039",
+                format!(
+                    "the field of this gap is that of `gap2de`; SUGAR's trial model has fixed sizes (100 µm by 20 µm) and conducts by R_insulator where it closes ({elements})"
+                ),
+                "write `gap2de` to say that this is meant",
+            ),
+            Fact::AnchorNodes => (
+                "W039",
+                format!("every node of an anchor is held; SUGAR holds the first alone ({elements})"),
+                "give each its own `anchor`",
+            ),
+            Fact::Trapezoid => (
+                "W039",
+                format!(
+                    "a trapezoid has its whole thickness here: area and second moment of SUGAR's macro are a third ({elements})"
+                ),
+                "for SUGAR's, write `beam3d` with the mean width and `h` a third",
+            ),
+            Fact::ArmsPlace => (
+                "W039",
+                format!(
+                    "SUGAR places the second node as if there were no arms; this one is {number} m long ({elements})"
+                ),
+                "`rigidlinkbeamcloaked` is placed alike in both",
             ),
             Fact::ActiveCircuit => (
                 "W022",

@@ -58,6 +58,20 @@ pub(crate) enum Fact {
     Capacitor,
     /// Current sources and amplifiers, which take no part in the model.
     ActiveCircuit,
+    /// Switches, which are open.
+    Switch,
+    /// Members out of the plane that join anchored nodes.
+    BetweenAnchors,
+    /// Members normal to the plane that are taken as rigid; the number is the stiffness across one of them [N/m].
+    Post,
+    /// Gaps of models that SUGAR's tree holds as trials.
+    TrialGap,
+    /// Nodes after the first of an anchor.
+    AnchorNodes,
+    /// Trapezoidal sections.
+    Trapezoid,
+    /// rigidlinkbeam with arms; the number is the longest arm [m].
+    ArmsPlace,
 }
 
 /// A fact with where it was first met, how often, and its number there (a temperature, a conductivity).
@@ -69,12 +83,28 @@ pub(crate) struct Noted {
     pub(crate) number: f64,
 }
 
+/// A member that leaves the drawing plane.
+#[derive(Debug, Clone)]
+pub(crate) struct Upright {
+    pub(crate) span: Span,
+    pub(crate) name: String,
+    pub(crate) nodes: [NodeId; 2],
+    /// Normal to the plane and stouter than long.
+    pub(crate) post: bool,
+    /// What it would be across as a cantilever [N/m].
+    pub(crate) stiffness: f64,
+    /// Its axis lies in the plane, its section is askew.
+    pub(crate) tilted: bool,
+}
+
 /// Structure, placements and facts gathered while elements are built.
 #[derive(Debug, Default)]
 pub(crate) struct Drawing {
     pub(crate) structure: Structure,
     pub(crate) placements: Vec<Placement>,
     pub(crate) unmeasured: Vec<Unmeasured>,
+    /// Members that leave the plane, until the anchors are known.
+    pub(crate) upright: Vec<Upright>,
     /// In order of appearance.
     pub(crate) facts: Vec<Noted>,
     /// Nodes at electrical ground, and names of ports, so far.

@@ -72,6 +72,10 @@ impl<'p> Elaborator<'p> {
                 (Some(axis), Value::Number(angle)) => {
                     angles[axis] = *angle;
                     self.check_angle(*angle, def.value.span);
+                    // it turns a subnet's instance, and is a parameter besides where the subnet has one of that name
+                    if element.subnet.is_some() {
+                        given.push(Argument { name: &def.name.name, value, span: def.name.span.to(def.value.span) });
+                    }
                 }
                 (Some(_), other) => {
                     let message = format!("`{}` must be a number, this is {}", def.name.name, other.called());

@@ -16,6 +16,7 @@ mod elaborate;
 mod elements;
 mod evaluate;
 mod expression;
+mod foreign;
 mod functions;
 mod instance;
 mod lexer;
@@ -98,6 +99,7 @@ impl Source {
             return Err(sink.finish(bundle));
         }
         let mut elaborated = Elaborator::run(program, set, &mut sink);
+        elements::upright::settle(&mut elaborated.drawing, &mut sink);
         if !sink.failed() {
             place::place(&mut elaborated.drawing, &mut sink);
             check::check(&elaborated.drawing, &mut sink);

@@ -2,6 +2,7 @@
 
 use super::ast::{Ident, Program, Statement};
 use super::bundle::{Bundle, DEEPEST_INCLUDE, MOST_INCLUDES};
+use super::foreign;
 use super::lexer;
 use super::sink::{Reported, Sink};
 use super::source::Span;
@@ -110,10 +111,19 @@ impl<'a> Parser<'a> {
     fn file(&mut self, name: &str, depth: usize, out: &mut Vec<Statement>) {
         let Some(text) = self.bundle.files.get(name) else { return };
         let number = u16::try_from(self.includes).unwrap_or(u16::MAX);
-        if let Some(span) = lua(text, number) {
-            let message = format!("`{name}` looks like a SUGAR 3 (Lua) netlist");
-            self.sink.error("E005", span, message, "only SUGAR 2 netlists are read: rewrite it in that syntax");
-            return;
+        match foreign::kind(text, number) {
+            foreign::Kind::Lua(span) => {
+                let message = format!("`{name}` looks like a SUGAR 3 (Lua) netlist");
+                self.sink.error("E005", span, message, "only SUGAR 2 netlists are read: rewrite it in that syntax");
+                return;
+            }
+            foreign::Kind::Matlab(span) => {
+                let message = format!("`{name}` is a MATLAB file, not a netlist");
+                let help = "a netlist is what such a file loads with `cho_load`: name that one";
+                self.sink.error("E006", span, message, help);
+                return;
+            }
+            foreign::Kind::Netlist => {}
         }
         let tokens = lexer::tokens(number, text, self.sink);
         let outer = (
@@ -250,18 +260,4 @@ impl<'a> Parser<'a> {
         self.depth -= 1;
         result
     }
-}
-
-/// The first line that only a SUGAR 3 netlist can have: `use(…)`, or a `--` comment.
-fn lua(text: &str, file: u16) -> Option<Span> {
-    let mut start = 0;
-    for line in text.split_inclusive('\n') {
-        let body = line.trim_start();
-        if body.starts_with("use(") || body.starts_with("use (") || body.starts_with("--") {
-            let at = |offset: usize| u32::try_from(offset).unwrap_or(u32::MAX);
-            return Some(Span { file, start: at(start), end: at(start + line.trim_end().len()) });
-        }
-        start += line.len();
-    }
-    None
 }

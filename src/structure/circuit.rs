@@ -34,6 +34,9 @@ pub struct CircuitElement {
     pub nodes: Vec<NodeId>,
     /// Its value, in the unit of its kind; none where the netlist gives none.
     pub value: Option<f64>,
+    /// Amplitude [V] and phase [rad] in small-signal analyses, of voltage sources that give them.
+    #[serde(default)]
+    pub small_signal: Option<[f64; 2]>,
 }
 
 impl Structure {

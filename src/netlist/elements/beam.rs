@@ -1,10 +1,9 @@
-//! Beams: beam2d, beam3d, beams with rigid arms, and beams that conduct.
+//! Straight beams: beam2d, beam3d and its kin, and beams that conduct.
 
 use super::super::drawing::Fact;
-use super::super::rotation::Rotation;
 use super::super::sink::Reported;
 use super::arguments::Site;
-use crate::structure::{Beam, Heater, Link, Load, NodeId, Resistor, Yield};
+use crate::structure::{Beam, Heater, Load, NodeId, Resistor, Yield};
 
 /// A layer's `thermcond` below this is no conductivity of a solid structural material [W/(m·K)]. The MUMPs process
 /// file of SUGAR has 2.33, which is the digits of silicon's expansion coefficient.
@@ -33,7 +32,13 @@ impl Site<'_, '_> {
     }
 
     /// A beam between two nodes; without a length it is measured from the node positions.
-    fn beam(&mut self, name: String, ends: [NodeId; 2], width: f64, length: Option<f64>) -> Result<Beam, Reported> {
+    pub(super) fn beam(
+        &mut self,
+        name: String,
+        ends: [NodeId; 2],
+        width: f64,
+        length: Option<f64>,
+    ) -> Result<Beam, Reported> {
         let section = self.section(width)?;
         let material = self.material()?;
         let temperature = self.temperature(&material)?;
@@ -54,6 +59,12 @@ impl Site<'_, '_> {
     /// Adds a beam of the element's own `l` and the given width.
     pub(super) fn add_beam(&mut self, name: String, ends: [NodeId; 2], width: f64) -> Result<(), Reported> {
         let length = self.positive_if_any("l")?;
+        if let Some(length) = length
+            && self.leaves_plane()
+        {
+            let offset = self.instance.rotation.apply([length, 0.0, 0.0]);
+            return self.upright(name, ends, width, offset);
+        }
         let beam = self.beam(name, ends, width, length)?;
         self.bow(&beam)?;
         self.drawing.add_beam(self.instance.span, beam, length.is_some());
@@ -116,6 +127,17 @@ pub(super) fn beam3de(site: &mut Site<'_, '_>) -> Result<(), Reported> {
     beam2de(site)
 }
 
+/// beam2de_b: a resistor of Rs·l/w along a beam.
+pub(super) fn beam2de_b(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+    let (a, b) = (site.node(0), site.node(1));
+    let (length, width) = (site.positive("l")?, site.positive("w")?);
+    let resistance = site.positive("Rs")? * length / width;
+    site.add_beam(site.name(), [a, b], width)?;
+    site.drawing.electrical(&[a, b]);
+    site.drawing.structure.resistors.push(Resistor { name: site.name(), a, b, resistance });
+    Ok(())
+}
+
 /// The electro-thermal beam.
 pub(super) fn beam2det(site: &mut Site<'_, '_>) -> Result<(), Reported> {
     let (a, b) = (site.node(0), site.node(1));
@@ -153,46 +175,4 @@ pub(super) fn beam2det(site: &mut Site<'_, '_>) -> Result<(), Reported> {
     site.bow(&beam)?;
     site.drawing.add_beam(site.instance.span, beam, true);
     Ok(())
-}
-
-/// beam3dlink and its kin: a beam between two rigid arms.
-pub(super) fn beam3dlink(site: &mut Site<'_, '_>) -> Result<(), Reported> {
-    site.drawing.note(Fact::OutOfPlane, site.instance.span);
-    let width = site.positive("w")?;
-    site.positive("l")?;
-    let (a, b) = (site.node(0), site.node(1));
-    let start = site.arm(1, "start")?;
-    let end = site.arm(2, "end")?;
-    let p = start.map_or(a, |(node, _)| node);
-    let q = end.map_or(b, |(node, _)| node);
-    if let Some((node, arm)) = start {
-        site.add_link(format!("{}.arm1", site.instance.name), a, node, arm);
-    }
-    site.add_beam(site.name(), [p, q], width)?;
-    if let Some((node, arm)) = end {
-        site.add_link(format!("{}.arm2", site.instance.name), node, b, arm);
-    }
-    Ok(())
-}
-
-impl Site<'_, '_> {
-    /// Arm `number` of a beam3dlink: the node between it and the beam, and the arm's vector [m]; none without a length.
-    fn arm(&mut self, number: usize, end: &str) -> Result<Option<(NodeId, [f64; 2])>, Reported> {
-        let length = self.non_negative_or(if number == 1 { "L1" } else { "L2" }, 0.0)?;
-        if length == 0.0 {
-            return Ok(None);
-        }
-        let [ox, oy, oz] = [format!("ox{number}"), format!("oy{number}"), format!("oz{number}")];
-        let (ox, oy, oz) = (self.number_or(&ox, 0.0)?, self.number_or(&oy, 0.0)?, self.number_or(&oz, 0.0)?);
-        let turned: Rotation = self.instance.rotation.turned(ox, oy, oz);
-        let angle = self.direction(turned)?;
-        let node = self.drawing.add_node(format!("{}.{end}", self.instance.name), self.instance.span);
-        Ok(Some((node, [length * angle.cos(), length * angle.sin()])))
-    }
-
-    /// Adds a rigid, massless link whose second node lies at `offset` [m] from the first.
-    pub(super) fn add_link(&mut self, name: String, a: NodeId, b: NodeId, offset: [f64; 2]) {
-        self.drawing.place(self.instance.span, &[a, b], &[[0.0; 2], offset]);
-        self.drawing.structure.links.push(Link { name, a, b });
-    }
 }

@@ -29,16 +29,73 @@ pub(super) fn voltage_source(site: &mut Site<'_, '_>) -> Result<(), Reported> {
         let help = "make it a `port` and let the circuit drive it";
         return Err(site.sink.error("E062", v.span, "a source of a netlist cannot change in time".into(), help));
     }
-    let voltage = site.required("V")?;
+    // a source of small signals alone gives nothing at rest
+    let small = [site.number("sv")?, site.number("sph")?];
+    let voltage = if small == [None; 2] { site.required("V")? } else { site.number_or("V", 0.0)? };
     draw(site, CircuitKind::VoltageSource, Some(voltage));
+    if small != [None; 2]
+        && let Some(element) = site.drawing.structure.circuit.last_mut()
+    {
+        element.small_signal = Some([small[0].unwrap_or(1.0), small[1].unwrap_or(0.0)]);
+    }
     source(site, voltage)
+}
+
+/// The elements of Clark's circuits for SUGAR are drawn too: between arms, `len` long, without being members.
+fn drawn(site: &mut Site<'_, '_>, build: fn(&mut Site<'_, '_>) -> Result<(), Reported>) -> Result<(), Reported> {
+    if let Some(length) = site.number("len")? {
+        let (first, second) = (site.arm(1)?, site.arm(2)?);
+        let along = site.instance.rotation.apply([length, 0.0, 0.0]);
+        let way = [0, 1].map(|i| first[i] + along[i] + second[i]);
+        site.drawing.lay(site.instance.span, &[site.node(0), site.node(1)], &[[0.0; 2], way]);
+    }
+    build(site)
+}
+
+pub(super) fn drawn_resistor(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+    drawn(site, resistor)
+}
+
+pub(super) fn drawn_capacitor(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+    drawn(site, capacitor)
+}
+
+pub(super) fn drawn_inductor(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+    drawn(site, inductor)
+}
+
+pub(super) fn drawn_source(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+    drawn(site, voltage_source)
+}
+
+/// A wire that is drawn: its nodes are at one potential.
+pub(super) fn drawn_short(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+    drawn(site, |site| {
+        draw(site, CircuitKind::VoltageSource, Some(0.0));
+        source(site, 0.0)
+    })
+}
+
+/// A switch. SUGAR draws it and gives it no equation: it is open.
+pub(super) fn drawn_switch(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+    drawn(site, |site| {
+        let nodes = site.instance.nodes.clone();
+        site.drawing.electrical(&nodes);
+        site.drawing.note(Fact::Switch, site.instance.span);
+        Ok(())
+    })
+}
+
+/// Ground at the first node; the second is where its picture ends.
+pub(super) fn drawn_ground(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+    drawn(site, eground)
 }
 
 /// Keeps an element as drawn.
 fn draw(site: &mut Site<'_, '_>, kind: CircuitKind, value: Option<f64>) {
     let nodes = site.instance.nodes.to_vec();
     site.drawing.electrical(&nodes);
-    site.drawing.structure.circuit.push(CircuitElement { name: site.name(), kind, nodes, value });
+    site.drawing.structure.circuit.push(CircuitElement { name: site.name(), kind, nodes, value, small_signal: None });
 }
 
 /// A current source, from the first node through it to the second. It takes no part in the model.

@@ -70,6 +70,14 @@ impl Site<'_, '_> {
         self.add_beam(format!("{}.lower", self.instance.name), [self.node(2), self.node(3)], w2)
     }
 
+    /// The resistance of one of the two beams, from the node `end` to the next.
+    fn add_resistor(&mut self, end: usize, part: &str, resistance: f64) {
+        let (a, b) = (self.node(end), self.node(end + 1));
+        let name = format!("{}.{part}", self.instance.name);
+        self.drawing.electrical(&[a, b]);
+        self.drawing.structure.resistors.push(Resistor { name, a, b, resistance });
+    }
+
     /// The potential difference of the nodes `i` and `j`.
     pub(super) fn across(&mut self, i: usize, j: usize) -> GapVoltage {
         let (a, b) = (self.node(i), self.node(j));
@@ -98,11 +106,19 @@ pub(super) fn gap2de(site: &mut Site<'_, '_>) -> Result<(), Reported> {
         let own = site.is_given(r) || site.is_given(g);
         let (r, g) = if own { (r, g) } else { ("R", "G") };
         let resistance = site.resistance(r, g, width)?;
-        let (a, b) = (site.node(end), site.node(end + 1));
-        let name = format!("{}.{part}", site.instance.name);
-        site.drawing.electrical(&[a, b]);
-        site.drawing.structure.resistors.push(Resistor { name, a, b, resistance });
+        site.add_resistor(end, part, resistance);
     }
+    site.facing_beams()?;
+    let voltage = site.across(0, 2);
+    site.facing(voltage)
+}
+
+/// gap2de_b and those after it: two beams of the sheet resistance `Rs` and the field between them, which is that of `gap2de`.
+pub(super) fn gap2de_b(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+    let ([w1, w2], length, sheet) = (site.widths()?, site.positive("l")?, site.positive("Rs")?);
+    site.drawing.note(Fact::TrialGap, site.instance.span);
+    site.add_resistor(0, "upper", sheet * length / w1);
+    site.add_resistor(2, "lower", sheet * length / w2);
     site.facing_beams()?;
     let voltage = site.across(0, 2);
     site.facing(voltage)

@@ -1,4 +1,4 @@
-//! Dead loads: f2d and f3d.
+//! Dead loads: f2d, f3d, and the pair of loads of a prestressed beam.
 
 use super::super::sink::Reported;
 use super::arguments::Site;
@@ -43,5 +43,36 @@ fn add(site: &mut Site<'_, '_>, moment: f64, moment_given: bool) -> Result<(), R
     let node = site.node(0);
     site.drawing.mechanical(&[node]);
     site.drawing.structure.loads.push(Load { name: site.name(), node, force: [force * x, force * y], moment });
+    Ok(())
+}
+
+/// prestressedbeam: no beam, but the loads K22·q on its first node and −K22·q on its second that SUGAR's has for a beam whose end
+/// is displaced by q = (qx, qy, qoz in degrees), as SUGAR has them: the moments do not balance the forces' couple.
+pub(super) fn prestressed(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+    let (l, w, h) = (site.positive("l")?, site.positive("w")?, site.positive("h")?);
+    let modulus = site.material()?.youngs_modulus;
+    let angle = site.direction(site.instance.rotation)?;
+    let side = site.side()?;
+    for across in ["qz", "qox", "qoy"] {
+        if site.number_or(across, 0.0)? != 0.0 {
+            let span = site.span_of(across);
+            let message = format!("`{across}` acts out of the drawing plane and is left out");
+            site.sink.warning("W020", span, message, "models are planar (x, y, rotation about z)");
+        }
+    }
+    let (qx, qy) = (site.number_or("qx", 0.0)?, site.number_or("qy", 0.0)?);
+    let qoz = site.number_or("qoz", 0.0)?.to_radians();
+    let bending = modulus * h * w.powi(3) / 12.0;
+    let along = modulus * w * h / l * qx;
+    let across = bending * (12.0 * qy / l.powi(3) - 6.0 * qoz / (l * l));
+    let moment = bending * (4.0 * qoz / l - 6.0 * qy / (l * l));
+    let (s, c) = angle.sin_cos();
+    let force = [along * c - side * across * s, along * s + side * across * c];
+    let nodes = [site.node(0), site.node(1)];
+    site.drawing.mechanical(&nodes);
+    for (node, sign) in nodes.into_iter().zip([1.0, -1.0]) {
+        let (force, moment) = (force.map(|f| sign * f), sign * side * moment);
+        site.drawing.structure.loads.push(Load { name: site.name(), node, force, moment });
+    }
     Ok(())
 }

@@ -1,16 +1,21 @@
 //! The elements: what each takes, checks and adds to the drawing.
 
 mod arguments;
+mod arm;
 mod beam;
 mod circuit;
 mod comb;
+mod curve;
 mod gap;
 mod load;
 mod lumped;
 mod material;
+mod pinned;
+mod section;
 mod stop;
 mod support;
 mod table;
+pub(crate) mod upright;
 
 pub(crate) use arguments::{Argument, Arguments, Instance, Site};
 pub(crate) use table::{MODELS, Model, model};
@@ -27,9 +32,12 @@ pub(crate) fn build(instance: &Instance<'_>, drawing: &mut Drawing, sink: &mut S
     };
     let got = instance.nodes.len();
     if !model.nodes.contains(&got) {
-        let wanted: Vec<String> = model.nodes.iter().map(usize::to_string).collect();
+        let wanted = match model.nodes {
+            [least, .., most] if model.nodes.len() > 2 => format!("{least} to {most}"),
+            counts => counts.iter().map(usize::to_string).collect::<Vec<_>>().join(" or "),
+        };
         let plural = if model.nodes == [1] { "" } else { "s" };
-        let message = format!("`{}` takes {} node{plural}, {got} given", model.name, wanted.join(" or "));
+        let message = format!("`{}` takes {wanted} node{plural}, {got} given", model.name);
         let help = format!("write `{} LAYER {}`", model.name, model.node_names);
         return Err(sink.error("E054", instance.nodes_span, message, help));
     }
@@ -47,10 +55,17 @@ pub(crate) fn unknown<'a>(
     if let Some((_, reason)) = table::LEFT_OUT.iter().find(|(left_out, _)| *left_out == name) {
         return sink.error("E056", span, format!("the element `{name}` is not supported"), *reason);
     }
-    let known = table::MODELS.iter().map(|m| m.name).chain(subnets);
+    // names that differ in their numbers alone are different things: `slider` is not `slider1`
+    let known = table::MODELS.iter().map(|m| m.name).chain(subnets).filter(|known| !differ_in_numbers(known, name));
     let help =
         did_you_mean(name, known, "it is neither built in nor a subnet defined above; is a `uses` line missing?");
     sink.error("E055", span, format!("unknown element `{name}`"), help)
+}
+
+/// True when two names are the same but for their digits.
+fn differ_in_numbers(a: &str, b: &str) -> bool {
+    let letters = |name: &'_ str| name.chars().filter(|c| !c.is_ascii_digit()).collect::<String>();
+    letters(a) == letters(b)
 }
 
 /// Warns of parameters that the element does not take.

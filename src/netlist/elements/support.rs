@@ -1,8 +1,10 @@
-//! What holds nodes: anchors, hinges, sliders, guides; and `pos`, which only places them.
+//! What holds nodes: anchors, hinges, sliders, guides, beams that slide; and `pos`, which only places them.
 
+use super::super::drawing::Fact;
+use super::super::rotation::Rotation;
 use super::super::sink::Reported;
 use super::arguments::Site;
-use crate::structure::Support;
+use crate::structure::{NodeId, Support};
 
 impl Site<'_, '_> {
     fn support(&mut self, held: [bool; 3]) -> Result<(), Reported> {
@@ -11,14 +13,25 @@ impl Site<'_, '_> {
         }
         let node = self.node(0);
         let angle = self.instance.rotation.angle();
+        self.hold(node, held, angle);
+        Ok(())
+    }
+
+    fn hold(&mut self, node: NodeId, held: [bool; 3], angle: f64) {
         self.drawing.place(self.instance.span, &[node], &[[0.0; 2]]);
         self.drawing.structure.supports.push(Support { name: self.name(), node, held, angle });
-        Ok(())
     }
 }
 
+/// An anchor holds every node that it is given.
 pub(super) fn anchor(site: &mut Site<'_, '_>) -> Result<(), Reported> {
-    site.support([true, true, true])
+    site.support([true, true, true])?;
+    let angle = site.instance.rotation.angle();
+    for k in 1..site.instance.nodes.len() {
+        site.hold(site.node(k), [true; 3], angle);
+        site.drawing.note(Fact::AnchorNodes, site.instance.span);
+    }
+    Ok(())
 }
 
 pub(super) fn hinge(site: &mut Site<'_, '_>) -> Result<(), Reported> {
@@ -38,6 +51,20 @@ pub(super) fn pinjoint(site: &mut Site<'_, '_>) -> Result<(), Reported> {
 pub(super) fn guide2d(site: &mut Site<'_, '_>) -> Result<(), Reported> {
     site.direction(site.instance.rotation)?;
     site.support([false, true, true])
+}
+
+/// slider2: a beam whose far end slides along a direction of the whole drawing, that of x turned by `sliderox slideroy slideroz`.
+pub(super) fn slider2(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+    site.drawing.note(Fact::OutOfPlane, site.instance.span);
+    let [ox, oy, oz] =
+        [site.number_or("sliderox", 0.0)?, site.number_or("slideroy", 0.0)?, site.number_or("slideroz", 0.0)?];
+    let slope = Rotation::IDENTITY.turned(ox, oy, oz);
+    let angle = site.direction(slope)?;
+    let width = site.positive("w")?;
+    site.positive("l")?;
+    site.add_beam(site.name(), [site.node(0), site.node(1)], width)?;
+    site.hold(site.node(1), [false, true, false], angle);
+    Ok(())
 }
 
 pub(super) fn pos(site: &mut Site<'_, '_>) -> Result<(), Reported> {

@@ -2,7 +2,7 @@
 
 use super::super::sink::Reported;
 use super::arguments::Site;
-use super::{beam, circuit, comb, gap, load, lumped, stop, support};
+use super::{arm, beam, circuit, comb, curve, gap, load, lumped, pinned, section, stop, support};
 
 /// An element of the language.
 pub(crate) struct Model {
@@ -52,10 +52,41 @@ pub(super) const STRAY: &[&str] =
 const BEAM: &[&str] = &["l", "w", "h", "T", "curvature"];
 const BEAM_E: &[&str] = &["l", "w", "h", "T", "curvature", "R", "G", "resistivity"];
 const LINK: &[&str] = &["l", "w", "h", "T", "L1", "ox1", "oy1", "oz1", "L2", "ox2", "oy2", "oz2"];
+const ARC: &[&str] = &["radius", "alpha", "w", "h", "T", "L1", "ox1", "oy1", "oz1", "L2", "ox2", "oy2", "oz2"];
+const PREDISPLACED: &[&str] = &[
+    "l", "w", "h", "T", "qx2", "qy2", "qz2", "qox1", "qoy1", "qoz1", "qox2", "qoy2", "qoz2", "L1", "ox1", "oy1", "oz1",
+    "L2", "ox2", "oy2", "oz2",
+];
+const PRESTRESSED: &[&str] = &["l", "w", "h", "qx", "qy", "qz", "qox", "qoy", "qoz"];
+const SLIDER: &[&str] = &["l", "w", "h", "T", "sliderox", "slideroy", "slideroz"];
+/// What any element of a drawn circuit may carry.
+const DRAWN: &[&str] = &[
+    "V",
+    "R",
+    "G",
+    "C",
+    "L",
+    "len",
+    "L1",
+    "ox1",
+    "oy1",
+    "oz1",
+    "L2",
+    "ox2",
+    "oy2",
+    "oz2",
+    "linewidth",
+    "nodewidth",
+    "sv",
+    "sph",
+];
+/// Nodes that one anchor may hold.
+const PADS: &[usize] = &[1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16];
 const SIZE: &[&str] = &["l", "w", "h"];
 const GAP: &[&str] = &["l", "w", "w1", "w2", "gap", "h", "V", "permittivity", "touch"];
 const GAP_E: &[&str] =
     &["l", "w", "w1", "w2", "gap", "h", "R", "R1", "R2", "G", "G1", "G2", "resistivity", "permittivity", "touch"];
+const GAP_SHEET: &[&str] = &["l", "w", "w1", "w2", "gap", "h", "Rs", "permittivity", "touch"];
 const LOAD: &[&str] = &["F", "M"];
 
 const fn sugar(
@@ -80,9 +111,9 @@ const fn own(
 
 /// Every element.
 pub(crate) const MODELS: &[Model] = &[
-    sugar("anchor", &[1], "[a]", SIZE, support::anchor),
-    sugar("bondingpad", &[1], "[a]", SIZE, support::anchor),
-    sugar("commonground", &[1], "[a]", SIZE, support::anchor),
+    sugar("anchor", PADS, "[a …]", SIZE, support::anchor),
+    sugar("bondingpad", PADS, "[a …]", SIZE, support::anchor),
+    sugar("commonground", PADS, "[a …]", SIZE, support::anchor),
     sugar("hinge", &[1], "[a]", SIZE, support::hinge),
     sugar("slider", &[1], "[a]", SIZE, support::slider),
     sugar("pinjoint", &[1], "[a]", SIZE, support::pinjoint),
@@ -90,10 +121,52 @@ pub(crate) const MODELS: &[Model] = &[
     sugar("beam2d", &[2], "[a b]", BEAM, beam::beam2d),
     sugar("beam3d", &[2], "[a b]", BEAM, beam::beam3d),
     sugar("beam2de", &[2], "[a b]", BEAM_E, beam::beam2de),
+    sugar("beam2de_b", &[2], "[a b]", &["l", "w", "h", "T", "curvature", "Rs"], beam::beam2de_b),
     sugar("beam3de", &[2], "[a b]", BEAM_E, beam::beam3de),
-    sugar("beam3dlink", &[2], "[a b]", LINK, beam::beam3dlink),
-    sugar("beam3dlinkcorner", &[2], "[a b]", LINK, beam::beam3dlink),
-    sugar("beam3dlink_cloak", &[2], "[a b]", LINK, beam::beam3dlink),
+    sugar("beam", &[2], "[a b]", BEAM, beam::beam3d),
+    sugar("beam3d_2", &[2], "[a b]", BEAM, beam::beam3d),
+    sugar("beam3d_a1", &[2], "[a b]", BEAM, beam::beam3d),
+    sugar("beam3d_perf", &[2], "[a b]", BEAM, beam::beam3d),
+    sugar("beam3da", &[2], "[a b]", BEAM, beam::beam3d),
+    sugar("beam3db", &[2], "[a b]", BEAM, beam::beam3d),
+    sugar("beam3dh", &[2], "[a b]", BEAM, beam::beam3d),
+    sugar("beam3dnl", &[2], "[a b]", BEAM, beam::beam3d),
+    sugar("beam3dnl1", &[2], "[a b]", BEAM, beam::beam3d),
+    sugar("beam3dnl2", &[2], "[a b]", BEAM, beam::beam3d),
+    sugar("beam3dnl3", &[2], "[a b]", BEAM, beam::beam3d),
+    sugar("beam3dnl4", &[2], "[a b]", BEAM, beam::beam3d),
+    sugar("beam3dnl5", &[2], "[a b]", BEAM, beam::beam3d),
+    sugar("beam3dnl6", &[2], "[a b]", BEAM, beam::beam3d),
+    sugar("beam_R2", &[2], "[a b]", BEAM, beam::beam3d),
+    sugar("prestressed", &[2], "[a b]", BEAM, beam::beam3d),
+    sugar("beam3dlink", &[2], "[a b]", LINK, arm::beam3dlink),
+    sugar("beam3dlinkcorner", &[2], "[a b]", LINK, arm::beam3dlink),
+    sugar("beam3dlink_cloak", &[2], "[a b]", LINK, arm::beam3dlink),
+    sugar("rigidlinkbeam", &[2], "[a b]", LINK, arm::rigidlinkbeam),
+    sugar("rigidlinkbeamcorner", &[2], "[a b]", LINK, arm::beam3dlink),
+    sugar("rigidlinkbeamcloaked", &[2], "[a b]", LINK, arm::beam3dlink),
+    sugar("semicircularbeam", &[2], "[a b]", ARC, curve::spatial_arc),
+    sugar("circbeam", &[2], "[a b]", ARC, curve::spatial_arc),
+    sugar("circbeam2", &[2], "[a b]", ARC, curve::spatial_arc),
+    sugar("circbeam3", &[2], "[a b]", ARC, curve::spatial_arc),
+    sugar("circbeam4", &[2], "[a b]", ARC, curve::spatial_arc),
+    sugar("circbeam5", &[2], "[a b]", ARC, curve::spatial_arc),
+    sugar("circbeam6", &[2], "[a b]", ARC, curve::spatial_arc),
+    sugar("circbeam7", &[2], "[a b]", ARC, curve::spatial_arc),
+    sugar("circbeam8", &[2], "[a b]", ARC, curve::spatial_arc),
+    sugar("circbeam9", &[2], "[a b]", ARC, curve::spatial_arc),
+    sugar("circbeam10", &[2], "[a b]", ARC, curve::spatial_arc),
+    sugar("circbeam11", &[2], "[a b]", ARC, curve::spatial_arc),
+    sugar("circbeam12", &[2], "[a b]", ARC, curve::spatial_arc),
+    sugar("predisplacedbeam3", &[2], "[a b]", PREDISPLACED, curve::predisplaced),
+    sugar("predisplacedbeam4", &[2], "[a b]", PREDISPLACED, curve::predisplaced),
+    sugar("prestressedbeam", &[2], "[a b]", PRESTRESSED, load::prestressed),
+    sugar("trapezoidalbeam", &[2], "[a b]", &["l", "wbottom", "wtop", "h", "T"], section::trapezoidal),
+    sugar("softjointlr", &[2], "[a b]", &["l", "w", "h", "T"], section::soft_joint),
+    sugar("hinge3", &[2], "[a b]", &["l", "w", "h", "T"], section::soft_joint),
+    sugar("freehinge", &[2], "[a b]", SIZE, pinned::bar),
+    sugar("hinge2", &[2], "[a b]", SIZE, pinned::bar),
+    sugar("slider2", &[2], "[a b]", SLIDER, support::slider2),
     sugar("f2d", &[1], "[a]", LOAD, load::f2d),
     sugar("f3d", &[1], "[a]", LOAD, load::f3d),
     sugar("gap2d", &[4], "[a b c d]", GAP, gap::gap2d),
@@ -103,15 +176,32 @@ pub(crate) const MODELS: &[Model] = &[
     sugar("gap3dforce", &[4], "[a b c d]", GAP, gap::gap2dforce),
     sugar("gap2de", &[4], "[a b c d]", GAP_E, gap::gap2de),
     sugar("gap3de", &[4], "[a b c d]", GAP_E, gap::gap3de),
+    sugar("gap2de_b", &[4], "[a b c d]", GAP_SHEET, gap::gap2de_b),
+    sugar("gap2de_c", &[4], "[a b c d]", GAP_SHEET, gap::gap2de_b),
+    sugar("gap2de_d", &[4], "[a b c d]", GAP_SHEET, gap::gap2de_b),
+    sugar("gap2de_e", &[4], "[a b c d]", GAP_SHEET, gap::gap2de_b),
+    sugar("gap2de_f", &[4], "[a b c d]", GAP_SHEET, gap::gap2de_b),
+    sugar("gap2de_g", &[4], "[a b c d]", GAP_SHEET, gap::gap2de_b),
+    sugar("gap2de_h", &[4], "[a b c d]", GAP_SHEET, gap::gap2de_b),
     sugar("comb2d", &[2], "[a b]", &["l", "L", "w", "gap", "N", "h", "V", "permittivity"], comb::comb2d),
     sugar("R", &[2], "[a b]", &["R", "G"], circuit::resistor),
     sugar("C", &[2], "[a b]", &["C"], circuit::capacitor),
     sugar("L", &[2], "[a b]", &["L"], circuit::inductor),
-    sugar("Vsrc", &[2], "[plus minus]", &["V"], circuit::voltage_source),
+    sugar("Vsrc", &[2], "[plus minus]", &["V", "sv", "sph"], circuit::voltage_source),
+    sugar("resistor", &[2], "[a b]", DRAWN, circuit::drawn_resistor),
+    sugar("capacitor", &[2], "[a b]", DRAWN, circuit::drawn_capacitor),
+    sugar("inductor", &[2], "[a b]", DRAWN, circuit::drawn_inductor),
+    sugar("voltage", &[2], "[plus minus]", DRAWN, circuit::drawn_source),
+    sugar("voltagesinusoidal", &[2], "[plus minus]", DRAWN, circuit::drawn_source),
+    sugar("short", &[2], "[a b]", DRAWN, circuit::drawn_short),
+    sugar("eswitch", &[2], "[a b]", DRAWN, circuit::drawn_switch),
+    sugar("ground", &[1, 2], "[n] or [n end]", DRAWN, circuit::drawn_ground),
     sugar("Isrc", &[2], "[plus minus]", &["I"], circuit::current_source),
     sugar("opamp", &[4], "[minus plus out reference]", &["A"], circuit::op_amp),
     sugar("vcvs", &[4], "[plus minus out reference]", &["A"], circuit::amplifier),
     sugar("eground", &[1], "[n]", &[], circuit::eground),
+    own("arc2d", &[2], "[a b]", ARC, curve::arc),
+    own("taper2d", &[2], "[a b]", &["l", "w1", "w2", "h", "T"], curve::taper),
     own("plate2d", &[1], "[c]", SIZE, lumped::plate2d),
     own("mass2d", &[1], "[n]", &["m", "J"], lumped::mass2d),
     own("link2d", &[2], "[a b]", &["l"], lumped::link2d),
@@ -147,10 +237,6 @@ pub(crate) const MODELS: &[Model] = &[
 
 /// Elements of SUGAR's that have no counterpart here, and why.
 pub(super) const LEFT_OUT: &[(&str, &str)] = &[
-    ("predisplacedbeam4", "draw the curved beam as a chain of short `beam2d`"),
-    ("semicircularbeam", "draw the curved beam as a chain of short `beam2d`"),
-    ("circbeam", "draw the curved beam as a chain of short `beam2d`"),
-    ("circbeam3", "draw the curved beam as a chain of short `beam2d`"),
     ("gapV2", "it is in SUGAR's manual only; use `gap2d` or `gap2dforce`"),
     ("gap3dV2", "it is in SUGAR's manual only; use `gap2d` or `gap2dforce`"),
 ];
@@ -173,6 +259,7 @@ pub(super) fn meaning(name: &str) -> &'static str {
         "A" => "gain [1], or area [m²]",
         "I" => "current [A]",
         "V" => "voltage [V]",
+        "Rs" => "sheet resistance [Ω/square]",
         "R" | "R1" | "R2" => "resistance [Ω]",
         "G" | "G1" | "G2" => "conductance [S]",
         "Cp" | "C" => "capacitance [F]",
@@ -204,6 +291,12 @@ pub(super) fn meaning(name: &str) -> &'static str {
         "yieldstress" => "yield stress at ambient temperature [Pa]",
         "softening" => "temperature without strength [K]",
         "curvature" => "rest curvature [1/m]",
+        "radius" => "radius [m]",
+        "wtop" | "wbottom" => "width of the top or the bottom [m]",
+        "len" => "length of the picture [m]",
+        "qx2" | "qy2" | "qz2" | "qx" | "qy" | "qz" => "displacement of the end [m]",
+        "qox" | "qoy" | "qoz" => "rotation of the end [°]",
+        "sv" => "amplitude of small signals [V]",
         _ => "angle [rad]",
     }
 }

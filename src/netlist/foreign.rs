@@ -1,0 +1,99 @@
+//! Files that are no netlist of SUGAR 2 though they come beside them: SUGAR 3 netlists, which are Lua, and MATLAB files.
+//!
+//! Both are told by whole statements that the language does not have. A SUGAR 3 netlist says `use("…")`, holds a Lua comment or
+//! braces at the end of a word; a MATLAB file defines a function or loads a netlist.
+
+use super::source::Span;
+
+/// What a file is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Kind {
+    /// A SUGAR 3 netlist, told by the line.
+    Lua(Span),
+    /// A MATLAB function or script, told by the line.
+    Matlab(Span),
+    /// Anything else: a SUGAR 2 netlist, right or wrong.
+    Netlist,
+}
+
+/// Lines that only a MATLAB file begins with.
+const MATLAB: [&str; 9] =
+    ["clear all", "clear;", "close all", "clc", "figure(", "figure;", "addpath(", "cho_load(", "hold on"];
+
+/// What the text of file number `file` is, by its first line that decides.
+pub(crate) fn kind(text: &str, file: u16) -> Kind {
+    let mut start = 0;
+    for line in text.split_inclusive('\n') {
+        let at = |offset: usize| u32::try_from(offset).unwrap_or(u32::MAX);
+        let span = Span { file, start: at(start), end: at(start + line.trim_end().len()) };
+        start += line.len();
+        let body = line.trim_start_matches(['\u{feff}', ' ', '\t', '\r']);
+        if body.starts_with('%') {
+            continue;
+        }
+        if lua(body) {
+            return Kind::Lua(span);
+        }
+        if matlab(body) {
+            return Kind::Matlab(span);
+        }
+    }
+    Kind::Netlist
+}
+
+/// True for a line of Lua: `use(…)`, `use"…"`, a `--` comment, `NAME = function`, `NAME {`.
+fn lua(line: &str) -> bool {
+    let words = line.strip_prefix("use").map(str::trim_start);
+    let used = words.is_some_and(|rest| rest.starts_with(['(', '"', '\'', '[']));
+    let name = line.len() - line.trim_start_matches(|c: char| c.is_ascii_alphanumeric() || c == '_').len();
+    let called = name > 0 && line[name..].trim_start().starts_with('{');
+    used || line.starts_with("--") || called || line.strip_prefix("local ").is_some_and(defines)
+}
+
+/// True for `NAME = …` and `function …`, what follows Lua's `local`.
+fn defines(rest: &str) -> bool {
+    let name = rest.trim_start().trim_start_matches(|c: char| c.is_ascii_alphanumeric() || c == '_');
+    name.len() < rest.trim_start().len()
+        && (name.trim_start().starts_with('=') || rest.trim_start().starts_with("function "))
+}
+
+/// True for a line of MATLAB: a function's head, or a command of a session.
+fn matlab(line: &str) -> bool {
+    let head = line.strip_prefix("function").is_some_and(|rest| rest.starts_with([' ', '\t', '[']));
+    let loads = line.split_once('=').is_some_and(|(name, rest)| {
+        rest.trim_start().starts_with("cho_load(")
+            && name.trim().bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_')
+    });
+    head || loads || MATLAB.iter().any(|word| line.starts_with(word))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn told(text: &str) -> (char, u32) {
+        match kind(text, 0) {
+            Kind::Lua(span) => ('l', span.start),
+            Kind::Matlab(span) => ('m', span.start),
+            Kind::Netlist => ('n', 0),
+        }
+    }
+
+    /// Files are told by the first line that only their language has; comments of SUGAR 2 decide nothing.
+    #[test]
+    fn files_are_told_apart() {
+        assert_eq!(told("% net=cho_load('x.net');\nuses mumps.net\nanchor p1 [a] []\n"), ('n', 0));
+        assert_eq!(told("% title\nuse(\"mumps.net\")\n"), ('l', 8));
+        assert_eq!(told("use 'mumps.net'\n"), ('l', 0));
+        assert_eq!(told("-- title\n"), ('l', 0));
+        assert_eq!(told("A = 1\nanchor {A; material=p1}\n"), ('l', 6));
+        assert_eq!(told("function [q] = f(net)\n"), ('m', 0));
+        assert_eq!(told("x=1;\nnet = cho_load('a.net', p);\n"), ('m', 5));
+        assert_eq!(told("functions = 3\nfunction_of beam2d p1 [a b] [l=1u]\n"), ('n', 0));
+        assert_eq!(told("local = 3\nlocal beam2d p1 [a b] [l=1u]\n"), ('n', 0));
+        assert_eq!(told("x = 1\nlocal y = 3\n"), ('l', 6));
+        assert_eq!(told("clear all\n"), ('m', 0));
+        assert_eq!(told("used = 1\nuser = 2\nuses a.net\n"), ('n', 0));
+        assert_eq!(told(""), ('n', 0));
+    }
+}
