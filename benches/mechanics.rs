@@ -55,7 +55,7 @@ fn mechanics(c: &mut Criterion) {
     let mut error = start.clone();
     let sources = vec![0.0; system.electrics.sources()];
     let rise = vec![0.0; system.electrics.heating.heaters.len()];
-    let ramp = Ramp { electrics: &system.electrics, from: &sources, to: &sources, rise: &rise, dt: 1e-6, push: &[] };
+    let ramp = Ramp::new(&system.electrics, &sources, &sources, &rise, 1e-6);
     group.bench_function("Rodas4 step", |b| {
         b.iter(|| {
             motion.q.copy_from_slice(&start.q);

@@ -71,7 +71,7 @@ fn measure(name: &str, coordinates: usize) -> (usize, [f64; 8]) {
     let mut rodas = Rodas4::new(&system, &[]);
     let (start, mut motion) = (Motion { q, v: r.clone() }, Motion::zeros(n));
     let mut error = Motion::zeros(n);
-    let ramp = Ramp { electrics: &system.electrics, from: &[], to: &[], rise: &[], dt: 1e-6, push: &[] };
+    let ramp = Ramp::new(&system.electrics, &[], &[], &[], 1e-6);
     let step = median(1, |_| {
         motion.q.copy_from_slice(&start.q);
         motion.v.fill(Pose::zeros());

@@ -113,7 +113,7 @@ fn measure((file, set, start, volts, stop): &Scene<'_>, tol: f64) {
             .unwrap();
     }
     let rise = vec![0.0; electrics.heating.heaters.len()];
-    let ramp = Ramp { electrics, from: &sources, to: &sources, rise: &rise, dt: *stop, push: &[] };
+    let ramp = Ramp::new(electrics, &sources, &sources, &rise, *stop);
     let first = bimorph::analysis::transient::first_step(system, *stop);
     let equations = Arc::new(Joints::elastic(system).unwrap());
     let tree = &equations.tree;

@@ -64,7 +64,7 @@ fn a_step_is_one_factorization_and_six_solves_at_any_size() {
             let mut rodas = Rodas4::new(&system, &[]);
             let (mut motion, mut error) = (Motion::zeros(system.bodies()), Motion::zeros(system.bodies()));
             motion.v[0].y = 1e-3;
-            let ramp = Ramp { electrics: &system.electrics, from: &[], to: &[], rise: &[], dt: 1e-6, push: &[] };
+            let ramp = Ramp::new(&system.electrics, &[], &[], &[], 1e-6);
             for _ in 0..3 {
                 rodas.step(&system, &ramp, 0.0, 1e-8, &mut motion, &mut error).unwrap();
             }

@@ -48,7 +48,7 @@ fn a_bank_session_is_small_and_steps_allocate_nothing() {
     let (mut motion, mut error) = (Motion::zeros(system.bodies()), Motion::zeros(system.bodies()));
     let sources = vec![1.0; system.electrics.sources()];
     let rise = vec![0.0; system.electrics.heating.heaters.len()];
-    let ramp = Ramp { electrics: &system.electrics, from: &sources, to: &sources, rise: &rise, dt: 1e-6, push: &[] };
+    let ramp = Ramp::new(&system.electrics, &sources, &sources, &rise, 1e-6);
     let blocks = dhat::HeapStats::get().total_blocks;
     for _ in 0..10 {
         rodas.step(system, &ramp, 0.0, 1e-8, &mut motion, &mut error).unwrap();

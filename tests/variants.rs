@@ -145,7 +145,7 @@ fn alone(compiled: &Compiled, volts: &[f64], stop: f64, tol: f64) -> Option<Ran>
     let mut sources = vec![0.0; system.electrics.sources()];
     system.electrics.fill_sources(&volts[..system.electrics.ports], &mut sources);
     let rise = vec![0.0; system.electrics.heating.heaters.len()];
-    let ramp = Ramp { electrics: &system.electrics, from: &sources, to: &sources, rise: &rise, dt: stop, push: &[] };
+    let ramp = Ramp::new(&system.electrics, &sources, &sources, &rise, stop);
     let mut motion = Motion::zeros(system.bodies());
     let (mut steps, mut h) = (Vec::new(), first_step(system, stop));
     let mut driver = Adaptive::new(system, Rodas4::new(system, &[]));
@@ -176,7 +176,7 @@ fn together<const N: usize>(variants: &[Compiled], volts: &[f64], stop: f64, tol
             let (number, (variant, notes)) = queue.next()?;
             let system = &variant.parts.system;
             let (volts, rise) = (&sources[number], &rises[number]);
-            let ramp = Ramp { electrics: &system.electrics, from: volts, to: volts, rise, dt: stop, push: &[] };
+            let ramp = Ramp::new(&system.electrics, volts, volts, rise, stop);
             let motion = Motion::zeros(system.bodies());
             Some((number, Variant { system, ramp, motion, h: first_step(system, stop), tol, watcher: notes }))
         };

@@ -130,7 +130,7 @@ pub fn frame_transient(
     let signals: Vec<FrameSignal> =
         options.signals.iter().map(|name| FrameSignal::find(compiled, frame, name)).collect::<Result<_, _>>()?;
     let electrics = &compiled.parts.system.electrics;
-    let ramp = Ramp { electrics, from: &sources, to: &sources, rise: &rise, dt: options.stop, push: &[] };
+    let ramp = Ramp::new(electrics, &sources, &sources, &rise, options.stop);
     let spacing = options.stop / (options.points - 1) as f64;
     let mut counters = Counters::default();
     let mut run = |between: usize, counters: &mut Counters| -> Result<Vec<Vec<f64>>, AnalysisError> {

@@ -125,7 +125,7 @@ impl Setup {
 
     fn ramp<'a>(&'a self, compiled: &'a Compiled, stop: f64) -> Ramp<'a> {
         let electrics = &compiled.parts.system.electrics;
-        Ramp { electrics, from: &self.sources, to: &self.sources, rise: &self.rise, dt: stop, push: &[] }
+        Ramp::new(electrics, &self.sources, &self.sources, &self.rise, stop)
     }
 }
 

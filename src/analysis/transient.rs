@@ -229,7 +229,7 @@ pub(super) fn record(
         motion.q.copy_from_slice(&point.q);
         rise.copy_from_slice(&point.rise);
     }
-    let ramp = Ramp { electrics, from: &sources, to: &sources, rise: &rise, dt: options.stop, push: &[] };
+    let ramp = Ramp::new(electrics, &sources, &sources, &rise, options.stop);
     let mut drive = electrics.drive();
     ramp.at(0.0, &mut drive);
     let volts = drive.volts.clone();

@@ -110,7 +110,7 @@ impl Session {
             }
         }
         let push = self.shaken.as_ref().map_or(&[][..], Shaken::mean);
-        let ramp = Ramp { electrics, from: &from, to: &self.sources, rise: &self.rise, dt: request.dt, push };
+        let ramp = Ramp::new(electrics, &from, &self.sources, &self.rise, request.dt).pushed(push);
         let mut h = parent.map_or(self.first_step, |p| p.next_step);
         let advanced = self.stepper.advance(
             system,
@@ -194,18 +194,18 @@ impl Session {
         for (p, &port) in self.ports.sources.iter().enumerate() {
             let s = &self.stepper.method.sensitivity()[p];
             let gap_row: Vec<f64> = (0..gaps).map(|g| electrics.gap_rows[(g, port)]).collect();
-            for k in 0..self.rise_slope.len() {
-                self.rise_slope[k] = match from {
-                    None => {
-                        self.unit.fill(0.0);
-                        self.unit[port] = 1.0;
-                        electrics.heating.slope(k, &self.sources, &self.unit)
+            match from {
+                None => {
+                    self.unit.fill(0.0);
+                    self.unit[port] = 1.0;
+                    for (k, slope) in self.rise_slope.iter_mut().enumerate() {
+                        *slope = electrics.heating.slope(k, &self.sources, &self.unit);
                     }
-                    Some((from, _)) => {
-                        Ramp { electrics, from, to: &self.sources, rise: &self.rise, dt: request.dt, push: &[] }
-                            .rise_sensitivity(k, request.dt, port)
-                    }
-                };
+                }
+                Some((from, _)) => {
+                    let (dt, slopes) = (request.dt, &mut self.rise_slope);
+                    electrics.rise_sensitivities((from, &self.sources), dt, dt, port, |k, slope| slopes[k] = slope);
+                }
             }
             for (g, volts) in gap_row.iter().enumerate() {
                 let dq =

@@ -2,7 +2,8 @@
 //! them the inputs that are no voltages.
 
 use super::inputs::Input;
-use super::thermal::{Heating, Lag, lagged};
+use super::lag::Lags;
+use super::thermal::Heating;
 use crate::multibody::forces::RestStrain;
 use crate::multibody::planar::Pose;
 use nalgebra::DMatrix;
@@ -136,6 +137,51 @@ impl Electrics {
         (slope.load, slope.turning) = (0.0, 0.0);
     }
 
+    /// Of each heater the coefficients of its steady rise in the time [s] since the sources began to go `from` one value `to` another
+    /// [V] in `dt` [s]: K, K/s, K/s².
+    fn heat_course(&self, (from, to): (&[f64], &[f64]), dt: f64) -> Vec<[f64; 3]> {
+        let course = |k: usize| {
+            let [a, b, c] = self.heating.between(k, from, to);
+            [a, b / dt, c / (dt * dt)]
+        };
+        (0..self.heating.heaters.len()).map(course).collect()
+    }
+
+    /// Change of the second and third coefficient of [`Electrics::heat_course`] with the final voltage of source `port`; the first
+    /// has none.
+    fn heat_course_change(&self, k: usize, (from, to): (&[f64], &[f64]), dt: f64, port: usize) -> [f64; 2] {
+        let (b, c) = (self.row(k, port, from), self.row(k, port, to));
+        let heat = self.heating.per_watt(k, port);
+        [(2.0 * b + heat) / dt, 2.0 * (c - b) / (dt * dt)]
+    }
+
+    /// (Q·u)_port of heater `k`.
+    fn row(&self, k: usize, port: usize, u: &[f64]) -> f64 {
+        let voltages = self.voltages();
+        if port >= voltages {
+            return 0.0;
+        }
+        (0..voltages).map(|j| self.heating.entry(k, port, j) * u[j]).sum()
+    }
+
+    /// The change of the rise of each heater with the final voltage of source `port` [K/V], `s` after the sources began to go `from` one
+    /// value `to` another in `dt` [s].
+    pub fn rise_sensitivities(
+        &self,
+        way: (&[f64], &[f64]),
+        dt: f64,
+        s: f64,
+        port: usize,
+        mut put: impl FnMut(usize, f64),
+    ) {
+        let mut lags = Lags::new(s);
+        for (k, heater) in self.heating.heaters.iter().enumerate() {
+            let [p1, p2] = self.heat_course_change(k, way, dt, port);
+            let tau = heater.time_constant;
+            put(k, if tau > 0.0 { lags.of(tau).rise(0.0, [0.0, p1, p2]) } else { s * (p1 + s * p2) });
+        }
+    }
+
     #[inline]
     fn gap_volts(&self, u: &[f64], volts: &mut [f64]) {
         for (g, v) in volts.iter_mut().enumerate() {
@@ -144,8 +190,9 @@ impl Electrics {
     }
 }
 
-/// Source voltages that go linearly from one value to another during a step, with the rises that follow them.
-#[derive(Debug, Clone, Copy)]
+/// Source voltages that go linearly from one value to another during a step, with the rises that follow them. What does not depend on
+/// the time is looked up once.
+#[derive(Debug, Clone)]
 pub struct Ramp<'a> {
     /// The electrical side.
     pub electrics: &'a Electrics,
@@ -159,30 +206,55 @@ pub struct Ramp<'a> {
     pub dt: f64,
     /// Force and moment on each body throughout the step; empty: none.
     pub push: &'a [Pose],
+    /// Of each heater the coefficients of its steady rise in the time since the start: [`Electrics::heat_course`].
+    heat: Vec<[f64; 3]>,
 }
 
-impl Ramp<'_> {
-    /// Coefficients of the steady rise of heater `k` in the time since the start.
-    fn parabola(&self, k: usize) -> [f64; 3] {
-        let [a, b, c] = self.electrics.heating.between(k, self.from, self.to);
-        [a, b / self.dt, c / (self.dt * self.dt)]
+impl<'a> Ramp<'a> {
+    /// Sources that go `from` one value `to` another [V] in `dt` [s], with heaters at `rise` [K] before.
+    pub fn new(electrics: &'a Electrics, from: &'a [f64], to: &'a [f64], rise: &'a [f64], dt: f64) -> Self {
+        Self { electrics, from, to, rise, dt, push: &[], heat: electrics.heat_course((from, to), dt) }
+    }
+
+    /// The same with a force and a moment on each body.
+    pub fn pushed(self, push: &'a [Pose]) -> Self {
+        Self { push, ..self }
     }
 
     /// Rise of heater `k` at time `s` after the start [K].
     pub fn rise_at(&self, k: usize, s: f64) -> f64 {
-        self.rise_after(k, s, self.parabola(k), &mut None)
+        self.rise_after(k, &mut Lags::new(s))
     }
 
-    /// The same with what is known of it: the parabola, and the exponentials of the heater before.
+    /// The same with the exponentials that other heaters have needed at this time.
     #[inline]
-    fn rise_after(&self, k: usize, s: f64, p: [f64; 3], lag: &mut Option<Lag>) -> f64 {
-        let tau = self.electrics.heating.heaters[k].time_constant;
+    fn rise_after(&self, k: usize, lags: &mut Lags) -> f64 {
+        let (tau, p) = (self.electrics.heating.heaters[k].time_constant, self.heat[k]);
         if tau <= 0.0 {
-            return p[0] + s * (p[1] + s * p[2]);
+            return p[0] + lags.t * (p[1] + lags.t * p[2]);
         }
-        match lag {
-            Some(lag) if lag.is_of(tau) => lag.rise(self.rise[k], p),
-            other => other.insert(Lag::new(tau, s)).rise(self.rise[k], p),
+        lags.of(tau).rise(self.rise[k], p)
+    }
+
+    /// The free strain of each heater at time `s` after the start.
+    pub fn expansions(&self, s: f64, mut put: impl FnMut(usize, f64)) {
+        let mut lags = Lags::new(s);
+        for (k, heater) in self.electrics.heating.heaters.iter().enumerate() {
+            put(k, heater.expansion * self.rise_after(k, &mut lags));
+        }
+    }
+
+    /// Their rates of change in time [1/s].
+    pub fn expansion_rates(&self, s: f64, mut put: impl FnMut(usize, f64)) {
+        let mut lags = Lags::new(s);
+        for (k, heater) in self.electrics.heating.heaters.iter().enumerate() {
+            let p = self.heat[k];
+            let slope = if heater.time_constant > 0.0 {
+                (p[0] + s * (p[1] + s * p[2]) - self.rise_after(k, &mut lags)) / heater.time_constant
+            } else {
+                p[1] + 2.0 * s * p[2]
+            };
+            put(k, heater.expansion * slope);
         }
     }
 
@@ -192,11 +264,7 @@ impl Ramp<'_> {
         for (g, v) in drive.volts.iter_mut().enumerate() {
             *v = self.gap(g, |i| self.from[i] + x * (self.to[i] - self.from[i]));
         }
-        let mut lag = None;
-        for k in 0..drive.expansion.len() {
-            let rise = self.rise_after(k, s, self.parabola(k), &mut lag);
-            drive.expansion[k] = self.electrics.heating.heaters[k].expansion * rise;
-        }
+        self.expansions(s, |k, strain| drive.expansion[k] = strain);
         drive.push.clear();
         drive.push.extend_from_slice(self.push);
         let first = self.electrics.voltages();
@@ -215,10 +283,7 @@ impl Ramp<'_> {
         for (g, v) in rate.volts.iter_mut().enumerate() {
             *v = self.gap(g, |i| (self.to[i] - self.from[i]) / self.dt);
         }
-        let mut lag = None;
-        for k in 0..rate.expansion.len() {
-            rate.expansion[k] = self.expansion_rate(k, s, self.parabola(k), &mut lag);
-        }
+        self.expansion_rates(s, |k, strain| rate.expansion[k] = strain);
         let first = self.electrics.voltages();
         for (k, value) in rate.inputs.iter_mut().enumerate() {
             *value = (self.to[first + k] - self.from[first + k]) / self.dt;
@@ -227,28 +292,15 @@ impl Ramp<'_> {
         rate.push.clear();
     }
 
-    /// Rate of the free strain of heater `k` at time `s` [1/s].
-    #[inline]
-    fn expansion_rate(&self, k: usize, s: f64, p: [f64; 3], lag: &mut Option<Lag>) -> f64 {
-        let heater = &self.electrics.heating.heaters[k];
-        let slope = if heater.time_constant > 0.0 {
-            (p[0] + s * (p[1] + s * p[2]) - self.rise_after(k, s, p, lag)) / heater.time_constant
-        } else {
-            p[1] + 2.0 * s * p[2]
-        };
-        heater.expansion * slope
-    }
-
     /// The change of the drive at time `s` with the final voltage of source `port`.
     pub fn sensitivity(&self, s: f64, port: usize, out: &mut Drive) {
         let x = s / self.dt;
         for (g, v) in out.volts.iter_mut().enumerate() {
             *v = self.electrics.gap_rows[(g, port)] * x;
         }
-        for k in 0..out.expansion.len() {
-            let heater = &self.electrics.heating.heaters[k];
-            out.expansion[k] = heater.expansion * self.rise_sensitivity(k, s, port);
-        }
+        let heaters = &self.electrics.heating.heaters;
+        let put = |k: usize, rise: f64| out.expansion[k] = heaters[k].expansion * rise;
+        self.electrics.rise_sensitivities((self.from, self.to), self.dt, s, port, put);
         out.load = 0.0;
         out.push.clear();
         out.turning = if self.set_input(port, x, out) == Some(Input::Rate) { 1.0 / self.dt } else { 0.0 };
@@ -262,23 +314,17 @@ impl Ramp<'_> {
         Some(self.electrics.inputs[k])
     }
 
-    /// The change of the rise of heater `k` at time `s` with the final voltage of source `port` [K/V].
-    pub fn rise_sensitivity(&self, k: usize, s: f64, port: usize) -> f64 {
-        let tau = self.electrics.heating.heaters[k].time_constant;
-        let [p1, p2] = self.parabola_change(k, port);
-        if tau > 0.0 { lagged(0.0, tau, s, [0.0, p1, p2]) } else { s * (p1 + s * p2) }
-    }
-
     /// The change of [`Ramp::rate`] at time `s` with the final voltage of source `port`.
     pub fn rate_sensitivity(&self, s: f64, port: usize, out: &mut Drive) {
         for (g, v) in out.volts.iter_mut().enumerate() {
             *v = self.electrics.gap_rows[(g, port)] / self.dt;
         }
-        for k in 0..out.expansion.len() {
-            let heater = &self.electrics.heating.heaters[k];
-            let [p1, p2] = self.parabola_change(k, port);
+        let mut lags = Lags::new(s);
+        for (k, heater) in self.electrics.heating.heaters.iter().enumerate() {
+            let [p1, p2] = self.electrics.heat_course_change(k, (self.from, self.to), self.dt, port);
             let slope = if heater.time_constant > 0.0 {
-                (s * (p1 + s * p2) - self.rise_sensitivity(k, s, port)) / heater.time_constant
+                let rise = lags.of(heater.time_constant).rise(0.0, [0.0, p1, p2]);
+                (s * (p1 + s * p2) - rise) / heater.time_constant
             } else {
                 p1 + 2.0 * s * p2
             };
@@ -289,56 +335,7 @@ impl Ramp<'_> {
         out.push.clear();
     }
 
-    /// Change of the parabola's second and third coefficient with the final voltage of source `port`; the first has none.
-    fn parabola_change(&self, k: usize, port: usize) -> [f64; 2] {
-        let (b, c) = (self.row(k, port, self.from), self.row(k, port, self.to));
-        let heat = self.electrics.heating.per_watt(k, port);
-        [(2.0 * b + heat) / self.dt, 2.0 * (c - b) / (self.dt * self.dt)]
-    }
-
-    /// (Q·u)_port of heater `k`.
-    fn row(&self, k: usize, port: usize, u: &[f64]) -> f64 {
-        let voltages = self.electrics.voltages();
-        if port >= voltages {
-            return 0.0;
-        }
-        (0..voltages).map(|j| self.electrics.heating.entry(k, port, j) * u[j]).sum()
-    }
-
     fn gap(&self, g: usize, u: impl Fn(usize) -> f64) -> f64 {
         (0..self.from.len()).map(|i| self.electrics.gap_rows[(g, i)] * u(i)).sum()
-    }
-}
-
-/// A ramp with what does not depend on the time looked up once: the same bits, for runs of many steps.
-#[derive(Debug, Clone)]
-pub struct Course<'a> {
-    /// The ramp.
-    pub ramp: Ramp<'a>,
-    parabolas: Vec<[f64; 3]>,
-}
-
-impl<'a> Course<'a> {
-    /// Of a ramp.
-    pub fn new(ramp: Ramp<'a>) -> Self {
-        let parabolas = (0..ramp.electrics.heating.heaters.len()).map(|k| ramp.parabola(k)).collect();
-        Self { ramp, parabolas }
-    }
-
-    /// The free strains at time `s` after the start, heater by heater.
-    pub fn expansions(&self, s: f64, mut put: impl FnMut(usize, f64)) {
-        let mut lag = None;
-        for (k, p) in self.parabolas.iter().enumerate() {
-            let rise = self.ramp.rise_after(k, s, *p, &mut lag);
-            put(k, self.ramp.electrics.heating.heaters[k].expansion * rise);
-        }
-    }
-
-    /// Their rates of change in time [1/s].
-    pub fn expansion_rates(&self, s: f64, mut put: impl FnMut(usize, f64)) {
-        let mut lag = None;
-        for (k, p) in self.parabolas.iter().enumerate() {
-            put(k, self.ramp.expansion_rate(k, s, *p, &mut lag));
-        }
     }
 }

@@ -15,7 +15,8 @@
 //! | [`contact`] | pressure between surfaces that touch |
 //! | [`facing`] | two facing beams: pressure along a gap that varies over their length |
 //! | [`network`] | potentials of a resistive network driven by ports and sources |
-//! | [`thermal`] | mean temperature rise of beams that carry current; its lag in time |
+//! | [`thermal`] | mean temperature rise of beams that carry current |
+//! | [`lag`] | how a rise lags behind its steady value |
 //! | [`drive`] | ports → gap voltages and free strains, at a time within a step |
 //! | [`inputs`] | forces at points, heat into beams, the motion of the frame |
 //! | [`energy`] | the potential of it all, and the energy that an undamped motion keeps |
@@ -31,6 +32,7 @@ pub mod drive;
 pub mod energy;
 pub mod facing;
 pub mod inputs;
+pub mod lag;
 pub mod network;
 mod pull;
 pub mod stop;
@@ -39,6 +41,6 @@ pub mod system;
 pub mod thermal;
 mod touching;
 
-pub use drive::{Course, Drive, Ramp};
+pub use drive::{Drive, Ramp};
 pub use inputs::Input;
 pub use system::{Gap, Load, Point, System};

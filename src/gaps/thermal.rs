@@ -11,8 +11,7 @@
 //! a quadratic form T̄ = uᵀ·Q·u. Heat W that comes from elsewhere, spread evenly along a beam, acts as P does and adds Z·W with
 //! the same thermal resistances Z. Resistance and conductivity do not depend on temperature here.
 //!
-//! With a time constant τ the rise follows its steady value, dT̄/dt = (T̄_steady(u(t)) − T̄)/τ. During a step u goes
-//! linearly in time, T̄_steady is a parabola, and the lag is integrated exactly.
+//! With a time constant the rise follows its steady value: [`super::lag`].
 
 use super::inputs::Input;
 use super::network::Potentials;
@@ -246,62 +245,6 @@ fn without_sink(heaters: &[Heater], sink: &[bool]) -> Option<usize> {
     }
 }
 
-/// φ₁, φ₂, φ₃ of the exponential integrators: φ_k(z) = ∫₀¹ e^{(1−σ)z} σ^{k−1}/(k−1)! dσ (Hochbruck & Ostermann 2010).
-pub fn phi(z: f64) -> [f64; 3] {
-    if z.abs() < 0.5 {
-        let series = |k: u32| {
-            let mut term = 1.0 / (1..=k).map(f64::from).product::<f64>();
-            let mut sum = 0.0;
-            for n in 0..18 {
-                sum += term;
-                term *= z / f64::from(n + k + 1);
-            }
-            sum
-        };
-        [series(1), series(2), series(3)]
-    } else {
-        let one = z.exp_m1() / z;
-        let two = (one - 1.0) / z;
-        [one, two, (two - 0.5) / z]
-    }
-}
-
-/// The rise at time `t` after it was `start`, while its steady value is p₀ + p₁·s + p₂·s² [K].
-pub fn lagged(start: f64, time_constant: f64, t: f64, p: [f64; 3]) -> f64 {
-    Lag::new(time_constant, t).rise(start, p)
-}
-
-/// What a time is to a time constant: the exponentials that all heaters with this time constant have in common.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Lag {
-    time_constant: f64,
-    t: f64,
-    x: f64,
-    f: [f64; 3],
-    decay: f64,
-}
-
-impl Lag {
-    /// At time `t` after the start [s].
-    pub fn new(time_constant: f64, t: f64) -> Self {
-        let x = t / time_constant;
-        Self { time_constant, t, x, f: phi(-x), decay: (-x).exp() }
-    }
-
-    /// True where this is the time constant.
-    #[inline]
-    pub fn is_of(&self, time_constant: f64) -> bool {
-        self.time_constant == time_constant
-    }
-
-    /// See [`lagged`].
-    #[inline]
-    pub fn rise(&self, start: f64, p: [f64; 3]) -> f64 {
-        let (t, x, [f1, f2, f3], decay) = (self.t, self.x, &self.f, self.decay);
-        start * decay + x * (p[0] * f1 + p[1] * t * f2 + 2.0 * p[2] * t * t * f3)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::network::Circuit;
@@ -342,21 +285,6 @@ mod tests {
         for pieces in [1, 2, 7] {
             assert!((bar(pieces, 3.0) / exact - 1.0).abs() < 1e-12, "{pieces}");
         }
-    }
-
-    /// The exact lag agrees with the closed solution of dT/dt = (a + bt + ct² − T)/τ, for short and long steps.
-    #[test]
-    fn lag_is_exact() {
-        let (a, b, c, tau, start): (f64, f64, f64, f64, f64) = (3.0, -2.0, 5.0, 0.7, 1.5);
-        let exact = |t: f64| {
-            let (c2, c1) = (c, b - 2.0 * tau * c);
-            let c0 = a - tau * c1;
-            c0 + c1 * t + c2 * t * t + (start - c0) * (-t / tau).exp()
-        };
-        for t in [1e-3f64, 0.2, 0.4, 3.0, 30.0] {
-            assert!((lagged(start, tau, t, [a, b, c]) - exact(t)).abs() < 1e-12 * exact(t).abs());
-        }
-        assert!((lagged(start, 1e9, 1e-3, [a, b, c]) - start).abs() < 1e-11);
     }
 
     /// A heater without a path for its heat is refused.

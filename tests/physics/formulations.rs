@@ -148,7 +148,7 @@ fn rotary_bank_keeps_its_energy() {
     let system = &compiled.parts.system;
     let linkage = Formulation::Rcr.linkage(system).unwrap();
     let n = linkage.coordinates;
-    let ramp = Ramp { electrics: &system.electrics, from: &[], to: &[], rise: &[], dt: 2e-6, push: &[] };
+    let ramp = Ramp::new(&system.electrics, &[], &[], &[], 2e-6);
     let drive = system.electrics.drive();
     let mut loads = JointLoads::new(system, &linkage, &ramp);
     let mut motion =

@@ -57,7 +57,7 @@ fn run(
     (method, stop, control): (Integrator, f64, Control),
 ) -> (Result<(), SolveError>, Work) {
     let rise = vec![0.0; system.electrics.heating.heaters.len()];
-    let ramp = Ramp { electrics: &system.electrics, from: volts.0, to: volts.1, rise: &rise, dt: stop, push: &[] };
+    let ramp = Ramp::new(&system.electrics, volts.0, volts.1, &rise, stop);
     let solver = Solver::Recursion(Recursion);
     let (end, work) = method.advance(system, solver, &ramp, motion, 1e-9, control, &mut |_, _, _, _| true);
     (end.map(|_| ()), work)

@@ -58,7 +58,7 @@ fn struck(compiled: &Compiled, rule: Rule, stop: f64, h: f64) -> (Vec<f64>, u64)
     let system = &compiled.parts.system;
     let linkage = Formulation::Rcr.linkage(system).unwrap();
     let n = linkage.coordinates;
-    let ramp = Ramp { electrics: &system.electrics, from: &[], to: &[], rise: &[], dt: stop, push: &[] };
+    let ramp = Ramp::new(&system.electrics, &[], &[], &[], stop);
     let scale = coordinate_scales(&linkage, system.length_scale);
     let mut motion = ImplicitMotion::new(&linkage, JointLoads::new(system, &linkage, &ramp), &scale);
     let mut now = Pair::zeros(n);

@@ -408,7 +408,7 @@ fn sensitivities_of_a_step_are_exact() {
     let from = [1.0, 9.0];
     let shortest = 1e-10;
     let after = |to: [f64; 2]| {
-        let before = Ramp { electrics, from: &[0.5, 3.0], to: &from, rise: &rise, dt: 3e-7, push: &[] };
+        let before = Ramp::new(electrics, &[0.5, 3.0], &from, &rise, 3e-7);
         let mut method = JointRodas4::new(Arc::clone(&joints), shortest, &[0, 1]);
         let (mut motion, mut error) = (Motion::zeros(count), Motion::zeros(count));
         method.start(system, &before, &motion).unwrap();
@@ -417,7 +417,7 @@ fn sensitivities_of_a_step_are_exact() {
         }
         // a moving start, from which the step that is differentiated goes on
         let rise: Vec<f64> = (0..rise.len()).map(|k| before.rise_at(k, 3e-7)).collect();
-        let ramp = Ramp { electrics, from: &from, to: &to, rise: &rise, dt: 2e-8, push: &[] };
+        let ramp = Ramp::new(electrics, &from, &to, &rise, 2e-8);
         method.forget_sensitivities();
         method.step(system, &ramp, 0.0, 2e-8, &mut motion, &mut error).unwrap();
         (motion, method.sensitivity.clone())

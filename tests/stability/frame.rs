@@ -112,7 +112,7 @@ impl Frame {
 
 /// A time of `dt` [s] in which nothing electrical happens.
 pub(crate) fn quiet(system: &System, dt: f64) -> Ramp<'_> {
-    Ramp { electrics: &system.electrics, from: &[], to: &[], rise: &[], dt, push: &[] }
+    Ramp::new(&system.electrics, &[], &[], &[], dt)
 }
 
 /// A cantilever of 200 µm × 2 µm along +x with `count` segments; its tip.

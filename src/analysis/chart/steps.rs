@@ -64,7 +64,7 @@ pub(super) fn measure(model: &Variant, request: &Request<'_>, kind: SolverKind) 
         start.q.copy_from_slice(&begin.q);
         rise.copy_from_slice(&begin.rise);
     }
-    let ramp = Ramp { electrics, from: &sources, to: &sources, rise: &rise, dt: request.stop, push: &[] };
+    let ramp = Ramp::new(electrics, &sources, &sources, &rise, request.stop);
     let h = SHARE * request.stop;
     let steps = (MULTIPLICATIONS / multiplications.max(1)).clamp(1, MOST_STEPS) as usize;
     let mut method = Rodas4::with_solver(solver, system, &[]);

@@ -201,7 +201,7 @@ mod tests {
         let mut rodas = Rodas4::new(system, &[0]);
         let (mut motion, mut error) = (Motion::zeros(1), Motion::zeros(1));
         let (from, to) = ([2.0], [end]);
-        let ramp = Ramp { electrics: &system.electrics, from: &from, to: &to, rise: &[], dt: 4e-5, push: &[] };
+        let ramp = Ramp::new(&system.electrics, &from, &to, &[], 4e-5);
         let h = ramp.dt / steps as f64;
         for k in 0..steps {
             let s = k as f64 * h;

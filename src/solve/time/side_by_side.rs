@@ -10,7 +10,7 @@ use super::adaptive::{FLOOR, MAX_REJECTED, contact_error};
 use super::method::Motion;
 use super::rodas4::lanes::{Lane, LaneRodas4};
 use super::step_size;
-use crate::gaps::{Course, Ramp, System};
+use crate::gaps::{Ramp, System};
 
 /// Exponent of the step-size rule: the estimated error falls with the fourth power of the step.
 const EXPONENT: f64 = -1.0 / 4.0;
@@ -102,7 +102,7 @@ pub fn advance<'a, const N: usize>(
                     continue;
                 }
                 method.put(k, variant.system, &variant.ramp, &variant.motion);
-                lanes[k] = Some(Lane { system: variant.system, course: Course::new(variant.ramp) });
+                lanes[k] = Some(Lane { system: variant.system, ramp: variant.ramp });
                 let system = variant.system;
                 running[k] = Some(Running {
                     number,
@@ -123,7 +123,7 @@ pub fn advance<'a, const N: usize>(
         crate::budget::check();
         for k in 0..N {
             if let (Some(run), Some(lane)) = (&running[k], &lanes[k]) {
-                (s[k], step[k]) = (run.s, step_size::fitted(run.h, lane.course.ramp.dt - run.s));
+                (s[k], step[k]) = (run.s, step_size::fitted(run.h, lane.ramp.dt - run.s));
             }
         }
         let vanished = method.step(&lanes, &s, &step);
@@ -133,7 +133,7 @@ pub fn advance<'a, const N: usize>(
                 method.go_back(k);
                 continue;
             };
-            let (system, dt, h) = (lane.system, lane.course.ramp.dt, step[k]);
+            let (system, dt, h) = (lane.system, lane.ramp.dt, step[k]);
             let wanted = run.watcher.wants(s[k], h);
             if wanted || run.contacts {
                 method.before.take(k, &mut before);

@@ -9,7 +9,7 @@ mod motion;
 pub use motion::{LaneMotion, Norms};
 
 use super::{A, ALPHA, C, GAMMA, GAMMA_I};
-use crate::gaps::{Course, Drive, Ramp, System};
+use crate::gaps::{Drive, Ramp, System};
 use crate::multibody::lanes::forces::{self, LaneRest};
 use crate::multibody::lanes::joint::LanePlaced;
 use crate::multibody::lanes::{LaneMatrix, LaneModel, LanePose, Lanes, Real, add, add_scaled, times, zero};
@@ -28,8 +28,8 @@ const IN_PLACE: usize = 4;
 pub struct Lane<'a> {
     /// The variant.
     pub system: &'a System,
-    /// Its heat.
-    pub course: Course<'a>,
+    /// Its sources and heat.
+    pub ramp: Ramp<'a>,
 }
 
 /// Change of the displacement and rate of one body.
@@ -170,7 +170,7 @@ impl<const N: usize> LaneRodas4<N> {
         let rate = &mut self.rate;
         for (k, lane) in lanes.iter().enumerate() {
             if let Some(lane) = lane {
-                lane.course.expansion_rates(s[k], |j, x| rate[j].set_lane(k, x));
+                lane.ramp.expansion_rates(s[k], |j, x| rate[j].set_lane(k, x));
             }
         }
         self.run(Task::Forcing);
@@ -211,7 +211,7 @@ impl<const N: usize> LaneRodas4<N> {
         let expansion = &mut self.expansion;
         for (k, lane) in lanes.iter().enumerate() {
             if let Some(lane) = lane {
-                lane.course.expansions(s[k], |j, x| expansion[j].set_lane(k, x));
+                lane.ramp.expansions(s[k], |j, x| expansion[j].set_lane(k, x));
             }
         }
     }
