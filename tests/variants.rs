@@ -158,7 +158,7 @@ fn alone(compiled: &Compiled, volts: &[f64], stop: f64, tol: f64) -> Option<Ran>
 }
 
 /// The same runs side by side.
-fn together<const N: usize>(variants: &[Compiled], volts: &[f64], stop: f64, tol: f64) -> Vec<Option<Ran>> {
+fn together(variants: &[Compiled], volts: &[f64], stop: f64, tol: f64) -> Vec<Option<Ran>> {
     let electrics: Vec<_> = variants.iter().map(|v| &v.parts.system.electrics).collect();
     let sources: Vec<Vec<f64>> = (electrics.iter())
         .map(|e| {
@@ -185,7 +185,7 @@ fn together<const N: usize>(variants: &[Compiled], volts: &[f64], stop: f64, tol
                 ends[number] = Some(motion);
             }
         };
-        let work = side_by_side::advance::<N>(&variants[0].parts.system, &mut next, &mut done);
+        let work = side_by_side::advance(&variants[0].parts.system, &mut next, &mut done);
         assert!(work.together < work.accepted + work.rejected, "nothing was side by side: {work:?}");
     }
     notes.into_iter().zip(ends).map(|(notes, end)| Some((notes.0, end?))).collect()
@@ -199,7 +199,7 @@ fn bits(ran: &Ran) -> Vec<u64> {
 
 /// Side by side a run has the steps and the bits that it has alone, whatever its neighbours are: variants that take many steps
 /// beside some that take few, contact, dampers, supports, heat, a comb, loads, one that cannot be stepped at all (a mass of
-/// 1e-300 kg), and one of another topology, which is left to a run alone. Eleven variants in lanes of 4 and 8.
+/// 1e-300 kg), and one of another topology, which is left to a run alone. Eleven variants in eight lanes.
 #[test]
 fn a_lane_has_the_bits_of_its_variant_alone() {
     let bank = std::fs::read_to_string("examples/bank/bank.net").expect("the bank");
@@ -247,20 +247,18 @@ drive port * [m e] []
     {
         let volts = &volts;
         let one: Vec<_> = variants.iter().map(|v| alone(v, volts, stop, 1e-5)).collect();
-        let runs = [together::<4>(variants, volts, stop, 1e-5), together::<8>(variants, volts, stop, 1e-5)];
+        let run = together(variants, volts, stop, 1e-5);
         let steps: Vec<usize> = one.iter().flatten().map(|ran| ran.0.len()).collect();
         assert!(steps.iter().max() > steps.iter().min(), "{name}: all alike {steps:?}");
-        for run in &runs {
-            for (number, (lane, alone)) in run.iter().zip(&one).enumerate() {
-                match (lane, alone) {
-                    (Some(lane), Some(alone)) => {
-                        assert_eq!(lane.0.len(), alone.0.len(), "{name} {number}");
-                        assert!(bits(lane) == bits(alone), "{name} {number}");
-                        assert!(!odd.contains(&number));
-                    }
-                    (None, _) => assert!(odd.contains(&number) || alone.is_none(), "{name} {number} has no lane"),
-                    (Some(_), None) => panic!("{name} {number} ends in a lane and not alone"),
+        for (number, (lane, alone)) in run.iter().zip(&one).enumerate() {
+            match (lane, alone) {
+                (Some(lane), Some(alone)) => {
+                    assert_eq!(lane.0.len(), alone.0.len(), "{name} {number}");
+                    assert!(bits(lane) == bits(alone), "{name} {number}");
+                    assert!(!odd.contains(&number));
                 }
+                (None, _) => assert!(odd.contains(&number) || alone.is_none(), "{name} {number} has no lane"),
+                (Some(_), None) => panic!("{name} {number} ends in a lane and not alone"),
             }
         }
     }

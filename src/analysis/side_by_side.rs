@@ -20,9 +20,6 @@ use crate::solve::time::side_by_side::{self, Ended, LaneWork, Variant, Watcher};
 
 use super::integrator::Integrator;
 
-/// Lanes that go side by side. Four, one vector of AVX2, were measured to be slower than eight.
-pub const LANES: usize = 8;
-
 /// What a run ends with.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RunEnd {
@@ -86,7 +83,7 @@ pub fn ends(
                 Ended::Alone => {}
             };
             let first = &variants[left[0]].parts.system;
-            let round = side_by_side::advance::<LANES>(first, &mut next, &mut done);
+            let round = side_by_side::advance(first, &mut next, &mut done);
             work.together += round.together;
             work.accepted += round.accepted;
             work.rejected += round.rejected;

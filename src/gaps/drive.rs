@@ -236,21 +236,20 @@ impl<'a> Ramp<'a> {
         lags.of(tau).rise(self.rise[k], p)
     }
 
-    /// The free strain of each heater at time `s` after the start.
-    pub fn expansions(&self, s: f64, mut put: impl FnMut(usize, f64)) {
-        let mut lags = Lags::new(s);
+    /// The free strain of each heater at the time of `lags` after the start.
+    pub fn expansions(&self, lags: &mut Lags, mut put: impl FnMut(usize, f64)) {
         for (k, heater) in self.electrics.heating.heaters.iter().enumerate() {
-            put(k, heater.expansion * self.rise_after(k, &mut lags));
+            put(k, heater.expansion * self.rise_after(k, lags));
         }
     }
 
     /// Their rates of change in time [1/s].
-    pub fn expansion_rates(&self, s: f64, mut put: impl FnMut(usize, f64)) {
-        let mut lags = Lags::new(s);
+    pub fn expansion_rates(&self, lags: &mut Lags, mut put: impl FnMut(usize, f64)) {
+        let s = lags.t;
         for (k, heater) in self.electrics.heating.heaters.iter().enumerate() {
             let p = self.heat[k];
             let slope = if heater.time_constant > 0.0 {
-                (p[0] + s * (p[1] + s * p[2]) - self.rise_after(k, &mut lags)) / heater.time_constant
+                (p[0] + s * (p[1] + s * p[2]) - self.rise_after(k, lags)) / heater.time_constant
             } else {
                 p[1] + 2.0 * s * p[2]
             };
@@ -260,11 +259,23 @@ impl<'a> Ramp<'a> {
 
     /// The drive at time `s` after the start.
     pub fn at(&self, s: f64, drive: &mut Drive) {
+        self.set(&mut Lags::new(s), drive);
+    }
+
+    /// The drive at time `s`, and its rate of change in time [1/s].
+    pub fn at_and_rate(&self, s: f64, drive: &mut Drive, rate: &mut Drive) {
+        let mut lags = Lags::new(s);
+        self.set(&mut lags, drive);
+        self.set_rate(&mut lags, rate);
+    }
+
+    fn set(&self, lags: &mut Lags, drive: &mut Drive) {
+        let s = lags.t;
         let x = s / self.dt;
         for (g, v) in drive.volts.iter_mut().enumerate() {
             *v = self.gap(g, |i| self.from[i] + x * (self.to[i] - self.from[i]));
         }
-        self.expansions(s, |k, strain| drive.expansion[k] = strain);
+        self.expansions(lags, |k, strain| drive.expansion[k] = strain);
         drive.push.clear();
         drive.push.extend_from_slice(self.push);
         let first = self.electrics.voltages();
@@ -278,12 +289,11 @@ impl<'a> Ramp<'a> {
         }
     }
 
-    /// The drive's rate of change in time at `s` [1/s].
-    pub fn rate(&self, s: f64, rate: &mut Drive) {
+    fn set_rate(&self, lags: &mut Lags, rate: &mut Drive) {
         for (g, v) in rate.volts.iter_mut().enumerate() {
             *v = self.gap(g, |i| (self.to[i] - self.from[i]) / self.dt);
         }
-        self.expansion_rates(s, |k, strain| rate.expansion[k] = strain);
+        self.expansion_rates(lags, |k, strain| rate.expansion[k] = strain);
         let first = self.electrics.voltages();
         for (k, value) in rate.inputs.iter_mut().enumerate() {
             *value = (self.to[first + k] - self.from[first + k]) / self.dt;

@@ -43,4 +43,5 @@ mod touching;
 
 pub use drive::{Drive, Ramp};
 pub use inputs::Input;
+pub use lag::Lags;
 pub use system::{Gap, Load, Point, System};

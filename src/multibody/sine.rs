@@ -4,7 +4,11 @@
 //! Reference: the minimax polynomials of K. C. Ng, FreeBSD msun `k_sin.c` and `k_cos.c` (1993), which carry |x| ≤ π/4 with an
 //! error of the series below 2⁻⁵⁸.
 
+use crate::multibody::lanes::Number;
 use std::f64::consts::FRAC_PI_4;
+
+/// Largest angle of [`small`] [rad].
+pub const SMALL: f64 = FRAC_PI_4;
 
 // digits as published
 #[allow(clippy::excessive_precision)]
@@ -27,32 +31,16 @@ pub fn sin_cos(x: f64) -> (f64, f64) {
     if x.abs() <= FRAC_PI_4 { small(x) } else { x.sin_cos() }
 }
 
+/// [`sin_cos`] for |x| ≤ [`SMALL`], of a number or of one in every lane.
 #[inline(always)]
-fn small(x: f64) -> (f64, f64) {
+pub fn small<T: Number>(x: T) -> (T, T) {
     let z = x * x;
     let w = z * z;
-    let s = SIN[1] + z * (SIN[2] + z * SIN[3]) + z * w * (SIN[4] + z * SIN[5]);
-    let c = z * (COS[0] + z * (COS[1] + z * COS[2])) + w * w * (COS[3] + z * (COS[4] + z * COS[5]));
-    let half = 0.5 * z;
-    let less = 1.0 - half;
-    (x + z * x * (SIN[0] + z * s), less + (((1.0 - less) - half) + z * c))
-}
-
-/// [`sin_cos`] of some angles at once, the bits of each alone.
-#[inline(always)]
-pub fn sin_cos_lanes<const N: usize>(x: [f64; N]) -> ([f64; N], [f64; N]) {
-    let (mut sin, mut cos) = (x, x);
-    let mut near = true;
-    for k in 0..N {
-        near &= x[k].abs() <= FRAC_PI_4;
-        (sin[k], cos[k]) = small(x[k]);
-    }
-    if !near {
-        for k in 0..N {
-            (sin[k], cos[k]) = sin_cos(x[k]);
-        }
-    }
-    (sin, cos)
+    let s = z * (z * SIN[3] + SIN[2]) + SIN[1] + z * w * (z * SIN[5] + SIN[4]);
+    let c = z * (z * (z * COS[2] + COS[1]) + COS[0]) + w * w * (z * (z * COS[5] + COS[4]) + COS[3]);
+    let half = z * 0.5;
+    let less = -half + 1.0;
+    (x + z * x * (z * s + SIN[0]), less + (((-less + 1.0) - half) + z * c))
 }
 
 /// Largest angle of [`reduced`] [rad].
@@ -107,10 +95,6 @@ mod tests {
             assert_eq!(sin_cos(-x), (-s, c));
         }
         assert_eq!(sin_cos(2.0), 2f64.sin_cos());
-        for x in [[0.1, -0.7, 0.0, 1e-9], [0.1, 2.0, -9.0, 0.5]] {
-            let (s, c) = sin_cos_lanes(x);
-            assert_eq!(x.map(sin_cos), std::array::from_fn(|k| (s[k], c[k])));
-        }
         assert!(sin_cos(f64::NAN).0.is_nan());
     }
 }

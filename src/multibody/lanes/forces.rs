@@ -1,130 +1,151 @@
 //! Elastic forces, tangent, damping and inertia over lanes: [`crate::multibody::forces`].
 
-use super::joint::{LaneKinematics, LanePair, LanePlaced, kinematics};
+use super::joint::{LaneKinematics, LanePair, LanePlaced, LaneSection, kinematics};
 use super::model::{LaneJoint, LaneModel, Shared};
-use super::{LaneMatrix, LanePose, Lanes, Real, add, times, zero};
+use super::{Eight, LaneBlock, LaneMatrix, LanePose, Wide, add, load, load_block, store, times};
 use crate::multibody::BodyId;
 use crate::multibody::section::{NONE, Place};
 
 /// What sets the axial rest offsets, or the change of it.
 #[derive(Debug, Clone, Copy)]
-pub struct LaneRest<'a, const N: usize> {
+pub struct LaneRest<'a> {
     /// Free strain of each group of joints [1].
-    pub expansion: &'a [Lanes<N>],
-    /// Share of the built-in offsets that acts [1].
-    pub built_in: Lanes<N>,
+    pub expansion: &'a [Eight],
+    /// Share of the built-in offsets that acts, the same in every lane [1].
+    pub built_in: f64,
 }
 
 /// Puts every body where `q` says; ground stays behind the last.
 #[inline(always)]
-pub fn place<const N: usize>(q: &[LanePose<N>], placed: &mut [LanePlaced<N>]) {
+pub fn place<W: Wide>(simd: W::Simd, q: &[LanePose], placed: &mut [LanePlaced]) {
     for (placed, q) in placed.iter_mut().zip(q) {
-        placed.put(q);
+        placed.put::<W>(simd, q);
     }
 }
 
-/// Kinematics of a joint.
-#[inline(always)]
-fn strained<const N: usize>(joint: &LaneJoint<N>, shared: &Shared<N>, placed: &[LanePlaced<N>]) -> LaneKinematics<N> {
-    // ground is the largest index, and stands last
-    let at = |body: u32| &placed[(body as usize).min(placed.len() - 1)];
-    kinematics(&shared.section, (&joint.arm_a, &joint.arm_b), at(joint.place.a), at(joint.place.b))
+/// A joint at work: what it shares with others, its kinematics, and its axial rest offset.
+struct Strained<W> {
+    section: LaneSection<W>,
+    k: LaneKinematics<W>,
+    offset: W,
+}
+
+impl<W: Wide> Strained<W> {
+    #[inline(always)]
+    fn new(simd: W::Simd, joint: &LaneJoint, shared: &Shared, placed: &[LanePlaced], rest: &LaneRest<'_>) -> Self {
+        // ground is the largest index, and stands last
+        let at = |body: u32| placed[(body as usize).min(placed.len() - 1)].load::<W>(simd);
+        let section = shared.section.load::<W>(simd);
+        let arms = (&load(simd, &joint.arm_a), &load(simd, &joint.arm_b));
+        let k = kinematics(&section, arms, &at(joint.place.a), &at(joint.place.b));
+        Self { section, k, offset: offset(simd, joint, shared, rest) }
+    }
+
+    #[inline(always)]
+    fn stress(&self) -> LanePose<W> {
+        let [u, g, p] = self.k.strain;
+        self.section.stress(&[u - self.offset, g, p])
+    }
 }
 
 #[inline(always)]
-fn offset<const N: usize>(joint: &LaneJoint<N>, shared: &Shared<N>, rest: &LaneRest<'_, N>) -> Lanes<N> {
-    let heat = shared.expansion.map_or(Lanes::ZERO, |(group, length)| length * rest.expansion[group]);
-    joint.rest * rest.built_in + heat
-}
-
-#[inline(always)]
-fn stress<const N: usize>(
-    joint: &LaneJoint<N>,
-    shared: &Shared<N>,
-    k: &LaneKinematics<N>,
-    rest: &LaneRest<'_, N>,
-) -> LanePose<N> {
-    shared.section.stress(&[k.strain[0] - offset(joint, shared, rest), k.strain[1], k.strain[2]])
+fn offset<W: Wide>(simd: W::Simd, joint: &LaneJoint, shared: &Shared, rest: &LaneRest<'_>) -> W {
+    let of = |x: &Eight| W::load(simd, x);
+    let heat = match &shared.expansion {
+        Some((group, length)) => of(length) * of(&rest.expansion[*group]),
+        None => W::splat(simd, 0.0),
+    };
+    of(&joint.rest) * rest.built_in + heat
 }
 
 /// `r +=` the elastic forces of bodies at `q`, where they have been placed, from the last joint to the first.
 #[inline(always)]
-pub fn add_elastic_backwards<const N: usize>(
-    model: &LaneModel<N>,
-    (q, placed): (&[LanePose<N>], &[LanePlaced<N>]),
-    rest: &LaneRest<'_, N>,
-    r: &mut [LanePose<N>],
+pub fn add_elastic_backwards<W: Wide>(
+    simd: W::Simd,
+    model: &LaneModel,
+    (q, placed): (&[LanePose], &[LanePlaced]),
+    rest: &LaneRest<'_>,
+    r: &mut [LanePose],
 ) {
     for joint in model.joints.iter().rev() {
-        let shared = &model.sections[joint.section as usize];
-        let k = strained(joint, shared, placed);
-        scatter(joint.place, &k.forces(&stress(joint, shared, &k, rest)), r);
+        let strained = Strained::<W>::new(simd, joint, &model.sections[joint.section as usize], placed, rest);
+        scatter(simd, joint.place, &strained.k.forces(&strained.stress()), r);
     }
-    add_couplings(model, q, r);
+    add_couplings::<W>(simd, model, q, r);
 }
 
 /// `tangent +=` that of the elastic forces, and `r +=` the forces.
 #[inline(always)]
-pub fn add_tangent<const N: usize>(
-    model: &LaneModel<N>,
-    (q, placed): (&[LanePose<N>], &[LanePlaced<N>]),
-    rest: &LaneRest<'_, N>,
-    tangent: &mut LaneMatrix<N>,
-    r: &mut [LanePose<N>],
+pub fn add_tangent<W: Wide>(
+    simd: W::Simd,
+    model: &LaneModel,
+    (q, placed): (&[LanePose], &[LanePlaced]),
+    rest: &LaneRest<'_>,
+    tangent: &mut LaneMatrix,
+    r: &mut [LanePose],
 ) {
     for joint in &model.joints {
-        let shared = &model.sections[joint.section as usize];
-        let k = strained(joint, shared, placed);
-        let stress = stress(joint, shared, &k, rest);
-        scatter(joint.place, &k.forces(&stress), r);
-        add_pair(joint.place, tangent, &k.tangent(&shared.section, &stress));
+        let strained = Strained::<W>::new(simd, joint, &model.sections[joint.section as usize], placed, rest);
+        let stress = strained.stress();
+        scatter(simd, joint.place, &strained.k.forces(&stress), r);
+        add_pair(simd, joint.place, tangent, &strained.k.tangent(&strained.section, &stress));
     }
-    add_couplings(model, q, r);
+    add_couplings::<W>(simd, model, q, r);
     add_coupling_tangent(model, tangent);
 }
 
 /// `r +=` the forces that a change of the rest offsets brings; lanes without a change stay as they are.
 #[inline(always)]
-pub fn add_rest_change<const N: usize>(
-    model: &LaneModel<N>,
-    placed: &[LanePlaced<N>],
-    change: &LaneRest<'_, N>,
-    r: &mut [LanePose<N>],
+pub fn add_rest_change<W: Wide>(
+    simd: W::Simd,
+    model: &LaneModel,
+    placed: &[LanePlaced],
+    change: &LaneRest<'_>,
+    r: &mut [LanePose],
 ) {
     for joint in &model.joints {
         let shared = &model.sections[joint.section as usize];
-        let offset = offset(joint, shared, change);
-        let acts = offset.0.map(|x| x != 0.0);
-        if acts.iter().any(|acts| *acts) {
-            let k = strained(joint, shared, placed);
-            let (a, b) = k.forces(&shared.section.stress(&[-offset, Lanes::ZERO, Lanes::ZERO]));
-            for (body, force) in [(joint.place.a, a), (joint.place.b, b)] {
-                if body != NONE {
-                    for (r, force) in r[body as usize].iter_mut().zip(force) {
-                        for lane in 0..N {
-                            r.0[lane] = if acts[lane] { r.0[lane] + force.0[lane] } else { r.0[lane] };
-                        }
-                    }
+        let offset = offset::<W>(simd, joint, shared, change);
+        let mut acts = Eight::NONE;
+        offset.store(&mut acts);
+        if acts.0.iter().all(|x| *x == 0.0) {
+            continue;
+        }
+        let strained = Strained::<W>::new(simd, joint, shared, placed, change);
+        let none = W::splat(simd, 0.0);
+        let (a, b) = strained.k.forces(&strained.section.stress(&[-offset, none, none]));
+        for (body, force) in [(joint.place.a, a), (joint.place.b, b)] {
+            if body != NONE {
+                for (r, force) in r[body as usize].iter_mut().zip(force) {
+                    let before = W::load(simd, r);
+                    offset.if_zero(before, before + force).store(r);
                 }
             }
         }
     }
 }
 
-/// `r +=` the forces of dampers, with the rate of each body from `v`.
+/// `r +=` the forces of dampers at the rates `v`.
 #[inline(always)]
-pub fn add_dampers<const N: usize>(model: &LaneModel<N>, v: impl Fn(usize) -> LanePose<N>, r: &mut [LanePose<N>]) {
-    let rate = |id: BodyId| if let BodyId::Free(k) = id { v(k) } else { zero() };
+pub fn add_dampers<W: Wide>(simd: W::Simd, model: &LaneModel, v: &[LanePose], r: &mut [LanePose]) {
     for damper in &model.dampers {
-        let (va, vb) = (rate(damper.bodies.0), rate(damper.bodies.1));
-        let pair = [va[0], va[1], va[2], vb[0], vb[1], vb[2]];
-        let force = |i: usize| {
-            let row = &damper.matrix[i];
-            (1..6).fold(row[0] * pair[0], |sum, j| row[j] * pair[j] + sum)
-        };
+        let mut pair = [W::splat(simd, 0.0); 6];
         for (id, from) in [(damper.bodies.0, 0), (damper.bodies.1, 3)] {
             if let BodyId::Free(k) = id {
-                add(&mut r[k], &[force(from), force(from + 1), force(from + 2)]);
+                for i in 0..3 {
+                    pair[from + i] = W::load(simd, &v[k][i]);
+                }
+            }
+        }
+        for (id, from) in [(damper.bodies.0, 0), (damper.bodies.1, 3)] {
+            let BodyId::Free(k) = id else { continue };
+            for i in 0..3 {
+                let row = load::<W, 6>(simd, &damper.matrix[from + i]);
+                let mut force = row[0] * pair[0];
+                for j in 1..6 {
+                    force = row[j] * pair[j] + force;
+                }
+                (W::load(simd, &r[k][i]) + force).store(&mut r[k][i]);
             }
         }
     }
@@ -132,32 +153,34 @@ pub fn add_dampers<const N: usize>(model: &LaneModel<N>, v: impl Fn(usize) -> La
 
 /// `matrix += m·M + c·C`.
 #[inline(always)]
-pub fn add_inertia<const N: usize>(model: &LaneModel<N>, m: Lanes<N>, c: Lanes<N>, matrix: &mut LaneMatrix<N>) {
+pub fn add_inertia<W: Wide>(simd: W::Simd, model: &LaneModel, m: W, c: W, matrix: &mut LaneMatrix) {
+    let plus = |to: &mut Eight, x: W| (W::load(simd, to) + x).store(to);
     for (block, body) in matrix.diagonal.iter_mut().zip(&model.bodies) {
+        let body = body.load::<W>(simd);
         let first = [body.first[0] * c, body.first[1] * c];
         let translation = m * body.mass[0] + c * body.drag;
-        block[0][0] += translation;
-        block[1][1] += translation;
-        block[2][2] += m * body.mass[2] + c * body.second;
+        plus(&mut block[0][0], translation);
+        plus(&mut block[1][1], translation);
+        plus(&mut block[2][2], m * body.mass[2] + c * body.second);
         for (i, lever) in [(0, -first[1]), (1, first[0])] {
-            block[2][i] += lever;
-            block[i][2] += lever;
+            plus(&mut block[2][i], lever);
+            plus(&mut block[i][2], lever);
         }
     }
     for damper in &model.dampers {
-        let at = |i: usize, j: usize| damper.matrix[i][j] * c;
+        let at = |i: usize, j: usize| W::load(simd, &damper.matrix[i][j]) * c;
         let Place { a, b, block } = damper.place;
         for (body, from) in [(a, 0), (b, 3)] {
             if body != NONE {
-                add_corner(&mut matrix.diagonal[body as usize], |i, j| at(from + i, from + j));
+                add_corner(simd, &mut matrix.diagonal[body as usize], |i, j| at(from + i, from + j));
             }
         }
         if block != NONE {
             let below = &mut matrix.below[block as usize];
             if a > b {
-                add_corner(below, |i, j| at(i, 3 + j));
+                add_corner(simd, below, |i, j| at(i, 3 + j));
             } else {
-                add_corner(below, |i, j| at(3 + i, j));
+                add_corner(simd, below, |i, j| at(3 + i, j));
             }
         }
     }
@@ -165,79 +188,80 @@ pub fn add_inertia<const N: usize>(model: &LaneModel<N>, m: Lanes<N>, c: Lanes<N
 
 /// Removes the held directions from a vector.
 #[inline(always)]
-pub fn project<const N: usize>(model: &LaneModel<N>, x: &mut [LanePose<N>]) {
+pub fn project<W: Wide>(simd: W::Simd, model: &LaneModel, x: &mut [LanePose]) {
     if model.holds {
         for (x, held) in x.iter_mut().zip(&model.held) {
             if let Some((p, _)) = held {
-                *x = times(p, x);
+                store(times(&load_block::<W>(simd, p), &load(simd, x)), x);
             }
         }
     }
 }
 
 #[inline(always)]
-fn add_corner<const N: usize>(block: &mut super::LaneBlock<N>, entry: impl Fn(usize, usize) -> Lanes<N>) {
+fn add_corner<W: Wide>(simd: W::Simd, block: &mut LaneBlock, entry: impl Fn(usize, usize) -> W) {
     for (j, column) in block.iter_mut().enumerate() {
-        for (i, to) in column.iter_mut().enumerate() {
-            *to += entry(i, j);
-        }
+        add(simd, column, &[entry(0, j), entry(1, j), entry(2, j)]);
     }
 }
 
 #[inline(always)]
-fn scatter<const N: usize>(place: Place, (a, b): &(LanePose<N>, LanePose<N>), r: &mut [LanePose<N>]) {
+fn scatter<W: Wide>(simd: W::Simd, place: Place, (a, b): &(LanePose<W>, LanePose<W>), r: &mut [LanePose]) {
     if place.a != NONE {
-        add(&mut r[place.a as usize], a);
+        add(simd, &mut r[place.a as usize], a);
     }
     if place.b != NONE {
-        add(&mut r[place.b as usize], b);
+        add(simd, &mut r[place.b as usize], b);
     }
 }
 
 #[inline(always)]
-fn add_pair<const N: usize>(place: Place, matrix: &mut LaneMatrix<N>, h: &LanePair<N>) {
+fn add_pair<W: Wide>(simd: W::Simd, place: Place, matrix: &mut LaneMatrix, h: &LanePair<W>) {
     if place.a != NONE {
-        h.add_aa(&mut matrix.diagonal[place.a as usize]);
+        h.add_aa(simd, &mut matrix.diagonal[place.a as usize]);
     }
     if place.b != NONE {
-        h.add_bb(&mut matrix.diagonal[place.b as usize]);
+        h.add_bb(simd, &mut matrix.diagonal[place.b as usize]);
     }
     if place.block != NONE {
-        h.add_ab(&mut matrix.below[place.block as usize], place.a < place.b);
+        h.add_ab(simd, &mut matrix.below[place.block as usize], place.a < place.b);
     }
 }
 
 #[inline(always)]
-fn turn_between<const N: usize>(q: &[LanePose<N>], (a, b): (BodyId, BodyId)) -> Lanes<N> {
-    let at = |id: BodyId| if let BodyId::Free(k) = id { q[k][2] } else { Lanes::ZERO };
-    at(b) - at(a)
-}
-
-#[inline(always)]
-fn add_couplings<const N: usize>(model: &LaneModel<N>, q: &[LanePose<N>], r: &mut [LanePose<N>]) {
+fn add_couplings<W: Wide>(simd: W::Simd, model: &LaneModel, q: &[LanePose], r: &mut [LanePose]) {
+    let at = |id: BodyId| if let BodyId::Free(k) = id { W::load(simd, &q[k][2]) } else { W::splat(simd, 0.0) };
     for coupling in &model.couplings {
-        let (first, second) = (turn_between(q, coupling.first), turn_between(q, coupling.second));
+        let between = |(a, b): (BodyId, BodyId)| at(b) - at(a);
+        let (first, second) = (between(coupling.first), between(coupling.second));
+        let stiffness = W::load(simd, &coupling.stiffness);
         for ((a, b), moment) in [(coupling.first, second), (coupling.second, first)] {
-            for (id, side) in [(a, -coupling.stiffness), (b, coupling.stiffness)] {
+            for (id, side) in [(a, -stiffness), (b, stiffness)] {
                 if let BodyId::Free(k) = id {
-                    r[k][2] += side * moment;
+                    (W::load(simd, &r[k][2]) + side * moment).store(&mut r[k][2]);
                 }
             }
         }
     }
 }
 
+/// Rare, and few: lane by lane.
 #[inline(always)]
-fn add_coupling_tangent<const N: usize>(model: &LaneModel<N>, tangent: &mut LaneMatrix<N>) {
+fn add_coupling_tangent(model: &LaneModel, tangent: &mut LaneMatrix) {
     for coupling in &model.couplings {
         let (first, second) = (coupling.first, coupling.second);
-        for (i, row) in [(first.0, -coupling.stiffness), (first.1, coupling.stiffness)] {
+        for (i, sign) in [(first.0, -1.0), (first.1, 1.0)] {
             for (j, side) in [(second.0, -1.0), (second.1, 1.0)] {
                 let (BodyId::Free(i), BodyId::Free(j)) = (i, j) else { continue };
-                if i == j {
-                    tangent.diagonal[i][2][2] += Lanes::splat(2.0) * row * Lanes::splat(side);
+                let (to, twice) = if i == j {
+                    (&mut tangent.diagonal[i][2][2], 2.0)
                 } else if let Some(block) = model.pattern.block(i.max(j), i.min(j)) {
-                    tangent.below[block][2][2] += row * Lanes::splat(side);
+                    (&mut tangent.below[block][2][2], 1.0)
+                } else {
+                    continue;
+                };
+                for (to, stiffness) in to.0.iter_mut().zip(coupling.stiffness.0) {
+                    *to += twice * (sign * stiffness) * side;
                 }
             }
         }

@@ -1,40 +1,38 @@
 //! Strains of a joint, its forces and its tangent: [`crate::multibody::planar`] over lanes.
 
-use super::{LaneBlock, LanePose, Lanes, Real};
+use super::{Eight, LaneBlock, LanePose, Number, STILL, Wide, add, load};
 
 /// Two numbers of the plane.
-pub type Pair<const N: usize> = [Lanes<N>; 2];
+pub type Pair<T = Eight> = [T; 2];
 
 /// Sine and cosine of half of a body's rotation, with R(θ) − 1.
 #[derive(Debug, Clone, Copy)]
-pub struct LaneTurn<const N: usize> {
-    sin: Lanes<N>,
-    cos: Lanes<N>,
-    less: Lanes<N>,
-    whole: Lanes<N>,
+pub struct LaneTurn<T = Eight> {
+    sin: T,
+    cos: T,
+    less: T,
+    whole: T,
 }
 
-impl<const N: usize> LaneTurn<N> {
+impl LaneTurn {
     /// Of ground.
-    const REST: Self =
-        Self { sin: Lanes([0.0; N]), cos: Lanes([1.0; N]), less: Lanes([0.0; N]), whole: Lanes([0.0; N]) };
+    const REST: Self = Self { sin: Eight::NONE, cos: Eight::of(1.0), less: Eight::NONE, whole: Eight::NONE };
 
-    /// Of a rotation [rad].
     #[inline(always)]
-    fn new(theta: Lanes<N>) -> Self {
-        let half = Lanes::splat(0.5) * theta;
-        let (sin, cos) = crate::multibody::sine::sin_cos_lanes(half.0);
-        let (sin, cos) = (Lanes(sin), Lanes(cos));
-        Self { sin, cos, less: Lanes::splat(-2.0) * sin * sin, whole: Lanes::splat(2.0) * sin * cos }
+    fn load<W: Wide>(&self, simd: W::Simd) -> LaneTurn<W> {
+        let of = |x: &Eight| W::load(simd, x);
+        LaneTurn { sin: of(&self.sin), cos: of(&self.cos), less: of(&self.less), whole: of(&self.whole) }
     }
+}
 
+impl<T: Number> LaneTurn<T> {
     #[inline(always)]
-    fn swing(&self, v: &Pair<N>) -> Pair<N> {
+    fn swing(&self, v: &Pair<T>) -> Pair<T> {
         [self.less * v[0] - self.whole * v[1], self.whole * v[0] + self.less * v[1]]
     }
 
     #[inline(always)]
-    fn mean(&self, other: &Self, v: &Pair<N>) -> Pair<N> {
+    fn mean(&self, other: &Self, v: &Pair<T>) -> Pair<T> {
         let c = self.cos * other.cos - self.sin * other.sin;
         let s = self.sin * other.cos + self.cos * other.sin;
         [c * v[0] - s * v[1], s * v[0] + c * v[1]]
@@ -43,100 +41,119 @@ impl<const N: usize> LaneTurn<N> {
 
 /// Where a body is: its displacement and its turn, looked up by each of its joints.
 #[derive(Debug, Clone, Copy)]
-pub struct LanePlaced<const N: usize> {
-    q: LanePose<N>,
-    turn: LaneTurn<N>,
+pub struct LanePlaced<T = Eight> {
+    q: LanePose<T>,
+    turn: LaneTurn<T>,
 }
 
-impl<const N: usize> LanePlaced<N> {
+impl LanePlaced {
     /// Ground.
-    pub const GROUND: Self = Self { q: [Lanes([0.0; N]); 3], turn: LaneTurn::REST };
+    pub const GROUND: Self = Self { q: STILL, turn: LaneTurn::REST };
 
     /// A body at `q`.
     #[inline(always)]
-    pub fn put(&mut self, q: &LanePose<N>) {
+    pub fn put<W: Wide>(&mut self, simd: W::Simd, q: &LanePose) {
         self.q = *q;
-        self.turn = LaneTurn::new(q[2]);
+        let (sin, cos) = (W::load(simd, &q[2]) * 0.5).sin_cos(simd);
+        sin.store(&mut self.turn.sin);
+        cos.store(&mut self.turn.cos);
+        (sin * -2.0 * sin).store(&mut self.turn.less);
+        (sin * 2.0 * cos).store(&mut self.turn.whole);
+    }
+
+    /// From memory.
+    #[inline(always)]
+    pub fn load<W: Wide>(&self, simd: W::Simd) -> LanePlaced<W> {
+        LanePlaced { q: load(simd, &self.q), turn: self.turn.load(simd) }
     }
 }
 
 /// What joints of one section share.
 #[derive(Debug, Clone, Copy)]
-pub struct LaneSection<const N: usize> {
+pub struct LaneSection<T = Eight> {
     /// Cosine and sine of the drawn angle.
-    pub axis: Pair<N>,
+    pub axis: Pair<T>,
     /// Stiffness: uu, ug, up, gg, gp, pp.
-    pub stiffness: [Lanes<N>; 6],
+    pub stiffness: [T; 6],
     /// Q over (g, p): gg, gp, pp.
-    pub second: [Lanes<N>; 3],
+    pub second: [T; 3],
 }
 
-impl<const N: usize> LaneSection<N> {
+impl LaneSection {
+    /// From memory.
+    #[inline(always)]
+    pub fn load<W: Wide>(&self, simd: W::Simd) -> LaneSection<W> {
+        let Self { axis, stiffness, second } = self;
+        LaneSection { axis: load(simd, axis), stiffness: load(simd, stiffness), second: load(simd, second) }
+    }
+}
+
+impl<T: Number> LaneSection<T> {
     /// Stress of a strain.
     #[inline(always)]
-    pub fn stress(&self, e: &LanePose<N>) -> LanePose<N> {
+    pub fn stress(&self, e: &LanePose<T>) -> LanePose<T> {
         multiply(&self.stiffness, e)
     }
 }
 
 /// Strains with what their derivatives need.
 #[derive(Debug, Clone, Copy)]
-pub struct LaneKinematics<const N: usize> {
+pub struct LaneKinematics<T = Eight> {
     /// e_u [m], g [m], p [rad].
-    pub strain: LanePose<N>,
-    axial: Lanes<N>,
-    shear: Lanes<N>,
-    bent: Pair<N>,
-    opening: Pair<N>,
-    radius_a: Pair<N>,
-    radius_b: Pair<N>,
-    e1: Pair<N>,
+    pub strain: LanePose<T>,
+    axial: T,
+    shear: T,
+    bent: Pair<T>,
+    opening: Pair<T>,
+    radius_a: Pair<T>,
+    radius_b: Pair<T>,
+    e1: Pair<T>,
 }
 
 /// The tangent of a pair of bodies, see [`crate::multibody::planar::PairTangent`].
 #[derive(Debug, Clone, Copy)]
-pub struct LanePair<const N: usize> {
-    shift: [Lanes<N>; 3],
-    shift_a: Pair<N>,
-    shift_b: Pair<N>,
-    turn: [Lanes<N>; 3],
+pub struct LanePair<T = Eight> {
+    shift: [T; 3],
+    shift_a: Pair<T>,
+    shift_b: Pair<T>,
+    turn: [T; 3],
 }
 
 #[inline(always)]
-fn turn<const N: usize>(v: &Pair<N>) -> Pair<N> {
+fn turn<T: Number>(v: &Pair<T>) -> Pair<T> {
     [-v[1], v[0]]
 }
 
 #[inline(always)]
-fn dot<const N: usize>(a: &Pair<N>, b: &Pair<N>) -> Lanes<N> {
+fn dot<T: Number>(a: &Pair<T>, b: &Pair<T>) -> T {
     a[0] * b[0] + a[1] * b[1]
 }
 
 #[inline(always)]
-fn dot3<const N: usize>(a: &LanePose<N>, b: &LanePose<N>) -> Lanes<N> {
+fn dot3<T: Number>(a: &LanePose<T>, b: &LanePose<T>) -> T {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// a·x + b·y.
 #[inline(always)]
-fn combine<const N: usize>(a: &Pair<N>, x: Lanes<N>, b: &Pair<N>, y: Lanes<N>) -> Pair<N> {
+fn combine<T: Number>(a: &Pair<T>, x: T, b: &Pair<T>, y: T) -> Pair<T> {
     [a[0] * x + b[0] * y, a[1] * x + b[1] * y]
 }
 
 #[inline(always)]
-fn multiply<const N: usize>(k: &[Lanes<N>; 6], x: &LanePose<N>) -> LanePose<N> {
+fn multiply<T: Number>(k: &[T; 6], x: &LanePose<T>) -> LanePose<T> {
     let [uu, ug, up, gg, gp, pp] = *k;
     [uu * x[0] + ug * x[1] + up * x[2], ug * x[0] + gg * x[1] + gp * x[2], up * x[0] + gp * x[1] + pp * x[2]]
 }
 
 /// Strains of a joint with these arms between two bodies.
 #[inline(always)]
-pub fn kinematics<const N: usize>(
-    section: &LaneSection<N>,
-    (arm_a, arm_b): (&Pair<N>, &Pair<N>),
-    LanePlaced { q: qa, turn: a }: &LanePlaced<N>,
-    LanePlaced { q: qb, turn: b }: &LanePlaced<N>,
-) -> LaneKinematics<N> {
+pub fn kinematics<T: Number>(
+    section: &LaneSection<T>,
+    (arm_a, arm_b): (&Pair<T>, &Pair<T>),
+    LanePlaced { q: qa, turn: a }: &LanePlaced<T>,
+    LanePlaced { q: qb, turn: b }: &LanePlaced<T>,
+) -> LaneKinematics<T> {
     let (swing_a, swing_b) = (a.swing(arm_a), b.swing(arm_b));
     let radius_a = [arm_a[0] + swing_a[0], arm_a[1] + swing_a[1]];
     let radius_b = [arm_b[0] + swing_b[0], arm_b[1] + swing_b[1]];
@@ -149,50 +166,51 @@ pub fn kinematics<const N: usize>(
     LaneKinematics { strain, axial: u, shear: g, bent, opening, radius_a, radius_b, e1 }
 }
 
-impl<const N: usize> LaneKinematics<N> {
+impl<T: Number> LaneKinematics<T> {
     /// Forces on bodies a and b.
     #[inline(always)]
-    pub fn forces(&self, stress: &LanePose<N>) -> (LanePose<N>, LanePose<N>) {
-        let double = Lanes::splat(2.0) * stress[0];
+    pub fn forces(&self, stress: &LanePose<T>) -> (LanePose<T>, LanePose<T>) {
+        let double = stress[0] * 2.0;
         let (shear, moment) = (stress[1] + double * self.bent[0], stress[2] + double * self.bent[1]);
         let n = combine(&self.e1, stress[0], &turn(&self.e1), shear);
-        let frame = Lanes::splat(0.5) * (self.shear * stress[0] - self.axial * shear);
+        let frame = (self.shear * stress[0] - self.axial * shear) * 0.5;
         let (at_a, at_b) = (dot(&turn(&self.radius_a), &n), dot(&turn(&self.radius_b), &n));
         ([-n[0], -n[1], frame - at_a - moment], [n[0], n[1], frame + at_b + moment])
     }
 
     /// The tangent under a stress.
     #[inline(always)]
-    pub fn tangent(&self, section: &LaneSection<N>, stress: &LanePose<N>) -> LanePair<N> {
-        let half = Lanes::splat(0.5);
-        let double = Lanes::splat(2.0) * stress[0];
+    pub fn tangent(&self, section: &LaneSection<T>, stress: &LanePose<T>) -> LanePair<T> {
+        let double = stress[0] * 2.0;
         let [uu, ug, up, gg, gp, pp] = section.stiffness;
-        let [q_gg, q_gp, q_pp] = section.second.map(|q| double * q);
+        let [q_gg, q_gp, q_pp] = section.second;
+        let [q_gg, q_gp, q_pp] = [double * q_gg, double * q_gp, double * q_pp];
         let mut h = self.elastic(&[uu, ug, up, gg + q_gg, gp + q_gp, pp + q_pp]);
         let n = combine(&self.e1, stress[0], &turn(&self.e1), stress[1] + double * self.bent[0]);
-        let across = turn(&n).map(|x| x * half);
+        let [x, y] = turn(&n);
+        let across = [x * 0.5, y * 0.5];
         for i in 0..2 {
             h.shift_a[i] += across[i];
             h.shift_b[i] += across[i];
         }
-        let quarter = Lanes::splat(0.25) * dot(&n, &self.opening);
+        let quarter = dot(&n, &self.opening) * 0.25;
         h.turn[0] -= quarter;
         h.turn[2] -= quarter;
-        h.turn[1] += half * (dot(&n, &self.radius_b) - dot(&n, &self.radius_a)) - quarter;
+        h.turn[1] += (dot(&n, &self.radius_b) - dot(&n, &self.radius_a)) * 0.5 - quarter;
         h
     }
 
     #[inline(always)]
-    fn elastic(&self, stiffness: &[Lanes<N>; 6]) -> LanePair<N> {
-        let half = Lanes::splat(0.5);
-        let (g, half_g, half_u) = (turn(&self.e1), half * self.shear, half * self.axial);
+    fn elastic(&self, stiffness: &[T; 6]) -> LanePair<T> {
+        let (g, half_g, half_u) = (turn(&self.e1), self.shear * 0.5, self.axial * 0.5);
+        let one = self.shear.like(1.0);
         let (ta, tb) = (turn(&self.radius_a), turn(&self.radius_b));
         let (u_a, u_b) = (half_g - dot(&self.e1, &ta), half_g + dot(&self.e1, &tb));
         let (g_a, g_b) = (-half_u - dot(&g, &ta), -half_u + dot(&g, &tb));
-        let twice = self.bent.map(|x| x * Lanes::splat(2.0));
+        let twice = [self.bent[0] * 2.0, self.bent[1] * 2.0];
         let u = [self.e1[0] + g[0] * twice[0], self.e1[1] + g[1] * twice[0]];
-        let turn_a = [u_a + g_a * twice[0] - twice[1], g_a, Lanes::splat(-1.0)];
-        let turn_b = [u_b + g_b * twice[0] + twice[1], g_b, Lanes::ONE];
+        let turn_a = [u_a + g_a * twice[0] - twice[1], g_a, -one];
+        let turn_b = [u_b + g_b * twice[0] + twice[1], g_b, one];
         let [uu, ug, _, gg, ..] = *stiffness;
         let (to_u, to_g) = (combine(&u, uu, &g, ug), combine(&u, ug, &g, gg));
         let (a, b) = (multiply(stiffness, &turn_a), multiply(stiffness, &turn_b));
@@ -205,37 +223,37 @@ impl<const N: usize> LaneKinematics<N> {
     }
 }
 
-impl<const N: usize> LanePair<N> {
+impl<W: Wide> LanePair<W> {
     /// Adds the block of body a twice.
     #[inline(always)]
-    pub fn add_aa(&self, block: &mut LaneBlock<N>) {
+    pub fn add_aa(&self, simd: W::Simd, block: &mut LaneBlock) {
         let ([xx, xy, yy], [cx, cy]) = (self.shift, self.shift_a);
-        add(block, [[xx, xy, -cx], [xy, yy, -cy], [-cx, -cy, self.turn[0]]]);
+        add_block(simd, block, [[xx, xy, -cx], [xy, yy, -cy], [-cx, -cy, self.turn[0]]]);
     }
 
     /// Adds the block of body b twice.
     #[inline(always)]
-    pub fn add_bb(&self, block: &mut LaneBlock<N>) {
+    pub fn add_bb(&self, simd: W::Simd, block: &mut LaneBlock) {
         let ([xx, xy, yy], [cx, cy]) = (self.shift, self.shift_b);
-        add(block, [[xx, xy, cx], [xy, yy, cy], [cx, cy, self.turn[2]]]);
+        add_block(simd, block, [[xx, xy, cx], [xy, yy, cy], [cx, cy, self.turn[2]]]);
     }
 
     /// Adds the block with rows of body a and columns of body b, or its transpose.
     #[inline(always)]
-    pub fn add_ab(&self, block: &mut LaneBlock<N>, transposed: bool) {
+    pub fn add_ab(&self, simd: W::Simd, block: &mut LaneBlock, transposed: bool) {
         let ([xx, xy, yy], [ax, ay], [bx, by]) = (self.shift, self.shift_a, self.shift_b);
         if transposed {
-            add(block, [[-xx, -xy, -bx], [-xy, -yy, -by], [ax, ay, self.turn[1]]]);
+            add_block(simd, block, [[-xx, -xy, -bx], [-xy, -yy, -by], [ax, ay, self.turn[1]]]);
         } else {
-            add(block, [[-xx, -xy, ax], [-xy, -yy, ay], [-bx, -by, self.turn[1]]]);
+            add_block(simd, block, [[-xx, -xy, ax], [-xy, -yy, ay], [-bx, -by, self.turn[1]]]);
         }
     }
 }
 
 /// `block += more`, columns.
 #[inline(always)]
-fn add<const N: usize>(block: &mut LaneBlock<N>, more: LaneBlock<N>) {
+fn add_block<W: Wide>(simd: W::Simd, block: &mut LaneBlock, more: LaneBlock<W>) {
     for (column, more) in block.iter_mut().zip(&more) {
-        super::add(column, more);
+        add(simd, column, more);
     }
 }

@@ -2,116 +2,129 @@
 //!
 //! A pivot that vanishes in one variant spoils that lane alone: its name is told, and what comes of it is not looked at.
 
-use super::{LaneBlock, LanePose, Lanes, Real, product, times};
+use super::{
+    BLANK, Eight, LANES, LaneBlock, LanePose, STILL, Wide, load, load_block, product, store, store_block, times,
+};
 use crate::multibody::Pattern;
 use crate::multibody::factor::LOST;
 
 /// A symmetric matrix of blocks on a pattern in each variant; after [`LaneMatrix::factor`], its factors.
 #[derive(Debug, Clone)]
-pub struct LaneMatrix<const N: usize> {
+pub struct LaneMatrix {
     /// Diagonal blocks; after factoring, their inverses.
-    pub diagonal: Vec<LaneBlock<N>>,
+    pub diagonal: Vec<LaneBlock>,
     /// Blocks below the diagonal; after factoring, L.
-    pub below: Vec<LaneBlock<N>>,
+    pub below: Vec<LaneBlock>,
     /// Diagonal entries before elimination.
-    scale: Vec<LanePose<N>>,
+    scale: Vec<LanePose>,
 }
 
-impl<const N: usize> LaneMatrix<N> {
+impl LaneMatrix {
     /// A zero matrix on `pattern`.
     pub fn new(pattern: &Pattern) -> Self {
-        let zero = [[Lanes::ZERO; 3]; 3];
         Self {
-            diagonal: vec![zero; pattern.bodies()],
-            below: vec![zero; pattern.off_blocks()],
-            scale: vec![[Lanes::ZERO; 3]; pattern.bodies()],
+            diagonal: vec![BLANK; pattern.bodies()],
+            below: vec![BLANK; pattern.off_blocks()],
+            scale: vec![STILL; pattern.bodies()],
         }
     }
 
     /// Sets every block to zero.
     #[inline(always)]
     pub fn clear(&mut self) {
-        self.diagonal.fill([[Lanes::ZERO; 3]; 3]);
-        self.below.fill([[Lanes::ZERO; 3]; 3]);
+        self.diagonal.fill(BLANK);
+        self.below.fill(BLANK);
     }
 
     /// Replaces the matrix by its factors. Returns the lanes in which a pivot vanished.
     #[inline(always)]
-    pub fn factor(&mut self, pattern: &Pattern) -> [bool; N] {
-        let mut vanished = [false; N];
+    pub fn factor<W: Wide>(&mut self, simd: W::Simd, pattern: &Pattern) -> [bool; LANES] {
+        let mut sound = W::splat(simd, 0.0);
         for (scale, block) in self.scale.iter_mut().zip(&self.diagonal) {
             for i in 0..3 {
-                scale[i] = block[i][i].abs();
+                W::load(simd, &block[i][i]).abs().store(&mut scale[i]);
             }
         }
         for j in 0..pattern.bodies() {
-            let own = Decomposed::new(&self.diagonal[j], &self.scale[j], &mut vanished);
-            self.diagonal[j] = own.inverse();
+            let (block, scale) = (load_block::<W>(simd, &self.diagonal[j]), load(simd, &self.scale[j]));
+            let own = Decomposed::new(block, &scale, &mut sound);
+            store_block(own.inverse(), &mut self.diagonal[j]);
             let column = pattern.column(j);
             let mut target = pattern.targets(j).iter();
             for (k, &row) in column.clone().zip(pattern.rows(j)) {
-                let coupling = self.below[k];
+                let coupling = load_block::<W>(simd, &self.below[k]);
                 for (i, &at) in (column.start..k).zip(target.by_ref()) {
-                    let scaled = self.below[i];
-                    let block = &mut self.below[at as usize];
-                    for c in 0..3 {
-                        for s in 0..3 {
-                            for r in 0..3 {
-                                block[s][r] -= coupling[c][r] * scaled[c][s];
+                    let scaled = load_block::<W>(simd, &self.below[i]);
+                    let to = &mut self.below[at as usize];
+                    for s in 0..3 {
+                        for r in 0..3 {
+                            let mut entry = W::load(simd, &to[s][r]);
+                            for c in 0..3 {
+                                entry -= coupling[c][r] * scaled[c][s];
                             }
+                            entry.store(&mut to[s][r]);
                         }
                     }
                 }
-                self.below[k] = own.eliminate(&coupling, &mut self.diagonal[row as usize]);
+                let mut later = load_block(simd, &self.diagonal[row as usize]);
+                store_block(own.eliminate(&coupling, &mut later), &mut self.below[k]);
+                store_block(later, &mut self.diagonal[row as usize]);
             }
         }
-        vanished
+        let mut spoilt = Eight::NONE;
+        sound.store(&mut spoilt);
+        spoilt.0.map(f64::is_nan)
     }
 
     /// Solves in place with the factors.
     #[inline(always)]
-    pub fn solve(&self, pattern: &Pattern, b: &mut [LanePose<N>]) {
+    pub fn solve<W: Wide>(&self, simd: W::Simd, pattern: &Pattern, b: &mut [LanePose]) {
+        let zero = W::splat(simd, 0.0);
         for j in 0..pattern.bodies() {
-            let pivot = b[j];
+            let pivot = load::<W, 3>(simd, &b[j]);
             for (block, &row) in self.below[pattern.column(j)].iter().zip(pattern.rows(j)) {
                 let to = &mut b[row as usize];
                 for i in 0..3 {
-                    let later = Lanes::ZERO + block[1][i] * pivot[1] + block[2][i] * pivot[2];
-                    to[i] = (to[i] - block[0][i] * pivot[0]) - later;
+                    let entry = |c: usize| W::load(simd, &block[c][i]);
+                    let (first, later) = (entry(0) * pivot[0], zero + entry(1) * pivot[1] + entry(2) * pivot[2]);
+                    ((W::load(simd, &to[i]) - first) - later).store(&mut to[i]);
                 }
             }
-            b[j] = times(&self.diagonal[j], &pivot);
+            store(times(&load_block(simd, &self.diagonal[j]), &pivot), &mut b[j]);
         }
         for j in (0..pattern.bodies()).rev() {
-            let mut sum = b[j];
+            let mut sum = load::<W, 3>(simd, &b[j]);
             for (block, &row) in self.below[pattern.column(j)].iter().zip(pattern.rows(j)) {
-                let x = b[row as usize];
+                let x = load::<W, 3>(simd, &b[row as usize]);
                 for i in 0..3 {
-                    let later = Lanes::ZERO + block[i][1] * x[1] + block[i][2] * x[2];
-                    sum[i] = (sum[i] - block[i][0] * x[0]) - later;
+                    let entry = load::<W, 3>(simd, &block[i]);
+                    let (first, later) = (entry[0] * x[0], zero + entry[1] * x[1] + entry[2] * x[2]);
+                    sum[i] = (sum[i] - first) - later;
                 }
             }
-            b[j] = sum;
+            store(sum, &mut b[j]);
         }
     }
 
     /// P·A·P with a pivot of 1 in what the projectors `held` (body, projector, what it leaves out) take away.
     #[inline(always)]
-    pub fn project(&mut self, pattern: &Pattern, held: &[Option<(LaneBlock<N>, LaneBlock<N>)>]) {
+    pub fn project<W: Wide>(&mut self, simd: W::Simd, pattern: &Pattern, held: &[Option<(LaneBlock, LaneBlock)>]) {
+        let block = |from: &LaneBlock| load_block::<W>(simd, from);
         for (j, own) in held.iter().enumerate() {
             if let Some((p, rest)) = own {
-                let mut block = product(&product(p, &self.diagonal[j]), p);
-                for (column, rest) in block.iter_mut().zip(rest) {
-                    super::add(column, rest);
+                let p = block(p);
+                let own = product(&product(&p, &block(&self.diagonal[j])), &p);
+                store_block(own, &mut self.diagonal[j]);
+                for (column, rest) in self.diagonal[j].iter_mut().zip(&block(rest)) {
+                    super::add(simd, column, rest);
                 }
-                self.diagonal[j] = block;
                 for k in pattern.column(j) {
-                    self.below[k] = product(&self.below[k], p);
+                    store_block(product(&block(&self.below[k]), &p), &mut self.below[k]);
                 }
             }
             for k in pattern.column(j) {
                 if let Some((p, _)) = &held[pattern.row(k)] {
-                    self.below[k] = product(p, &self.below[k]);
+                    store_block(product(&block(p), &block(&self.below[k])), &mut self.below[k]);
                 }
             }
         }
@@ -119,22 +132,20 @@ impl<const N: usize> LaneMatrix<N> {
 }
 
 /// A symmetric block as L·D·Lᵀ.
-struct Decomposed<const N: usize> {
-    l: LaneBlock<N>,
-    reciprocal: [Lanes<N>; 3],
+struct Decomposed<W> {
+    l: LaneBlock<W>,
+    reciprocal: [W; 3],
 }
 
-impl<const N: usize> Decomposed<N> {
+impl<W: Wide> Decomposed<W> {
+    /// `sound` stops being a number in lanes where a pivot vanishes, or is none.
     #[inline(always)]
-    fn new(a: &LaneBlock<N>, scale: &LanePose<N>, vanished: &mut [bool; N]) -> Self {
-        let mut l = *a;
-        let mut reciprocal = [Lanes::ZERO; 3];
+    fn new(mut l: LaneBlock<W>, scale: &LanePose<W>, sound: &mut W) -> Self {
+        let mut reciprocal = *scale;
         for j in 0..3 {
             let d = l[j][j];
-            for k in 0..N {
-                vanished[k] |= d.0[k].abs() <= LOST * scale[j].0[k] || !d.0[k].is_finite();
-            }
-            reciprocal[j] = Lanes::ONE / d;
+            *sound = d.abs().spoil(scale[j] * LOST, *sound) + d * 0.0;
+            reciprocal[j] = d.like(1.0) / d;
             for i in j + 1..3 {
                 let below = l[j][i];
                 l[j][i] = below * reciprocal[j];
@@ -149,10 +160,11 @@ impl<const N: usize> Decomposed<N> {
 
     /// L⁻ᵀ·D⁻¹·L⁻¹.
     #[inline(always)]
-    fn inverse(&self) -> LaneBlock<N> {
-        let mut li: LaneBlock<N> = [[Lanes::ZERO; 3]; 3];
+    fn inverse(&self) -> LaneBlock<W> {
+        let (zero, one) = (self.reciprocal[0].like(0.0), self.reciprocal[0].like(1.0));
+        let mut li = [[zero; 3]; 3];
         for j in 0..3 {
-            li[j][j] = Lanes::ONE;
+            li[j][j] = one;
             for i in j + 1..3 {
                 let mut s = -self.l[j][i];
                 for k in j + 1..i {
@@ -161,10 +173,10 @@ impl<const N: usize> Decomposed<N> {
                 li[j][i] = s;
             }
         }
-        let mut inverse = [[Lanes::ZERO; 3]; 3];
+        let mut inverse = [[zero; 3]; 3];
         for i in 0..3 {
             for j in 0..=i {
-                let mut s = Lanes::ZERO;
+                let mut s = zero;
                 for k in i..3 {
                     s += li[i][k] * self.reciprocal[k] * li[j][k];
                 }
@@ -177,7 +189,7 @@ impl<const N: usize> Decomposed<N> {
 
     /// See [`crate::multibody::factor`].
     #[inline(always)]
-    fn eliminate(&self, coupling: &LaneBlock<N>, later: &mut LaneBlock<N>) -> LaneBlock<N> {
+    fn eliminate(&self, coupling: &LaneBlock<W>, later: &mut LaneBlock<W>) -> LaneBlock<W> {
         let l = &self.l;
         let mut y = *coupling;
         for c in 1..3 {

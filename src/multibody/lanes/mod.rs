@@ -1,4 +1,4 @@
-//! Variants of one mechanism side by side: the bodies' own coordinates with a lane for each variant.
+//! Variants of one mechanism side by side: the bodies' own coordinates with a lane for each of eight variants.
 //!
 //! What the variants have in common (which bodies, joints and blocks there are, and in which order they are eliminated) stands
 //! once; every number stands as a lane of as many numbers as there are variants, and each operation is done for all of them
@@ -7,6 +7,7 @@
 //!
 //! | file | what it holds | as for one variant in |
 //! |---|---|---|
+//! | `wide` | a number in every lane, in registers | |
 //! | [`model`] | bodies and joints | [`super::model`] |
 //! | [`joint`] | strains, forces and tangents of joints | [`super::planar`] |
 //! | [`forces`] | their sums over a mechanism | [`super::forces`] |
@@ -19,33 +20,36 @@ pub mod forces;
 pub mod joint;
 pub mod matrix;
 pub mod model;
+mod wide;
 
-pub use super::rcr::{Lanes, Real};
+pub use super::rcr::Real;
 pub use matrix::LaneMatrix;
 pub use model::LaneModel;
+pub use wide::{Eight, Kernel, LANES, Number, Wide, across, add, load, store};
 
 /// Displacement, rate or force of a body in each variant: x, y, θ.
-pub type LanePose<const N: usize> = [Lanes<N>; 3];
+pub type LanePose<T = Eight> = [T; 3];
 /// A block of a matrix in each variant, column by column.
-pub type LaneBlock<const N: usize> = [[Lanes<N>; 3]; 3];
+pub type LaneBlock<T = Eight> = [[T; 3]; 3];
 
-/// Zero in every lane.
-#[inline(always)]
-pub fn zero<const N: usize>() -> LanePose<N> {
-    [Lanes::ZERO; 3]
-}
+impl Eight {
+    /// Zero in every lane.
+    pub const NONE: Self = Self([0.0; LANES]);
 
-/// `y += x`.
-#[inline(always)]
-pub fn add<const N: usize>(y: &mut LanePose<N>, x: &LanePose<N>) {
-    for i in 0..3 {
-        y[i] += x[i];
+    /// `x` in every lane.
+    pub const fn of(x: f64) -> Self {
+        Self([x; LANES])
     }
 }
 
+/// Nothing in every lane.
+pub const STILL: LanePose = [Eight::NONE; 3];
+/// A block of zeros in every lane.
+pub const BLANK: LaneBlock = [STILL; 3];
+
 /// `y += x·s`.
 #[inline(always)]
-pub fn add_scaled<const N: usize>(y: &mut LanePose<N>, x: &LanePose<N>, s: Lanes<N>) {
+pub fn add_scaled<T: Number>(y: &mut LanePose<T>, x: &LanePose<T>, s: T) {
     for i in 0..3 {
         y[i] += x[i] * s;
     }
@@ -53,12 +57,30 @@ pub fn add_scaled<const N: usize>(y: &mut LanePose<N>, x: &LanePose<N>, s: Lanes
 
 /// Block times vector.
 #[inline(always)]
-pub fn times<const N: usize>(block: &LaneBlock<N>, x: &LanePose<N>) -> LanePose<N> {
-    std::array::from_fn(|i| block[2][i] * x[2] + (block[1][i] * x[1] + block[0][i] * x[0]))
+pub fn times<T: Number>(block: &LaneBlock<T>, x: &LanePose<T>) -> LanePose<T> {
+    let mut y = *x;
+    for i in 0..3 {
+        y[i] = block[2][i] * x[2] + (block[1][i] * x[1] + block[0][i] * x[0]);
+    }
+    y
 }
 
 /// Product of two blocks.
 #[inline(always)]
-pub fn product<const N: usize>(a: &LaneBlock<N>, b: &LaneBlock<N>) -> LaneBlock<N> {
-    std::array::from_fn(|j| times(a, &b[j]))
+pub fn product<T: Number>(a: &LaneBlock<T>, b: &LaneBlock<T>) -> LaneBlock<T> {
+    [times(a, &b[0]), times(a, &b[1]), times(a, &b[2])]
+}
+
+/// A block from memory.
+#[inline(always)]
+pub fn load_block<W: Wide>(simd: W::Simd, from: &LaneBlock) -> LaneBlock<W> {
+    [load(simd, &from[0]), load(simd, &from[1]), load(simd, &from[2])]
+}
+
+/// A block to memory.
+#[inline(always)]
+pub fn store_block<W: Wide>(block: LaneBlock<W>, to: &mut LaneBlock) {
+    for (column, to) in block.into_iter().zip(to) {
+        store(column, to);
+    }
 }

@@ -1,7 +1,7 @@
 //! Bodies and joints of variants side by side.
 
 use super::joint::{LaneSection, Pair};
-use super::{LaneBlock, LanePose, Lanes, Real};
+use super::{BLANK, Eight, LaneBlock, LanePose, Number, Real, STILL, Wide, load};
 use crate::multibody::planar::Block;
 use crate::multibody::section::{LaidJoint, Place, Section};
 use crate::multibody::{Body, BodyId, Model, Pattern};
@@ -9,102 +9,101 @@ use nalgebra::Matrix3;
 
 /// A body in each variant.
 #[derive(Debug, Clone, Copy)]
-pub struct LaneBody<const N: usize> {
+pub struct LaneBody<T = Eight> {
     /// Mass [kg] and moment of inertia [kg·m²], as the mass matrix' diagonal.
-    pub mass: LanePose<N>,
+    pub mass: LanePose<T>,
     /// Drag on translation [N·s/m].
-    pub drag: Lanes<N>,
+    pub drag: T,
     /// Its first moment [N·s].
-    pub first: Pair<N>,
+    pub first: Pair<T>,
     /// Its second moment [N·m·s].
-    pub second: Lanes<N>,
+    pub second: T,
 }
 
 /// A joint in each variant.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct LaneJoint<const N: usize> {
+pub(crate) struct LaneJoint {
     pub(crate) place: Place,
     pub(crate) section: u32,
-    pub(crate) arm_a: Pair<N>,
-    pub(crate) arm_b: Pair<N>,
-    pub(crate) rest: Lanes<N>,
+    pub(crate) arm_a: Pair,
+    pub(crate) arm_b: Pair,
+    pub(crate) rest: Eight,
 }
 
 /// What joints share, and what lengthens them.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Shared<const N: usize> {
-    pub(crate) section: LaneSection<N>,
-    pub(crate) expansion: Option<(usize, Lanes<N>)>,
+pub(crate) struct Shared {
+    pub(crate) section: LaneSection,
+    pub(crate) expansion: Option<(usize, Eight)>,
 }
 
 /// Two joints whose moments depend on both rotations.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct LaneCoupling<const N: usize> {
+pub(crate) struct LaneCoupling {
     pub(crate) first: (BodyId, BodyId),
     pub(crate) second: (BodyId, BodyId),
-    pub(crate) stiffness: Lanes<N>,
+    pub(crate) stiffness: Eight,
 }
 
 /// A damper.
 #[derive(Debug, Clone)]
-pub(crate) struct LaneDamper<const N: usize> {
+pub(crate) struct LaneDamper {
     pub(crate) bodies: (BodyId, BodyId),
     pub(crate) place: Place,
     /// Rows.
-    pub(crate) matrix: [[Lanes<N>; 6]; 6],
+    pub(crate) matrix: [[Eight; 6]; 6],
 }
 
 /// A projector onto what a support leaves free, and the rest of the identity.
-pub(crate) type Held<const N: usize> = Option<(LaneBlock<N>, LaneBlock<N>)>;
+pub(crate) type Held = Option<(LaneBlock, LaneBlock)>;
 
 /// Models of as many variants as there are lanes.
 #[derive(Debug, Clone)]
-pub struct LaneModel<const N: usize> {
+pub struct LaneModel {
     /// Pattern of the tangent.
     pub pattern: Pattern,
     /// Bodies in elimination order.
-    pub bodies: Vec<LaneBody<N>>,
-    pub(crate) joints: Vec<LaneJoint<N>>,
-    pub(crate) sections: Vec<Shared<N>>,
-    pub(crate) couplings: Vec<LaneCoupling<N>>,
-    pub(crate) dampers: Vec<LaneDamper<N>>,
-    pub(crate) held: Vec<Held<N>>,
+    pub bodies: Vec<LaneBody>,
+    pub(crate) joints: Vec<LaneJoint>,
+    pub(crate) sections: Vec<Shared>,
+    pub(crate) couplings: Vec<LaneCoupling>,
+    pub(crate) dampers: Vec<LaneDamper>,
+    pub(crate) held: Vec<Held>,
     pub(crate) holds: bool,
 }
 
-impl<const N: usize> LaneModel<N> {
+impl LaneModel {
     /// Every lane holds `model`; none for a linear one, which has no lanes.
     pub fn new(model: &Model) -> Option<Self> {
         if model.linear {
             return None;
         }
-        let lanes = Lanes::splat;
-        let zero = [[Lanes::ZERO; 3]; 3];
-        let body = LaneBody { mass: [Lanes::ZERO; 3], drag: Lanes::ZERO, first: [Lanes::ZERO; 2], second: Lanes::ZERO };
-        let section = LaneSection { axis: [lanes(0.0); 2], stiffness: [lanes(0.0); 6], second: [lanes(0.0); 3] };
+        let none = Eight::NONE;
+        let body = LaneBody { mass: STILL, drag: none, first: [none; 2], second: none };
+        let section = LaneSection { axis: [none; 2], stiffness: [none; 6], second: [none; 3] };
         let joint = |j: &LaidJoint| LaneJoint {
             place: j.place,
             section: j.section() as u32,
-            arm_a: [lanes(0.0); 2],
-            arm_b: [lanes(0.0); 2],
-            rest: lanes(0.0),
+            arm_a: [none; 2],
+            arm_b: [none; 2],
+            rest: none,
         };
-        let expansion = |s: &Section| s.expansion.map(|(group, _)| (group, lanes(0.0)));
+        let expansion = |s: &Section| s.expansion.map(|(group, _)| (group, none));
         let mut laid = Self {
             pattern: model.pattern.clone(),
             bodies: vec![body; model.bodies.len()],
             joints: model.joints.iter().map(joint).collect(),
             sections: model.sections.iter().map(|s| Shared { section, expansion: expansion(s) }).collect(),
             couplings: (model.couplings.iter())
-                .map(|c| LaneCoupling { first: c.first, second: c.second, stiffness: lanes(0.0) })
+                .map(|c| LaneCoupling { first: c.first, second: c.second, stiffness: none })
                 .collect(),
             dampers: (model.dampers.iter().zip(&model.damper_place))
-                .map(|(d, place)| LaneDamper { bodies: (d.a, d.b), place: *place, matrix: [[lanes(0.0); 6]; 6] })
+                .map(|(d, place)| LaneDamper { bodies: (d.a, d.b), place: *place, matrix: [[none; 6]; 6] })
                 .collect(),
-            held: model.bodies.iter().map(|b| b.free.as_ref().map(|_| (zero, zero))).collect(),
+            held: model.bodies.iter().map(|b| b.free.as_ref().map(|_| (BLANK, BLANK))).collect(),
             holds: model.bodies.iter().any(|b| b.free.is_some()),
         };
-        for lane in 0..N {
+        for lane in 0..super::LANES {
             laid.put(lane, model);
         }
         Some(laid)
@@ -112,10 +111,10 @@ impl<const N: usize> LaneModel<N> {
 
     /// True for a model that differs from those laid here in numbers alone.
     pub fn fits(&self, model: &Model) -> bool {
-        let bodies = |(held, body): (&Held<N>, &Body)| held.is_some() == body.free.is_some();
+        let bodies = |(held, body): (&Held, &Body)| held.is_some() == body.free.is_some();
         // joints of one section here must be alike in the other model too
         let mut others = vec![u32::MAX; self.sections.len()];
-        let joints = |(own, other): (&LaneJoint<N>, &LaidJoint)| {
+        let joints = |(own, other): (&LaneJoint, &LaidJoint)| {
             let known = &mut others[own.section as usize];
             let section = other.section() as u32;
             let alike = *known == section || *known == u32::MAX;
@@ -177,22 +176,35 @@ impl<const N: usize> LaneModel<N> {
     }
 }
 
-fn set<const N: usize>(lane: usize, to: &mut [Lanes<N>], from: &[f64]) {
+fn set(lane: usize, to: &mut [Eight], from: &[f64]) {
     for (to, from) in to.iter_mut().zip(from) {
         to.set_lane(lane, *from);
     }
 }
 
-fn put_block<const N: usize>(lane: usize, to: &mut LaneBlock<N>, from: &Block) {
+fn put_block(lane: usize, to: &mut LaneBlock, from: &Block) {
     for (j, column) in to.iter_mut().enumerate() {
         set(lane, column, from.column(j).as_slice());
     }
 }
 
-impl<const N: usize> LaneBody<N> {
+impl LaneBody {
+    /// From memory.
+    #[inline(always)]
+    pub fn load<W: Wide>(&self, simd: W::Simd) -> LaneBody<W> {
+        LaneBody {
+            mass: load(simd, &self.mass),
+            drag: W::load(simd, &self.drag),
+            first: load(simd, &self.first),
+            second: W::load(simd, &self.second),
+        }
+    }
+}
+
+impl<T: Number> LaneBody<T> {
     /// Force of the drag at a rate.
     #[inline(always)]
-    pub fn drag_force(&self, v: &LanePose<N>) -> LanePose<N> {
+    pub fn drag_force(&self, v: &LanePose<T>) -> LanePose<T> {
         let (c, [sx, sy]) = (self.drag, self.first);
         [c * v[0] - sy * v[2], c * v[1] + sx * v[2], -sy * v[0] + sx * v[1] + self.second * v[2]]
     }

@@ -49,7 +49,7 @@ pub mod tree;
 
 pub use data::Reduction;
 pub use fast::Lanes;
-pub(crate) use fast::{across, has_lanes};
+pub(crate) use fast::has_lanes;
 pub use reduction::Task;
 pub use rotary::Counts;
 pub use scalar::Real;

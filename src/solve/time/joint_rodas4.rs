@@ -21,7 +21,7 @@ mod stages;
 mod tableau;
 
 use super::method::{Method, Motion, StepFailure, Work};
-use super::rodas4::{ALPHA, GAMMA, GAMMA_I};
+use super::rodas4::{ALPHA, GAMMA, GAMMA_I, moves_on};
 use crate::equations::Joints;
 use crate::gaps::{Drive, Ramp, System};
 use crate::multibody::forces;
@@ -235,14 +235,17 @@ impl Method for JointRodas4 {
         let gh = GAMMA * h;
         for i in 0..6 {
             let (at, rate) = (s + ALPHA[i] * h, GAMMA_I[i] * h);
-            ramp.at(at, &mut self.drive);
+            if i == 0 {
+                ramp.at_and_rate(s, &mut self.drive, &mut self.rate);
+            } else if moves_on(i) {
+                ramp.at(at, &mut self.drive);
+            }
             self.drive.load = 1.0;
             let stays = self.stages.begin(i, h, &self.carried[0], &self.carried[1]);
             self.residual(i == 0, stays);
             if i == 0 {
                 self.factor(gh)?;
                 self.stages.set_out(&self.joints.tree, &self.w, &self.carried[0], &self.carried[1]);
-                ramp.rate(s, &mut self.rate);
                 self.joints.closures.drive_force(&self.poses, &self.drive, &self.rate, &mut self.forcing);
                 self.ports.begin(&self.joints, ramp, s, &self.poses, (&self.drive, &self.rate));
             }

@@ -35,6 +35,10 @@ use stages::Stages;
 pub(super) const GAMMA: f64 = 0.25;
 /// Stage positions α_i and γ_i.
 pub(super) const ALPHA: [f64; 6] = [0.0, 0.386, 0.21, 0.63, 1.0, 1.0];
+/// True for a stage at another time than the one before it, or than the start.
+pub(super) fn moves_on(i: usize) -> bool {
+    i > 0 && ALPHA[i] != ALPHA[i - 1]
+}
 pub(super) const GAMMA_I: [f64; 6] = [0.25, -0.1043, 0.1035, -0.03620000000000023, 0.0, 0.0];
 #[rustfmt::skip]
 pub(super) const A: [[f64; 5]; 6] = [
@@ -111,9 +115,8 @@ impl<S: LinearSolver> Method for Rodas4<S> {
     ) -> Result<(), StepFailure> {
         let model = &system.model;
         let gh = GAMMA * h;
-        ramp.at(s, &mut self.drive);
+        ramp.at_and_rate(s, &mut self.drive, &mut self.rate);
         self.drive.load = 1.0;
-        ramp.rate(s, &mut self.rate);
         system.drive_force(&motion.q, &self.drive, &self.rate, &mut self.stages.forcing);
         self.ports.begin(system, ramp, s, &motion.q, (&self.drive, &self.rate));
         let mut turning = None;
@@ -128,7 +131,9 @@ impl<S: LinearSolver> Method for Rodas4<S> {
         }
         for (i, alpha) in ALPHA.into_iter().enumerate() {
             let at = s + alpha * h;
-            ramp.at(at, &mut self.drive);
+            if moves_on(i) {
+                ramp.at(at, &mut self.drive);
+            }
             self.stages.begin(model, i, h, motion);
             if let Some(turning) = &mut turning {
                 turning.now = system.frame(&self.drive).map(Gyration::new).unwrap_or_default();

@@ -11,6 +11,7 @@ use super::method::Motion;
 use super::rodas4::lanes::{Lane, LaneRodas4};
 use super::step_size;
 use crate::gaps::{Ramp, System};
+use crate::multibody::lanes::LANES;
 
 /// Exponent of the step-size rule: the estimated error falls with the fourth power of the step.
 const EXPONENT: f64 = -1.0 / 4.0;
@@ -76,25 +77,25 @@ pub struct LaneWork {
 
 /// Advances every variant that `next` gives with its number, and tells `done` how it ended. The lanes are laid out for the
 /// mechanism of `first`; variants that differ from it in more than numbers end as [`Ended::Unlike`] at once.
-pub fn advance<'a, const N: usize>(
+pub fn advance<'a>(
     first: &System,
     next: &mut dyn FnMut() -> Option<(usize, Variant<'a>)>,
     done: &mut dyn FnMut(usize, Ended),
 ) -> LaneWork {
     let mut work = LaneWork::default();
-    let Some(mut method) = LaneRodas4::<N>::new(first) else {
+    let Some(mut method) = LaneRodas4::new(first) else {
         while let Some((number, _)) = next() {
             done(number, Ended::Alone);
         }
         return work;
     };
-    let mut lanes: [Option<Lane<'a>>; N] = [const { None }; N];
-    let mut running: [Option<Running<'a>>; N] = [const { None }; N];
-    let (mut s, mut step) = ([0.0; N], [1.0; N]);
+    let mut lanes: [Option<Lane<'a>>; LANES] = [const { None }; LANES];
+    let mut running: [Option<Running<'a>>; LANES] = [const { None }; LANES];
+    let (mut s, mut step) = ([0.0; LANES], [1.0; LANES]);
     let (mut before, mut after) = (Motion::zeros(first.bodies()), Motion::zeros(first.bodies()));
     let mut error_motion = before.clone();
     loop {
-        for k in 0..N {
+        for k in 0..LANES {
             while running[k].is_none() {
                 let Some((number, variant)) = next() else { break };
                 if !method.fits(variant.system) {
@@ -121,14 +122,14 @@ pub fn advance<'a, const N: usize>(
             return work;
         }
         crate::budget::check();
-        for k in 0..N {
+        for k in 0..LANES {
             if let (Some(run), Some(lane)) = (&running[k], &lanes[k]) {
                 (s[k], step[k]) = (run.s, step_size::fitted(run.h, lane.ramp.dt - run.s));
             }
         }
         let vanished = method.step(&lanes, &s, &step);
         work.together += 1;
-        for k in 0..N {
+        for k in 0..LANES {
             let (Some(run), Some(lane)) = (&mut running[k], &lanes[k]) else {
                 method.go_back(k);
                 continue;
@@ -181,14 +182,7 @@ pub fn advance<'a, const N: usize>(
 }
 
 /// The error of a step over what it may be, as [`super::adaptive`] has it.
-fn relative_error<const N: usize>(
-    method: &LaneRodas4<N>,
-    k: usize,
-    system: &System,
-    run: &Running<'_>,
-    h: f64,
-    contact: f64,
-) -> f64 {
+fn relative_error(method: &LaneRodas4, k: usize, system: &System, run: &Running<'_>, h: f64, contact: f64) -> f64 {
     if run.mass == 0.0 {
         return 0.0;
     }

@@ -14,8 +14,8 @@ mod lanes;
 mod packs;
 mod pins;
 
+pub(crate) use dispatch::has_lanes;
 pub(super) use dispatch::{accelerate, place, reduce};
-pub(crate) use dispatch::{across, has_lanes};
 pub(super) use kernels::Small;
 pub use lanes::Lanes;
 pub(super) use packs::Packs;

@@ -1,18 +1,18 @@
 //! What acts on few bodies of a variant and has branches of its own: gaps and dead loads, variant by variant.
 
 use super::{IN_PLACE, Lane, LaneRodas4};
-use crate::multibody::lanes::{LanePose, Real};
+use crate::multibody::lanes::{LANES, LanePose, Real};
 use crate::multibody::planar::Pose;
 
-impl<const N: usize> LaneRodas4<N> {
+impl LaneRodas4 {
     /// What gaps and dead loads add to the forces of stage `i`, and in the first stage to the tangent.
-    pub(super) fn act(&mut self, lanes: &[Option<Lane<'_>>; N], i: usize) {
+    pub(super) fn act(&mut self, lanes: &[Option<Lane<'_>>; LANES], i: usize) {
         let Self { motion, at, force, w, acted, acted_blocks, drives, q, r, tangent, .. } = self;
         if acted.is_empty() {
             return;
         }
         let from = if i < IN_PLACE { &*at } else { &motion.q };
-        let pose = |p: &LanePose<N>, k: usize| Pose::new(p[0].lane(k), p[1].lane(k), p[2].lane(k));
+        let pose = |p: &LanePose, k: usize| Pose::new(p[0].lane(k), p[1].lane(k), p[2].lane(k));
         for (k, (lane, drive)) in lanes.iter().zip(drives).enumerate() {
             let Some(lane) = lane else { continue };
             for &b in acted.iter() {

@@ -1,21 +1,21 @@
 //! The motion of variants side by side, and its measure.
 
-use crate::multibody::lanes::{LaneModel, LanePose, Lanes, Real, zero};
+use crate::multibody::lanes::{Eight, LANES, LaneModel, LanePose, Real, STILL, Wide, load};
 use crate::multibody::planar::Pose;
 use crate::solve::time::method::Motion;
 
 /// Displacements and rates in each variant.
 #[derive(Debug, Clone)]
-pub struct LaneMotion<const N: usize> {
+pub struct LaneMotion {
     /// Displacements.
-    pub q: Vec<LanePose<N>>,
+    pub q: Vec<LanePose>,
     /// Rates.
-    pub v: Vec<LanePose<N>>,
+    pub v: Vec<LanePose>,
 }
 
-impl<const N: usize> LaneMotion<N> {
+impl LaneMotion {
     pub(super) fn zeros(bodies: usize) -> Self {
-        Self { q: vec![zero(); bodies], v: vec![zero(); bodies] }
+        Self { q: vec![STILL; bodies], v: vec![STILL; bodies] }
     }
 
     /// Puts a motion into one lane.
@@ -50,30 +50,32 @@ impl<const N: usize> LaneMotion<N> {
 
 /// √(xᵀMx) of what the length of a step follows from, in each lane.
 #[derive(Debug, Clone, Copy)]
-pub struct Norms<const N: usize> {
+pub struct Norms {
     /// Displacements at the start of the step.
-    pub before: [f64; N],
+    pub before: [f64; LANES],
     /// Displacements at its end.
-    pub after: [f64; N],
+    pub after: [f64; LANES],
     /// Error of the displacements.
-    pub error_q: [f64; N],
+    pub error_q: [f64; LANES],
     /// Error of the rates.
-    pub error_v: [f64; N],
+    pub error_v: [f64; LANES],
 }
 
-impl<const N: usize> Default for Norms<N> {
+impl Default for Norms {
     fn default() -> Self {
-        Self { before: [0.0; N], after: [0.0; N], error_q: [0.0; N], error_v: [0.0; N] }
+        Self { before: [0.0; LANES], after: [0.0; LANES], error_q: [0.0; LANES], error_v: [0.0; LANES] }
     }
 }
 
 /// √(xᵀMx).
 #[inline(always)]
-pub(super) fn mass_norm<const N: usize>(model: &LaneModel<N>, x: &[LanePose<N>]) -> [f64; N] {
-    let mut sum = Lanes::ZERO;
+pub(super) fn mass_norm<W: Wide>(simd: W::Simd, model: &LaneModel, x: &[LanePose]) -> [f64; LANES] {
+    let mut sum = W::splat(simd, 0.0);
     for (x, body) in x.iter().zip(&model.bodies) {
-        let y: LanePose<N> = std::array::from_fn(|i| body.mass[i] * x[i]);
-        sum += x[0] * y[0] + x[1] * y[1] + x[2] * y[2];
+        let (x, mass) = (load::<W, 3>(simd, x), load::<W, 3>(simd, &body.mass));
+        sum += x[0] * (mass[0] * x[0]) + x[1] * (mass[1] * x[1]) + x[2] * (mass[2] * x[2]);
     }
-    sum.sqrt().0
+    let mut square = Eight::NONE;
+    sum.store(&mut square);
+    square.0.map(f64::sqrt)
 }

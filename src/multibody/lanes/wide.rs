@@ -1,0 +1,313 @@
+//! A number in every lane, in registers.
+//!
+//! In memory eight lanes are an array ([`Eight`]); a kernel loads what it needs, computes in [`Wide`] numbers and stores what it has
+//! found. As long as arrays themselves were added and multiplied, compilers moved them through the stack between any two
+//! operations, which took half of the time. (For the same reason there are loops here, and no closures over arrays: those are not always
+//! inlined, and a call of one vector instruction costs more than it.) Operations are those of `f64`, lane by lane; none is fused.
+
+use crate::multibody::rcr::Lanes;
+use crate::multibody::sine;
+use pulp::{Arch, Simd, WithSimd};
+use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+
+/// Lanes that go side by side.
+pub const LANES: usize = 8;
+/// A number in each lane, in memory.
+pub type Eight = Lanes<LANES>;
+
+/// What formulas are written in: a number, or one in every lane.
+pub trait Number:
+    Copy
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+    + AddAssign
+    + SubAssign
+    + Add<f64, Output = Self>
+    + Mul<f64, Output = Self>
+{
+    /// `x`, in as many lanes as this has.
+    fn like(self, x: f64) -> Self;
+}
+
+impl Number for f64 {
+    #[inline(always)]
+    fn like(self, x: f64) -> Self {
+        x
+    }
+}
+
+/// A number in every lane, in registers.
+pub trait Wide: Number {
+    /// The instructions at hand.
+    type Simd: Copy;
+    /// `x` in every lane.
+    fn splat(simd: Self::Simd, x: f64) -> Self;
+    /// From memory.
+    fn load(simd: Self::Simd, from: &Eight) -> Self;
+    /// To memory.
+    fn store(self, to: &mut Eight);
+    /// |x|.
+    fn abs(self) -> Self;
+    /// `mark`, but not a number in lanes where this is at most `bound`.
+    fn spoil(self, bound: Self, mark: Self) -> Self;
+    /// `this` in lanes that are zero, `other` elsewhere.
+    fn if_zero(self, this: Self, other: Self) -> Self;
+
+    /// Sine and cosine [rad].
+    #[inline(always)]
+    fn sin_cos(self, simd: Self::Simd) -> (Self, Self) {
+        let mut angles = Eight::of(0.0);
+        self.store(&mut angles);
+        let (mut near, mut cosines) = (true, angles);
+        for x in angles.0 {
+            near &= x.abs() <= sine::SMALL;
+        }
+        if near {
+            return sine::small(self);
+        }
+        for k in 0..LANES {
+            (angles.0[k], cosines.0[k]) = sine::sin_cos(angles.0[k]);
+        }
+        (Self::load(simd, &angles), Self::load(simd, &cosines))
+    }
+}
+
+/// Some numbers from memory.
+#[inline(always)]
+pub fn load<W: Wide, const K: usize>(simd: W::Simd, from: &[Eight; K]) -> [W; K] {
+    let mut numbers = [W::splat(simd, 0.0); K];
+    for i in 0..K {
+        numbers[i] = W::load(simd, &from[i]);
+    }
+    numbers
+}
+
+/// Some numbers to memory.
+#[inline(always)]
+pub fn store<W: Wide, const K: usize>(numbers: [W; K], to: &mut [Eight; K]) {
+    for (to, x) in to.iter_mut().zip(numbers) {
+        x.store(to);
+    }
+}
+
+/// `to += x`, in memory.
+#[inline(always)]
+pub fn add<W: Wide, const K: usize>(simd: W::Simd, to: &mut [Eight; K], x: &[W; K]) {
+    for (to, x) in to.iter_mut().zip(x) {
+        (W::load(simd, to) + *x).store(to);
+    }
+}
+
+/// Eight lanes in `M` registers of the instructions `S`.
+#[derive(Clone, Copy)]
+struct Registers<S: Simd, const M: usize> {
+    simd: S,
+    x: [S::f64s; M],
+}
+
+macro_rules! register_wise {
+    ($($trait:ident $method:ident $instruction:ident)*) => {$(
+        impl<S: Simd, const M: usize> $trait for Registers<S, M> {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(mut self, other: Self) -> Self {
+                for i in 0..M {
+                    self.x[i] = self.simd.$instruction(self.x[i], other.x[i]);
+                }
+                self
+            }
+        }
+    )*};
+}
+register_wise!(Add add add_f64s  Sub sub sub_f64s  Mul mul mul_f64s  Div div div_f64s);
+
+macro_rules! with_one_number {
+    ($($trait:ident $method:ident $instruction:ident)*) => {$(
+        impl<S: Simd, const M: usize> $trait<f64> for Registers<S, M> {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(mut self, other: f64) -> Self {
+                let other = self.simd.splat_f64s(other);
+                for i in 0..M {
+                    self.x[i] = self.simd.$instruction(self.x[i], other);
+                }
+                self
+            }
+        }
+    )*};
+}
+with_one_number!(Add add add_f64s  Mul mul mul_f64s);
+
+impl<S: Simd, const M: usize> Neg for Registers<S, M> {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(mut self) -> Self {
+        for i in 0..M {
+            self.x[i] = self.simd.neg_f64s(self.x[i]);
+        }
+        self
+    }
+}
+
+impl<S: Simd, const M: usize> AddAssign for Registers<S, M> {
+    #[inline(always)]
+    fn add_assign(&mut self, other: Self) {
+        *self = *self + other;
+    }
+}
+
+impl<S: Simd, const M: usize> SubAssign for Registers<S, M> {
+    #[inline(always)]
+    fn sub_assign(&mut self, other: Self) {
+        *self = *self - other;
+    }
+}
+
+impl<S: Simd, const M: usize> Number for Registers<S, M> {
+    #[inline(always)]
+    fn like(self, x: f64) -> Self {
+        Self::splat(self.simd, x)
+    }
+}
+
+impl<S: Simd, const M: usize> Wide for Registers<S, M> {
+    type Simd = S;
+
+    #[inline(always)]
+    fn splat(simd: S, x: f64) -> Self {
+        Self { simd, x: [simd.splat_f64s(x); M] }
+    }
+
+    #[inline(always)]
+    fn load(simd: S, from: &Eight) -> Self {
+        let (registers, _) = S::as_simd_f64s(&from.0);
+        let mut to = Self::splat(simd, 0.0);
+        for i in 0..M {
+            to.x[i] = registers[i];
+        }
+        to
+    }
+
+    #[inline(always)]
+    fn store(self, to: &mut Eight) {
+        let (registers, _) = S::as_mut_simd_f64s(&mut to.0);
+        for i in 0..M {
+            registers[i] = self.x[i];
+        }
+    }
+
+    #[inline(always)]
+    fn abs(mut self) -> Self {
+        for i in 0..M {
+            self.x[i] = self.simd.abs_f64s(self.x[i]);
+        }
+        self
+    }
+
+    #[inline(always)]
+    fn spoil(self, bound: Self, mut mark: Self) -> Self {
+        let (simd, nan) = (self.simd, self.simd.splat_f64s(f64::NAN));
+        for i in 0..M {
+            let small = simd.less_than_or_equal_f64s(self.x[i], bound.x[i]);
+            mark.x[i] = simd.select_f64s(small, nan, mark.x[i]);
+        }
+        mark
+    }
+
+    #[inline(always)]
+    fn if_zero(self, this: Self, mut other: Self) -> Self {
+        let (simd, zero) = (self.simd, self.simd.splat_f64s(0.0));
+        for i in 0..M {
+            let none = simd.equal_f64s(self.x[i], zero);
+            other.x[i] = simd.select_f64s(none, this.x[i], other.x[i]);
+        }
+        other
+    }
+}
+
+/// Work over lanes.
+pub trait Kernel {
+    /// Does it with these registers.
+    fn run<W: Wide>(self, simd: W::Simd);
+}
+
+struct Over<K, const M: usize>(K);
+
+impl<K: Kernel, const M: usize> WithSimd for Over<K, M> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        self.0.run::<Registers<S, M>>(simd);
+    }
+}
+
+/// Runs a kernel in the widest instructions of the processor at hand. It is not compiled for a processor without any: that copy would
+/// be the largest, and never run.
+#[inline(always)]
+pub fn across<K: Kernel>(kernel: K) {
+    match Arch::new() {
+        #[cfg(target_arch = "x86_64")]
+        Arch::V4(simd) => Simd::vectorize(simd, Over::<K, 1>(kernel)),
+        #[cfg(target_arch = "x86_64")]
+        Arch::V3(simd) => Simd::vectorize(simd, Over::<K, 2>(kernel)),
+        #[cfg(target_arch = "aarch64")]
+        Arch::Neon(simd) => Simd::vectorize(simd, Over::<K, 4>(kernel)),
+        _ => {}
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! Every operation has the bits of `f64` in every lane.
+    use super::*;
+
+    struct Check([f64; LANES], [f64; LANES]);
+
+    impl WithSimd for Check {
+        type Output = [[f64; LANES]; 10];
+
+        #[inline(always)]
+        fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
+            match S::F64_LANES {
+                8 => operations::<Registers<S, 1>>(simd, &self.0, &self.1),
+                4 => operations::<Registers<S, 2>>(simd, &self.0, &self.1),
+                2 => operations::<Registers<S, 4>>(simd, &self.0, &self.1),
+                _ => operations::<Registers<S, 8>>(simd, &self.0, &self.1),
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn operations<W: Wide>(simd: W::Simd, a: &[f64; LANES], b: &[f64; LANES]) -> [[f64; LANES]; 10] {
+        let (x, y) = (W::load(simd, &Lanes(*a)), W::load(simd, &Lanes(*b)));
+        let (sin, cos) = x.sin_cos(simd);
+        let all = [x + y, x - y, x * y, x / y, -x, x.abs(), x * 0.3 + 0.7, y.if_zero(x, x + y), sin, cos];
+        all.map(|x| {
+            let mut to = Eight::of(0.0);
+            x.store(&mut to);
+            to.0
+        })
+    }
+
+    #[test]
+    fn lanes_are_numbers() {
+        for turn in [0.1, 3.0] {
+            let a = std::array::from_fn(|k| (k as f64 - 2.7) * turn);
+            let b = std::array::from_fn(|k| if k == 3 { 0.0 } else { 1.0 / (k as f64 - 5.1) });
+            let found = Arch::new().dispatch(Check(a, b));
+            for k in 0..LANES {
+                let (x, y) = (a[k], b[k]);
+                let (sin, cos) = crate::multibody::sine::sin_cos(x);
+                let chosen = if y == 0.0 { x } else { x + y };
+                let alone = [x + y, x - y, x * y, x / y, -x, x.abs(), x * 0.3 + 0.7, chosen, sin, cos];
+                for (found, alone) in found.iter().zip(alone) {
+                    assert_eq!(found[k].to_bits(), alone.to_bits(), "{x} {y}");
+                }
+            }
+        }
+    }
+}
