@@ -151,6 +151,20 @@ fn plate2d() {
     assert_eq!(plate.outline, [60e-6, 40e-6, 1.0]);
 }
 
+/// A body of any outline is its area and second moment: those of a rectangle make the plate of that size. Less than a disk has is
+/// refused.
+#[test]
+fn body2d() {
+    let at = "anchor p1 [a] []\nlink2d * [a c] [l=5u]\n";
+    let body = &drawn(&format!("{at}body2d p1 [c] [A=2400p Ip=2400p*(3600p+1600p)/12]")).masses[0];
+    let plate = &drawn(&format!("{at}plate2d p1 [c] [l=60u w=40u]")).masses[0];
+    same(body.mass, plate.mass);
+    same(body.inertia, plate.inertia);
+    same(body.drag[0], plate.drag[0]);
+    same(body.drag[1], plate.drag[1]);
+    assert_eq!(codes(&format!("{at}body2d p1 [c] [A=2400p Ip=1e-20]")), ["E060"]);
+}
+
 /// The lumped plate over its electrode: positions, axis, and the electrical side.
 #[test]
 fn lumped_plate() {

@@ -7,6 +7,7 @@
 mod cells;
 pub mod cif;
 pub mod drawing;
+pub mod extract;
 pub mod flatten;
 pub mod gds;
 mod outline;

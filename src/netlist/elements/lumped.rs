@@ -26,6 +26,32 @@ pub(super) fn plate2d(site: &mut Site<'_, '_>) -> Result<(), Reported> {
     Ok(())
 }
 
+/// A rigid body of any outline, given by its area and polar second moment about its node, with a Couette film under it.
+pub(super) fn body2d(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+    let (area, polar, h) = (site.positive("A")?, site.positive("Ip")?, site.positive("h")?);
+    let outline = [site.positive_if_any("l")?, site.positive_if_any("w")?];
+    let density = site.density()?;
+    let [viscosity, fluid] = site.film()?;
+    let angle = site.direction(site.instance.rotation)?;
+    let node = site.node(0);
+    // A disk turns most easily about its centre: Ip = A²/2π.
+    let least = area * area / (2.0 * std::f64::consts::PI);
+    if polar < 0.99 * least {
+        let wanted = format!("at least A²/(2·pi) = {least:.4e}, that of a disk of this area");
+        return Err(site.out_of_range("Ip", polar, &wanted));
+    }
+    site.drawing.place(site.instance.span, &[node], &[[0.0; 2]]);
+    site.drawing.structure.masses.push(Mass {
+        name: site.name(),
+        node,
+        mass: density * area * h,
+        inertia: density * polar * h,
+        drag: [viscosity / fluid * area, viscosity / fluid * polar],
+        outline: if let [Some(l), Some(w)] = outline { [l, w, angle] } else { [0.0; 3] },
+    });
+    Ok(())
+}
+
 pub(super) fn mass2d(site: &mut Site<'_, '_>) -> Result<(), Reported> {
     let mass = site.positive("m")?;
     let inertia = site.non_negative_or("J", 0.0)?;

@@ -1,0 +1,192 @@
+//! An extraction as a netlist in SUGAR's language.
+//!
+//! Widths and lengths that several beams share are parameters, so that the model can be swept. The same drawing gives the same bytes.
+
+use super::{Beam, Extraction};
+use crate::sets::Sets;
+use std::collections::HashMap;
+use std::fmt::Write as _;
+
+/// So many beams must share a width, or a length, for it to become a parameter.
+const SHARED: [usize; 2] = [2, 3];
+/// Pieces of a beam whose width changes along it.
+const TAPER_PIECES: usize = 8;
+/// Relative change of the width below which a beam has one width [1]: what rounding to the grid does.
+const UNIFORM: f64 = 5e-3;
+
+/// The netlist of an extraction.
+pub fn netlist(extraction: &Extraction) -> String {
+    let mut out = String::new();
+    head(extraction, &mut out);
+    let (pieces, inner) = pieces(extraction);
+    let names: Vec<&str> = extraction.nodes.iter().map(|n| n.name.as_str()).chain(inner.iter().map(String::as_str)).collect();
+    let widths = Shared::new("w", SHARED[0], pieces.iter().map(|p| micro(p.width)));
+    let lengths = Shared::new("l", SHARED[1], pieces.iter().map(|p| micro(p.length)));
+    for (shared, what) in [(&widths, "width"), (&lengths, "length")] {
+        for (name, value, count) in &shared.parameters {
+            let _ = writeln!(out, "param {name} = {value}  % {what} of {count} beams");
+        }
+    }
+    places(extraction, &mut out);
+    let layers = layers(extraction);
+    for node in &extraction.anchors {
+        let layer = layers[*node];
+        let _ = writeln!(out, "anchor {layer} [{}] []", names[*node]);
+    }
+    for body in &extraction.bodies {
+        let layer = &extraction.layers[body.layer].name;
+        let (area, polar) = (number(body.area), number(body.polar));
+        let _ = writeln!(out, "body2d {layer} [{}] [A={area} Ip={polar}]", names[body.node]);
+    }
+    for [a, b] in &extraction.links {
+        let d = difference(extraction, *a, *b);
+        let (l, oz) = (micro(d[0].hypot(d[1])), angle(d));
+        let _ = writeln!(out, "link2d * [{} {}] [l={l}{oz}]", names[*a], names[*b]);
+    }
+    for piece in &pieces {
+        let layer = &extraction.layers[piece.layer].name;
+        let [a, b] = piece.nodes.map(|n| names[n]);
+        let (l, w) = (lengths.word(micro(piece.length)), widths.word(micro(piece.width)));
+        let _ = writeln!(out, "beam2d {layer} [{a} {b}] [l={l} w={w}{}]", angle(piece.along));
+    }
+    out
+}
+
+fn head(extraction: &Extraction, out: &mut String) {
+    let clean = |text: &str| text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect::<String>();
+    let _ = writeln!(out, "% {}, cell {}, process {}", clean(&extraction.source), clean(&extraction.top), extraction.process);
+    for lost in &extraction.unrecognised {
+        let [x, y] = lost.at.map(|x| x * 1e6);
+        let _ = writeln!(out, "% not in the model: {:.6} um2 of {} at ({x:.3}, {y:.3}) um: {}", lost.area * 1e12, clean(&lost.layer), clean(&lost.why));
+    }
+    for layer in &extraction.layers {
+        let entries: Vec<String> = layer.material.iter().map(|(name, value)| format!("{name}={}", number(*value))).collect();
+        let _ = writeln!(out, "process {} = [ {} h={} ]", layer.name, entries.join(" "), micro(layer.thickness));
+    }
+}
+
+/// A straight piece with one width.
+struct Piece {
+    layer: usize,
+    nodes: [usize; 2],
+    length: f64,
+    along: [f64; 2],
+    width: f64,
+}
+
+/// Beams as pieces of one width each, and the names of the nodes between pieces.
+fn pieces(extraction: &Extraction) -> (Vec<Piece>, Vec<String>) {
+    let (mut pieces, mut inner) = (Vec::new(), Vec::new());
+    for (k, beam) in extraction.beams.iter().enumerate() {
+        let beam = forwards(extraction, beam);
+        let d = difference(extraction, beam.nodes[0], beam.nodes[1]);
+        let [w0, w1] = beam.width;
+        let count = if (w1 - w0).abs() <= UNIFORM * w0.max(w1) { 1 } else { TAPER_PIECES };
+        let mut from = beam.nodes[0];
+        for piece in 0..count {
+            let to = if piece + 1 == count {
+                beam.nodes[1]
+            } else {
+                inner.push(format!("t{}_{}", k + 1, piece + 1));
+                extraction.nodes.len() + inner.len() - 1
+            };
+            let width = w0 + (w1 - w0) * (piece as f64 + 0.5) / count as f64;
+            pieces.push(Piece { layer: beam.layer, nodes: [from, to], length: d[0].hypot(d[1]) / count as f64, along: d, width });
+            from = to;
+        }
+    }
+    (pieces, inner)
+}
+
+/// The beam from left to right, or upwards.
+fn forwards(extraction: &Extraction, beam: &Beam) -> Beam {
+    let d = difference(extraction, beam.nodes[0], beam.nodes[1]);
+    let tiny = 1e-9 * d[0].hypot(d[1]);
+    let mut beam = beam.clone();
+    if d[0] < -tiny || (d[0] <= tiny && d[1] < 0.0) {
+        beam.nodes.reverse();
+        beam.width.reverse();
+    }
+    beam
+}
+
+fn difference(extraction: &Extraction, a: usize, b: usize) -> [f64; 2] {
+    let [p, q] = [a, b].map(|n| extraction.nodes[n].at);
+    [q[0] - p[0], q[1] - p[1]]
+}
+
+/// Places parts that do not hang together with the first.
+fn places(extraction: &Extraction, out: &mut String) {
+    let mut sets = Sets::new(extraction.nodes.len());
+    for [a, b] in extraction.beams.iter().map(|b| b.nodes).chain(extraction.links.iter().copied()) {
+        sets.join(a, b);
+    }
+    for n in 1..extraction.nodes.len() {
+        if sets.first(n) == n {
+            let d = difference(extraction, 0, n);
+            let (from, to) = (&extraction.nodes[0].name, &extraction.nodes[n].name);
+            let _ = writeln!(out, "pos * [{from} {to}] [x={} y={}]", micro(d[0]), micro(d[1]));
+        }
+    }
+}
+
+/// The layer of each node.
+fn layers(extraction: &Extraction) -> Vec<&str> {
+    let mut layers = vec!["*"; extraction.nodes.len()];
+    for beam in &extraction.beams {
+        beam.nodes.iter().for_each(|n| layers[*n] = &extraction.layers[beam.layer].name);
+    }
+    layers
+}
+
+/// Values that several beams have, with a parameter for each.
+struct Shared {
+    words: HashMap<String, String>,
+    parameters: Vec<(String, String, usize)>,
+}
+
+impl Shared {
+    fn new(prefix: &str, least: usize, values: impl Iterator<Item = String>) -> Self {
+        let mut counts: Vec<(String, usize)> = Vec::new();
+        let mut at: HashMap<String, usize> = HashMap::new();
+        for value in values {
+            let k = *at.entry(value.clone()).or_insert_with(|| {
+                counts.push((value, 0));
+                counts.len() - 1
+            });
+            counts[k].1 += 1;
+        }
+        let shared = counts.into_iter().filter(|(_, count)| *count >= least);
+        let parameters: Vec<_> =
+            shared.enumerate().map(|(k, (value, count))| (format!("{prefix}{}", k + 1), value, count)).collect();
+        Self { words: parameters.iter().map(|(name, value, _)| (value.clone(), name.clone())).collect(), parameters }
+    }
+
+    fn word(&self, value: String) -> String {
+        self.words.get(&value).cloned().unwrap_or(value)
+    }
+}
+
+/// A length in micrometres with the suffix of the language, to 0.1 pm.
+fn micro(metres: f64) -> String {
+    let rounded = (metres * 1e13).round() / 1e7;
+    if rounded == 0.0 { "0".to_owned() } else { format!("{rounded}u") }
+}
+
+/// A number of the language.
+fn number(value: f64) -> String {
+    let plain = format!("{value}");
+    if plain.len() <= 8 { plain } else { format!("{value:e}") }
+}
+
+/// ` oz=…` of a direction; nothing along x.
+fn angle([x, y]: [f64; 2]) -> String {
+    let degrees = (y.atan2(x).to_degrees() * 1e9).round() / 1e9;
+    match degrees {
+        0.0 => String::new(),
+        90.0 => " oz=pi/2".to_owned(),
+        -90.0 => " oz=-pi/2".to_owned(),
+        180.0 | -180.0 => " oz=pi".to_owned(),
+        _ => format!(" oz=deg({degrees})"),
+    }
+}
