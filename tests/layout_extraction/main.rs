@@ -19,7 +19,7 @@ fn extracted(drawing: &Drawing) -> Extraction {
     let found = extract(drawing, &process, &ExtractOptions::default()).unwrap_or_else(|e| panic!("{e}"));
     for layer in &found.layers {
         let sum = layer.extracted + layer.anchored + layer.unrecognised;
-        assert!((sum / layer.drawn - 1.0).abs() < 1e-9, "areas balance: {layer:?}");
+        assert!((sum / (layer.drawn + layer.closed) - 1.0).abs() < 1e-9, "areas balance: {layer:?}");
     }
     found
 }

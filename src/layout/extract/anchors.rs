@@ -90,9 +90,10 @@ impl Held {
         let mut covered: Vec<[f64; 2]> = Vec::new();
         for pair in cuts.windows(2).filter(|pair| pair[1] - pair[0] > 1e-9) {
             let t = 0.5 * (pair[0] + pair[1]);
-            if near.iter().any(|k| {
-                inside(&self.polygons[*k as usize], [a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])])
-            }) {
+            if near
+                .iter()
+                .any(|k| inside(&self.polygons[*k as usize], [a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])]))
+            {
                 match covered.last_mut() {
                     Some(last) if last[1] >= pair[0] - 1e-9 => last[1] = pair[1],
                     _ => covered.push([pair[0], pair[1]]),

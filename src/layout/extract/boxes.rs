@@ -9,9 +9,9 @@ pub(super) type Extent = [[f64; 2]; 2];
 /// The box around some points.
 pub(super) fn around(points: impl IntoIterator<Item = [f64; 2]>) -> Extent {
     let none = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
-    points.into_iter().fold(none, |[low, high], p| {
-        [[low[0].min(p[0]), low[1].min(p[1])], [high[0].max(p[0]), high[1].max(p[1])]]
-    })
+    points
+        .into_iter()
+        .fold(none, |[low, high], p| [[low[0].min(p[0]), low[1].min(p[1])], [high[0].max(p[0]), high[1].max(p[1])]])
 }
 
 fn join(a: &Extent, b: &Extent) -> Extent {

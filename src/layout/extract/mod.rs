@@ -18,6 +18,7 @@ pub mod moments;
 mod names;
 mod netlist;
 mod skeleton;
+mod snap;
 
 pub use netlist::netlist;
 
@@ -108,6 +109,9 @@ pub struct LayerResult {
     pub material: Vec<(String, f64)>,
     /// Area of the union of its polygons [m²].
     pub drawn: f64,
+    /// Area of slits between polygons drawn edge to edge, less than two grid units wide, that were closed [m²]; it and `drawn`
+    /// together are the sum of the three that follow.
+    pub closed: f64,
     /// Area of beams and bodies [m²].
     pub extracted: f64,
     /// Area that is held [m²].
@@ -235,7 +239,9 @@ fn one_layer(
     result: &mut Extraction,
 ) -> Result<(), ExtractError> {
     let unit = drawing.unit_m;
-    let solid = regions::union(drawn);
+    let drawn_area = regions::area(&regions::union(drawn));
+    let snapped = snap::snap(drawn);
+    let solid = regions::union(snapped.as_deref().unwrap_or(drawn));
     let points: usize = solid.iter().flat_map(|p| &p.contours).map(Vec::len).sum();
     if points > MOST_POINTS {
         return Err(ExtractError::TooLarge { layer: layer.name.clone(), points });
@@ -247,7 +253,8 @@ fn one_layer(
         name: layer.name.clone(),
         thickness: layer.thickness,
         material: layer.material.iter().map(|(name, value)| (name.clone(), *value)).collect(),
-        drawn: regions::area(&solid) * unit * unit,
+        drawn: drawn_area * unit * unit,
+        closed: (regions::area(&solid) - drawn_area) * unit * unit,
         parts: solid.len(),
         ..LayerResult::default()
     };

@@ -117,7 +117,8 @@ impl Builder<'_> {
                 let held = self.held_body(joint);
                 self.count(joint.cell.area, held);
                 let size = joint.cell.area.max(0.0).sqrt();
-                let ends: Vec<usize> = places.iter().map(|at| self.node(*at, if held { size } else { 0.0 }, held)).collect();
+                let ends: Vec<usize> =
+                    places.iter().map(|at| self.node(*at, if held { size } else { 0.0 }, held)).collect();
                 if !held {
                     let moments = self.without_mouths(joint, places);
                     let node = self.node(moments.centroid(), size, false);
@@ -210,13 +211,17 @@ impl Builder<'_> {
         let (loose_start, loose_end) = (loose(0), loose(1));
         let cut = !(free.len() == 1 && free[0] == [0.0, 1.0]);
         for [t0, t1] in free {
-            let stump = cut && (t0 == 0.0 && loose_start || t1 == 1.0 && loose_end) && (t1 - t0) * long < STUMP * widest;
+            let stump =
+                cut && (t0 == 0.0 && loose_start || t1 == 1.0 && loose_end) && (t1 - t0) * long < STUMP * widest;
             if stump {
                 continue;
             }
             kept += t1 - t0;
             let origin = self.origin;
-            let local = |t: f64| { let x = at(t); [x[0] - origin[0], x[1] - origin[1]] };
+            let local = |t: f64| {
+                let x = at(t);
+                [x[0] - origin[0], x[1] - origin[1]]
+            };
             let start = if t0 == 0.0 { a } else { self.node(local(t0), widest, true) };
             let end = if t1 == 1.0 { b } else { self.node(local(t1), widest, true) };
             self.model.beams.push(Beam { a: start, b: end, width: [width(t0), width(t1)] });

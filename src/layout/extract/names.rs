@@ -56,7 +56,8 @@ pub(super) fn name(result: &mut Extraction, drawing: &Drawing) {
 
 /// A text as a name of the netlist language: other characters than letters and digits become `_`; none where nothing is left.
 fn identifier(text: &str) -> Option<String> {
-    let mut name: String = text.trim().chars().take(64).map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
+    let mut name: String =
+        text.trim().chars().take(64).map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
     if !name.bytes().any(|b| b.is_ascii_alphanumeric()) {
         return None;
     }

@@ -19,7 +19,8 @@ pub fn netlist(extraction: &Extraction) -> String {
     let mut out = String::new();
     head(extraction, &mut out);
     let (pieces, inner) = pieces(extraction);
-    let names: Vec<&str> = extraction.nodes.iter().map(|n| n.name.as_str()).chain(inner.iter().map(String::as_str)).collect();
+    let names: Vec<&str> =
+        extraction.nodes.iter().map(|n| n.name.as_str()).chain(inner.iter().map(String::as_str)).collect();
     let widths = Shared::new("w", SHARED[0], pieces.iter().map(|p| micro(p.width)));
     let lengths = Shared::new("l", SHARED[1], pieces.iter().map(|p| micro(p.length)));
     for (shared, what) in [(&widths, "width"), (&lengths, "length")] {
@@ -54,13 +55,26 @@ pub fn netlist(extraction: &Extraction) -> String {
 
 fn head(extraction: &Extraction, out: &mut String) {
     let clean = |text: &str| text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect::<String>();
-    let _ = writeln!(out, "% {}, cell {}, process {}", clean(&extraction.source), clean(&extraction.top), extraction.process);
+    let _ = writeln!(
+        out,
+        "% {}, cell {}, process {}",
+        clean(&extraction.source),
+        clean(&extraction.top),
+        extraction.process
+    );
     for lost in &extraction.unrecognised {
         let [x, y] = lost.at.map(|x| x * 1e6);
-        let _ = writeln!(out, "% not in the model: {:.6} um2 of {} at ({x:.3}, {y:.3}) um: {}", lost.area * 1e12, clean(&lost.layer), clean(&lost.why));
+        let _ = writeln!(
+            out,
+            "% not in the model: {:.6} um2 of {} at ({x:.3}, {y:.3}) um: {}",
+            lost.area * 1e12,
+            clean(&lost.layer),
+            clean(&lost.why)
+        );
     }
     for layer in &extraction.layers {
-        let entries: Vec<String> = layer.material.iter().map(|(name, value)| format!("{name}={}", number(*value))).collect();
+        let entries: Vec<String> =
+            layer.material.iter().map(|(name, value)| format!("{name}={}", number(*value))).collect();
         let _ = writeln!(out, "process {} = [ {} h={} ]", layer.name, entries.join(" "), micro(layer.thickness));
     }
 }
@@ -91,7 +105,13 @@ fn pieces(extraction: &Extraction) -> (Vec<Piece>, Vec<String>) {
                 extraction.nodes.len() + inner.len() - 1
             };
             let width = w0 + (w1 - w0) * (piece as f64 + 0.5) / count as f64;
-            pieces.push(Piece { layer: beam.layer, nodes: [from, to], length: d[0].hypot(d[1]) / count as f64, along: d, width });
+            pieces.push(Piece {
+                layer: beam.layer,
+                nodes: [from, to],
+                length: d[0].hypot(d[1]) / count as f64,
+                along: d,
+                width,
+            });
             from = to;
         }
     }
