@@ -253,7 +253,7 @@ impl Held {
 }
 
 /// Processor time of this thread, where the system tells it (Linux); elsewhere deadlines alone hold.
-fn thread_cpu() -> Option<Duration> {
+pub(crate) fn thread_cpu() -> Option<Duration> {
     let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
     text.split_whitespace().next()?.parse().ok().map(Duration::from_nanos)
 }

@@ -1,6 +1,6 @@
 //! A netlist with every file it includes, as one value that needs no disk.
 
-use super::lexer::uses_of;
+use super::{foreign, lexer, sugar3};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -118,6 +118,14 @@ impl Reader<'_> {
                 self.includes_of(&spelled, &folder_of(&file), depth + 1);
             }
         }
+    }
+}
+
+/// The files that a text uses, in the order in which its language meets them.
+fn uses_of(text: &str) -> Vec<String> {
+    match foreign::kind(text, 0) {
+        foreign::Kind::Lua(_) => sugar3::uses_of(text),
+        _ => lexer::uses_of(text),
     }
 }
 

@@ -41,20 +41,32 @@ pub(crate) fn kind(text: &str, file: u16) -> Kind {
     Kind::Netlist
 }
 
-/// True for a line of Lua: `use(…)`, `use"…"`, a `--` comment, `NAME = function`, `NAME {`.
+/// True for a line of Lua: `use(…)`, `use"…"`, a `--` comment, a `local`, a call with a table, `[NAME =] NAME {`, a `subnet` with
+/// parentheses.
 fn lua(line: &str) -> bool {
     let words = line.strip_prefix("use").map(str::trim_start);
     let used = words.is_some_and(|rest| rest.starts_with(['(', '"', '\'', '[']));
-    let name = line.len() - line.trim_start_matches(|c: char| c.is_ascii_alphanumeric() || c == '_').len();
-    let called = name > 0 && line[name..].trim_start().starts_with('{');
-    used || line.starts_with("--") || called || line.strip_prefix("local ").is_some_and(defines)
+    let called = |text: &str| after_name(text).is_some_and(|rest| rest.starts_with('{'));
+    let assigned =
+        after_name(line).and_then(|rest| rest.strip_prefix('=')).is_some_and(|rest| called(rest.trim_start()));
+    let subnet = line.strip_prefix("subnet ").and_then(|rest| after_name(rest.trim_start()));
+    used || line.starts_with("--")
+        || called(line)
+        || assigned
+        || subnet.is_some_and(|rest| rest.starts_with('('))
+        || line.strip_prefix("local ").is_some_and(defines)
+}
+
+/// What follows the name that a text begins with, blanks left out; none without a name.
+fn after_name(text: &str) -> Option<&str> {
+    let rest = text.trim_start_matches(|c: char| c.is_ascii_alphanumeric() || c == '_');
+    (rest.len() < text.len()).then(|| rest.trim_start())
 }
 
 /// True for `NAME = …` and `function …`, what follows Lua's `local`.
 fn defines(rest: &str) -> bool {
-    let name = rest.trim_start().trim_start_matches(|c: char| c.is_ascii_alphanumeric() || c == '_');
-    name.len() < rest.trim_start().len()
-        && (name.trim_start().starts_with('=') || rest.trim_start().starts_with("function "))
+    let rest = rest.trim_start();
+    rest.starts_with("function ") || after_name(rest).is_some_and(|rest| rest.starts_with('='))
 }
 
 /// True for a line of MATLAB: a function's head, or a command of a session.
@@ -85,6 +97,9 @@ mod tests {
         assert_eq!(told("% net=cho_load('x.net');\nuses mumps.net\nanchor p1 [a] []\n"), ('n', 0));
         assert_eq!(told("% title\nuse(\"mumps.net\")\n"), ('l', 8));
         assert_eq!(told("use 'mumps.net'\n"), ('l', 0));
+        assert_eq!(told("p1 = material {h=2u}\n"), ('l', 0));
+        assert_eq!(told("subnet s (A, B)\n"), ('l', 0));
+        assert_eq!(told("subnet s [a b] [l=1u]\nx = [\n"), ('n', 0));
         assert_eq!(told("-- title\n"), ('l', 0));
         assert_eq!(told("A = 1\nanchor {A; material=p1}\n"), ('l', 6));
         assert_eq!(told("function [q] = f(net)\n"), ('m', 0));

@@ -35,7 +35,7 @@ pub(crate) fn used_name(text: &str) -> &str {
 }
 
 /// Power of ten of a suffix letter.
-fn suffix(letter: u8) -> Option<i32> {
+pub(super) fn suffix(letter: u8) -> Option<i32> {
     Some(match letter {
         b'a' => -18,
         b'f' => -15,
@@ -57,7 +57,7 @@ fn suffix(letter: u8) -> Option<i32> {
 }
 
 /// The double nearest to `digits` times a power of ten, rounded once: `30u` is 30e-6, not 30 × 1e-6.
-fn scaled(digits: &str, power: i32) -> f64 {
+pub(super) fn scaled(digits: &str, power: i32) -> f64 {
     let (mantissa, exponent) = digits.split_once('e').unwrap_or((digits, "0"));
     let exponent = exponent.parse::<i32>().unwrap_or(0).saturating_add(power);
     format!("{mantissa}e{exponent}").parse().unwrap_or(f64::NAN)

@@ -1,11 +1,12 @@
-//! SUGAR netlists: text → tokens → syntax tree → elaborated [`Structure`].
+//! SUGAR netlists, of both languages: text → elements → placed [`Structure`], behind one trait, [`FrontEnd`].
 //!
 //! [`Bundle`] holds the text of a netlist and of every file it includes, so that nothing after it touches the disk: a
 //! bundle can be sent to a server as it is. [`load`] turns a bundle into a structure, or into diagnostics.
 //!
-//! One module a step: `lexer` makes tokens, `parser`, `statement` and `expression` the tree with all includes in place, `resolve`
-//! binds names, `elaborate` and `instance` run definitions, loops and subnets, `elements` builds what they instantiate, `place` walks
-//! over the drawing for node positions, and `check` looks for loose ends. docs/netlist.md describes the language.
+//! `foreign` tells the languages apart. SUGAR 2, one module a step: `lexer` makes tokens, `parser`, `statement` and `expression` the tree with all includes in place, `resolve`
+//! binds names, `elaborate` and `instance` run definitions, loops and subnets. SUGAR 3, which is Lua, is run by `sugar3`. What both
+//! instantiate is built by `elements`; `place` walks over the drawing for node positions, and `check` looks for loose ends.
+//! docs/netlist.md describes the languages.
 
 mod ast;
 mod bundle;
@@ -17,6 +18,7 @@ mod elements;
 mod evaluate;
 mod expression;
 mod foreign;
+mod front;
 mod functions;
 mod instance;
 mod lexer;
@@ -28,20 +30,20 @@ mod setting;
 mod sink;
 mod source;
 mod statement;
+mod sugar2;
+mod sugar3;
 mod suggest;
 mod token;
 mod value;
 
 pub use bundle::{Bundle, DroppedInclude};
 pub use diagnostic::{Diagnostic, Diagnostics, Severity};
+pub use front::FrontEnd;
 pub use setting::Setting;
 
 use crate::structure::Structure;
-use ast::{Program, Statement};
-use elaborate::Elaborator;
+use drawing::Drawing;
 use sink::Sink;
-use source::Span;
-use std::collections::HashSet;
 
 /// Longer lists of names are cut in messages.
 const MOST_LISTED: usize = 40;
@@ -65,82 +67,52 @@ pub fn load(bundle: &Bundle, set: &[(String, Setting)]) -> Result<Loaded, Diagno
     Source::new(bundle).load(set)
 }
 
-/// A bundle that has been read: parsed, and its names bound. What is drawn depends on the values of parameters too.
+/// A drawing that has been read, in whichever language it is.
 #[derive(Debug)]
 pub struct Source {
-    bundle: Bundle,
-    program: Program,
-    /// What reading had to say.
-    sink: Sink,
+    front: Box<dyn FrontEnd>,
 }
 
 impl Source {
     /// Reads a bundle. Errors come out with [`Source::load`].
     pub fn new(bundle: &Bundle) -> Self {
-        let mut sink = Sink::new(&bundle.root);
-        let mut program = parser::parse(bundle, &mut sink);
-        if !sink.failed() || program.incomplete {
-            resolve::resolve(&mut program, &mut sink);
-        }
-        Self { bundle: bundle.clone(), program, sink }
+        Self { front: front::read(bundle) }
     }
 
-    /// Elaborates it with parameters set from outside.
+    /// What another front end has read.
+    pub fn from_front(front: Box<dyn FrontEnd>) -> Self {
+        Self { front }
+    }
+
+    /// Draws it with parameters set from outside.
     ///
     /// # Errors
     /// Every error found in one run, those of reading too; warnings are among them.
     pub fn load(&self, set: &[(String, Setting)]) -> Result<Loaded, Diagnostics> {
-        let (bundle, program) = (&self.bundle, &self.program);
-        let mut sink = self.sink.clone();
-        if !sink.failed() || program.incomplete {
-            check_settings(program, set, &mut sink);
-        }
-        if sink.failed() {
-            return Err(sink.finish(bundle));
-        }
-        let mut elaborated = Elaborator::run(program, set, &mut sink);
-        elements::upright::settle(&mut elaborated.drawing, &mut sink);
-        if !sink.failed() {
-            place::place(&mut elaborated.drawing, &mut sink);
-            check::check(&elaborated.drawing, &mut sink);
-        }
-        if sink.failed() {
-            return Err(sink.finish(bundle));
-        }
-        let warnings = sink.finish(bundle);
-        Ok(Loaded { structure: elaborated.drawing.structure, parameters: elaborated.parameters, warnings })
+        self.front.load(set)
     }
+}
+
+/// What every front end of netlists does with the elements that it has built: members out of the plane, positions, loose ends.
+fn finish(
+    mut drawing: Drawing,
+    parameters: Vec<(String, Setting)>,
+    mut sink: Sink,
+    bundle: &Bundle,
+) -> Result<Loaded, Diagnostics> {
+    elements::upright::settle(&mut drawing, &mut sink);
+    if !sink.failed() {
+        place::place(&mut drawing, &mut sink);
+        check::check(&drawing, &mut sink);
+    }
+    if sink.failed() {
+        return Err(sink.finish(bundle));
+    }
+    let warnings = sink.finish(bundle);
+    Ok(Loaded { structure: drawing.structure, parameters, warnings })
 }
 
 /// The names of all built-in elements, in the order of docs/netlist.md.
 pub fn element_names() -> impl Iterator<Item = &'static str> {
     elements::MODELS.iter().map(|model| model.name)
-}
-
-/// Every name set from outside must be a parameter of the netlist.
-fn check_settings(program: &Program, set: &[(String, Setting)], sink: &mut Sink) {
-    let names = program
-        .statements
-        .iter()
-        .filter_map(|s| if let Statement::Param { name, .. } = s { Some(&*name.name) } else { None });
-    let known: Vec<&str> = names.collect();
-    let sorted: HashSet<&str> = known.iter().copied().collect();
-    for (name, _) in set {
-        if sorted.contains(name.as_str()) {
-            continue;
-        }
-        if !sink.suggests() {
-            sink.error("E048", Span::NOWHERE, format!("the netlist has no parameter `{name}` to set"), "");
-            continue;
-        }
-        let mut help = match known.as_slice() {
-            [] => "the netlist has no `param`".to_owned(),
-            names if names.len() <= MOST_LISTED => format!("its parameters are {}", names.join(" ")),
-            names => format!("it has {} parameters, {} …", names.len(), names[..MOST_LISTED].join(" ")),
-        };
-        if let Some(meant) = suggest::nearest(name, known.iter().copied()) {
-            help = format!("did you mean `{meant}`? {help}");
-        }
-        sink.error("E048", Span::NOWHERE, format!("the netlist has no parameter `{name}` to set"), help);
-    }
 }

@@ -113,8 +113,13 @@ impl<'a> Parser<'a> {
         let number = u16::try_from(self.includes).unwrap_or(u16::MAX);
         match foreign::kind(text, number) {
             foreign::Kind::Lua(span) => {
-                let message = format!("`{name}` looks like a SUGAR 3 (Lua) netlist");
-                self.sink.error("E005", span, message, "only SUGAR 2 netlists are read: rewrite it in that syntax");
+                let message = format!("`{name}` is a SUGAR 3 (Lua) netlist");
+                let help = if cfg!(feature = "lua") {
+                    "a SUGAR 2 netlist can use SUGAR 2 files only"
+                } else {
+                    "this build reads SUGAR 2 only: convert it, or build with the feature `lua`"
+                };
+                self.sink.error("E005", span, message, help);
                 return;
             }
             foreign::Kind::Matlab(span) => {

@@ -10,6 +10,8 @@ pub struct Limits {
     pub message_bytes: usize,
     /// Largest netlist, all files together [byte], default 16 MiB.
     pub netlist_bytes: usize,
+    /// Largest SUGAR 3 netlist, all files together [byte], default 0: such a netlist is a program, and none is run.
+    pub program_bytes: usize,
     /// Most mechanical unknowns of one model, default 200 000. Larger: more memory and longer trials.
     pub unknowns: usize,
     /// Models with at most this many unknowns are stepped on the task of their stream, default 2 000; larger ones on a
@@ -75,6 +77,7 @@ impl Default for Limits {
         Self {
             message_bytes: 64 << 20,
             netlist_bytes: 16 << 20,
+            program_bytes: 0,
             unknowns: 200_000,
             inline_unknowns: 2_000,
             models: 64,
@@ -113,9 +116,10 @@ enum Field<'a> {
 }
 
 /// Names of all limits, as `--limit NAME=VALUE` and docs/service.md have them.
-pub const NAMES: [&str; 27] = [
+pub const NAMES: [&str; 28] = [
     "message_bytes",
     "netlist_bytes",
+    "program_bytes",
     "unknowns",
     "inline_unknowns",
     "models",
@@ -148,6 +152,7 @@ impl Limits {
         Some(match name {
             "message_bytes" => Field::Bytes(&mut self.message_bytes),
             "netlist_bytes" => Field::Bytes(&mut self.netlist_bytes),
+            "program_bytes" => Field::Bytes(&mut self.program_bytes),
             "unknowns" => Field::Count(&mut self.unknowns),
             "inline_unknowns" => Field::Count(&mut self.inline_unknowns),
             "models" => Field::Count(&mut self.models),

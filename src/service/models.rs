@@ -110,6 +110,11 @@ pub(super) fn check_size(bundle: &Bundle, limits: &Limits) -> Result<(), Status>
     if bytes > limits.netlist_bytes {
         return Err(status::limit("netlist_bytes", limits.netlist_bytes, bytes));
     }
+    if bundle.is_program() && bytes > limits.program_bytes {
+        let got =
+            format!("a SUGAR 3 netlist of {bytes}, which is a program: `serve --limit program_bytes=1M` allows it");
+        return Err(status::limit("program_bytes", limits.program_bytes, got));
+    }
     Ok(())
 }
 

@@ -55,6 +55,20 @@ fn limits_are_named() {
     });
 }
 
+/// A SUGAR 3 netlist is a program: it is run only where the server was started with room for such.
+#[test]
+fn programs_are_refused_unless_allowed() {
+    let text = "-- a cantilever\np1 = material {Youngsmodulus=160e9, density=2300, h=2u}\nanchor {node 'a'; material=p1}\n\
+                beam2d {node 'a', node 'b'; material=p1, l=100u, w=2u}\n";
+    let bundle = proto::Bundle { root: "a".into(), files: [("a".to_owned(), text.to_owned())].into() };
+    let request = proto::CompileRequest { bundle: Some(bundle), options: None };
+    let server = start("127.0.0.1:0", Limits::default());
+    let status = block_on(async { server.client().await.compile(request.clone()).await }).expect_err("a program");
+    exhausted(&status, "program_bytes");
+    let server = start("127.0.0.1:0", Limits { program_bytes: 1000, ..Limits::default() });
+    block_on(async { server.client().await.compile(request).await }).expect("room for it");
+}
+
 /// A model with too many unknowns is refused after compiling (the echo device has three).
 #[test]
 fn large_models_are_refused() {

@@ -1,0 +1,75 @@
+//! SUGAR 2 netlists: parsed and their names bound once, elaborated for each set of parameters.
+
+use super::ast::{Program, Statement};
+use super::bundle::Bundle;
+use super::diagnostic::Diagnostics;
+use super::elaborate::Elaborator;
+use super::front::FrontEnd;
+use super::setting::Setting;
+use super::sink::Sink;
+use super::source::Span;
+use super::{Loaded, MOST_LISTED, finish, parser, resolve, suggest};
+use std::collections::HashSet;
+
+/// A SUGAR 2 netlist that has been parsed.
+#[derive(Debug)]
+pub(crate) struct Sugar2 {
+    bundle: Bundle,
+    program: Program,
+    /// What reading had to say.
+    sink: Sink,
+}
+
+impl Sugar2 {
+    pub(crate) fn new(bundle: &Bundle) -> Self {
+        let mut sink = Sink::new(&bundle.root);
+        let mut program = parser::parse(bundle, &mut sink);
+        if !sink.failed() || program.incomplete {
+            resolve::resolve(&mut program, &mut sink);
+        }
+        Self { bundle: bundle.clone(), program, sink }
+    }
+}
+
+impl FrontEnd for Sugar2 {
+    fn load(&self, set: &[(String, Setting)]) -> Result<Loaded, Diagnostics> {
+        let (bundle, program) = (&self.bundle, &self.program);
+        let mut sink = self.sink.clone();
+        if !sink.failed() || program.incomplete {
+            check_settings(program, set, &mut sink);
+        }
+        if sink.failed() {
+            return Err(sink.finish(bundle));
+        }
+        let elaborated = Elaborator::run(program, set, &mut sink);
+        finish(elaborated.drawing, elaborated.parameters, sink, bundle)
+    }
+}
+
+/// Every name set from outside must be a parameter of the netlist.
+fn check_settings(program: &Program, set: &[(String, Setting)], sink: &mut Sink) {
+    let names = program
+        .statements
+        .iter()
+        .filter_map(|s| if let Statement::Param { name, .. } = s { Some(&*name.name) } else { None });
+    let known: Vec<&str> = names.collect();
+    let sorted: HashSet<&str> = known.iter().copied().collect();
+    for (name, _) in set {
+        if sorted.contains(name.as_str()) {
+            continue;
+        }
+        if !sink.suggests() {
+            sink.error("E048", Span::NOWHERE, format!("the netlist has no parameter `{name}` to set"), "");
+            continue;
+        }
+        let mut help = match known.as_slice() {
+            [] => "the netlist has no `param`".to_owned(),
+            names if names.len() <= MOST_LISTED => format!("its parameters are {}", names.join(" ")),
+            names => format!("it has {} parameters, {} …", names.len(), names[..MOST_LISTED].join(" ")),
+        };
+        if let Some(meant) = suggest::nearest(name, known.iter().copied()) {
+            help = format!("did you mean `{meant}`? {help}");
+        }
+        sink.error("E048", Span::NOWHERE, format!("the netlist has no parameter `{name}` to set"), help);
+    }
+}
