@@ -5,16 +5,24 @@
 //! what, and what holds them.
 
 mod cells;
+mod chords;
 pub mod cif;
+mod draw;
 pub mod drawing;
 pub mod extract;
 pub mod flatten;
 pub mod gds;
+pub mod labelled;
+mod lines;
+pub mod mask;
 mod outline;
 pub mod process;
 pub mod read;
 pub mod regions;
+pub mod report;
 mod simple;
+mod write_cif;
+pub mod write_gds;
 
 pub use drawing::{Drawing, Label, Placement, Polygon};
 pub use process::{Anchoring, Layer, Process, ProcessError};

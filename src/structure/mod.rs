@@ -129,6 +129,15 @@ pub struct Support {
     pub angle: f64,
 }
 
+/// The outline of an anchor's pad, for drawings: from its node along local x, and as much to either side.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Pad {
+    /// Index of the anchor in [`Structure::supports`].
+    pub support: usize,
+    /// Length along local x and width across it [m].
+    pub size: [f64; 2],
+}
+
 /// A linear spring or viscous damper with three directions in a frame that turns with the mean of its two ends.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SpringDamper {
@@ -191,6 +200,9 @@ pub struct Comb {
     pub permittivity: f64,
     /// Capacitance that does not depend on the motion [F].
     pub parasitic: f64,
+    /// Length and width of its fingers [m], for drawings; a width of 0 where the netlist gives none.
+    #[serde(default)]
+    pub finger: [f64; 2],
     /// False for SUGAR's `comb2d`, whose force is constant whatever the overlap.
     pub finite: bool,
     /// Where its voltage comes from.
@@ -329,6 +341,9 @@ pub struct Structure {
     pub links: Vec<Link>,
     /// Anchors, guides and other supports.
     pub supports: Vec<Support>,
+    /// Pads of anchors whose sizes are given.
+    #[serde(default)]
+    pub pads: Vec<Pad>,
     /// Lumped springs and dampers.
     pub springs: Vec<SpringDamper>,
     /// Dead loads.

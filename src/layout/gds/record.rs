@@ -7,7 +7,7 @@ use std::io::Read;
 pub(crate) mod kind {
     macro_rules! kinds {
         ($($name:ident = $number:literal),* $(,)?) => {
-            $(#[allow(missing_docs)] pub(crate) const $name: u8 = $number;)*
+            $(#[allow(dead_code)] pub(crate) const $name: u8 = $number;)*
             /// The name of a type of record in the format's documentation.
             pub(crate) fn name(kind: u8) -> Option<&'static str> {
                 match kind { $($number => Some(stringify!($name)),)* _ => None }

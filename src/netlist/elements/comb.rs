@@ -14,6 +14,7 @@ impl Site<'_, '_> {
             let message = "the overlap `l` of a comb is longer than its fingers `L`".to_owned();
             return Err(self.sink.error("E060", span, message, ""));
         }
+        let width = self.positive_if_any("w")?.unwrap_or(0.0);
         let permittivity = self.permittivity()?;
         let axis = [angle.cos(), angle.sin()];
         let (a, b) = (self.node(0), self.node(1));
@@ -30,6 +31,7 @@ impl Site<'_, '_> {
             overlap,
             permittivity,
             parasitic,
+            finger: [finger, width],
             finite,
             voltage,
         });

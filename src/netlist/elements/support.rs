@@ -4,16 +4,18 @@ use super::super::drawing::Fact;
 use super::super::rotation::Rotation;
 use super::super::sink::Reported;
 use super::arguments::Site;
-use crate::structure::{NodeId, Support};
+use crate::structure::{NodeId, Pad, Support};
 
 impl Site<'_, '_> {
     fn support(&mut self, held: [bool; 3]) -> Result<(), Reported> {
-        for size in ["l", "w", "h"] {
-            self.positive_if_any(size)?;
-        }
+        let [l, w, _] = [self.positive_if_any("l")?, self.positive_if_any("w")?, self.positive_if_any("h")?];
         let node = self.node(0);
         let angle = self.instance.rotation.angle();
         self.hold(node, held, angle);
+        if let (Some(l), Some(w)) = (l, w) {
+            let support = self.drawing.structure.supports.len() - 1;
+            self.drawing.structure.pads.push(Pad { support, size: [l, w] });
+        }
         Ok(())
     }
 

@@ -1,0 +1,270 @@
+//! A drawing that carries its mechanism as labels, back to a netlist.
+//!
+//! Labels name things and say what outlines cannot: materials, kinds, lumped parts, ports. Where a node lies and how wide a beam is
+//! comes from the drawing: a number of a label stands where the drawing agrees with it to its grid, as the more exact of the
+//! two; else the drawing's is taken, with a note. At the end the mechanism is drawn again, and whatever is in only one of the two
+//! drawings is told with its area and place.
+
+use super::chords::Chords;
+use super::draw::{self, Role, is_beam};
+use super::drawing::{Drawing, Polygon};
+use super::lines::{Line, LineError, Lines, ProcessLine, is_full_name, text};
+use super::mask::{ROUNDING, Width, Widths, on_notes};
+use super::process::{Process, names};
+use super::regions;
+use super::report::{Areas, Report, Unrecognised, region};
+use std::collections::{BTreeMap, HashMap};
+use thiserror::Error;
+
+/// Differences told one by one.
+const TOLD: usize = 20;
+
+/// Why the labels of a drawing make no netlist.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum LabelledError {
+    /// A label on the layer of notes is no line.
+    #[error("{place}: {error}")]
+    Line {
+        /// Where it stands.
+        place: String,
+        /// Why not.
+        error: LineError,
+    },
+    /// A line names a node that has no label.
+    #[error(
+        "{place}: `{line}` is at node `{node}`, which has no label in the drawing: put a text `{node}` where it is"
+    )]
+    Node {
+        /// Where the line stands.
+        place: String,
+        /// Its name.
+        line: String,
+        /// The node.
+        node: String,
+    },
+    /// A line of a material that is not there.
+    #[error("{place}: `{line}` is of `{process}`, of which there is no label `process {process} = [...]`")]
+    Process {
+        /// Where the line stands.
+        place: String,
+        /// Its name.
+        line: String,
+        /// The process.
+        process: String,
+    },
+    /// Two nodes of a beam in one place.
+    #[error("{place}: `{line}` has both its nodes in one place")]
+    Short {
+        /// Where the line stands.
+        place: String,
+        /// Its name.
+        line: String,
+    },
+}
+
+/// Elements whose nodes must have places.
+fn has_places(model: &str) -> bool {
+    !matches!(model, "R" | "L" | "C" | "Vsrc" | "Isrc" | "opamp" | "vcvs" | "eground" | "port")
+}
+
+/// Reads the labels of a drawing and checks them against its polygons.
+///
+/// # Errors
+/// See [`LabelledError`].
+pub(crate) fn read(drawing: &Drawing, process: &Process) -> Result<(String, Report), LabelledError> {
+    let mut notes = drawing.notes.clone();
+    let (mut lines, places) = lines_of(drawing)?;
+    let at = nodes_of(drawing, &lines, &mut notes);
+    for (line, place) in lines.elements.iter().zip(&places).filter(|(l, _)| has_places(&l.model)) {
+        if let Some(node) = line.nodes.iter().find(|n| !at.contains_key(*n)) {
+            let (place, line, node) = (place.clone(), line.name.clone(), node.clone());
+            return Err(LabelledError::Node { place, line, node });
+        }
+    }
+    let layers = layers_of(drawing, process);
+    let measured = measure(&mut lines, &places, &at, drawing, process, &layers)?;
+    notes.extend(measured);
+    let report = compare(drawing, process, &lines, &at, &layers, notes);
+    let heading = format!("from {}, cell {}, by its labels", drawing.source, drawing.top);
+    Ok((text::netlist(&lines, &heading), report))
+}
+
+/// Lines in the order of their numbers, with where they stand.
+fn lines_of(drawing: &Drawing) -> Result<(Lines, Vec<String>), LabelledError> {
+    let mut numbered: Vec<(u64, Line, String)> = Vec::new();
+    let mut processes = BTreeMap::new();
+    for label in drawing.labels.iter().filter(|l| on_notes(&l.layer)) {
+        let place = || format!("{}, label at {}", drawing.source, drawing.place(label.at.map(f64::from)));
+        if let Some(process) = ProcessLine::parse(&label.text) {
+            processes.insert(process.name.clone(), process);
+        } else if let Some((number, text)) = label.text.split_once(": ").and_then(|(n, t)| Some((n.parse().ok()?, t))) {
+            let line = Line::parse(text).map_err(|error| LabelledError::Line { place: place(), error })?;
+            numbered.push((number, line, place()));
+        }
+    }
+    numbered.sort_by(|a, b| (a.0, &a.1.name).cmp(&(b.0, &b.1.name)));
+    for (_, line, place) in &numbered {
+        if line.process != "*" && !processes.contains_key(&line.process) {
+            let (place, name, process) = (place.clone(), line.name.clone(), line.process.clone());
+            return Err(LabelledError::Process { place, line: name, process });
+        }
+    }
+    let (elements, places) = numbered.into_iter().map(|(_, line, place)| (line, place)).unzip();
+    Ok((Lines { processes: processes.into_values().collect(), elements }, places))
+}
+
+/// Where nodes lie [m]: labels of their names.
+fn nodes_of(drawing: &Drawing, lines: &Lines, notes: &mut Vec<String>) -> HashMap<String, [f64; 2]> {
+    let wanted: std::collections::HashSet<&String> = lines.elements.iter().flat_map(|l| &l.nodes).collect();
+    let mut at: HashMap<String, [i32; 2]> = HashMap::new();
+    for label in drawing.labels.iter().filter(|l| is_full_name(&l.text) && wanted.contains(&l.text)) {
+        let known = *at.entry(label.text.clone()).or_insert(label.at);
+        if known != label.at {
+            let (first, second) = (drawing.place(known.map(f64::from)), drawing.place(label.at.map(f64::from)));
+            notes.push(format!("`{}` is a label at {first} and at {second}: the first one counts", label.text));
+        }
+    }
+    at.into_iter().map(|(name, p)| (name, p.map(|x| f64::from(x) * drawing.unit_m))).collect()
+}
+
+/// Polygons of each layer of the process, merged, and of its anchors.
+fn layers_of(drawing: &Drawing, process: &Process) -> BTreeMap<Role, Vec<Polygon>> {
+    let mut all: BTreeMap<Role, Vec<Polygon>> = BTreeMap::new();
+    for (name, polygons) in &drawing.layers {
+        for (k, layer) in process.layers.iter().enumerate() {
+            for (role, list) in [(Role::Layer(k), &layer.drawn), (Role::Anchor(k), &layer.anchoring.drawn)] {
+                if names(list, name) {
+                    all.entry(role).or_default().extend(polygons.iter().cloned());
+                }
+            }
+        }
+    }
+    all.into_iter().map(|(role, polygons)| (role, regions::union(&polygons))).collect()
+}
+
+/// Lengths, directions and widths: the label's where the drawing agrees, else the drawing's.
+fn measure(
+    lines: &mut Lines,
+    places: &[String],
+    at: &HashMap<String, [f64; 2]>,
+    drawing: &Drawing,
+    process: &Process,
+    layers: &BTreeMap<Role, Vec<Polygon>>,
+) -> Result<Vec<String>, LabelledError> {
+    let unit = drawing.unit_m;
+    let chords = layers.iter().filter_map(|(role, all)| match role {
+        Role::Layer(k) => Some((*k, Chords::new(all))),
+        Role::Anchor(_) => None,
+    });
+    let widths = Widths::new(chords.collect());
+    let figure = draw::draw(lines, at, process);
+    let mut notes = Vec::new();
+    let mut changed = 0;
+    let mut tell = |text: String| {
+        changed += 1;
+        if changed <= TOLD {
+            notes.push(text);
+        }
+    };
+    let um = |x: f64| (x * 1e12).round() / 1e6;
+    for (line, place) in lines.elements.iter_mut().zip(places) {
+        let stretched = is_beam(&line.model) || line.model == "link2d";
+        if !stretched || line.nodes.len() != 2 {
+            continue;
+        }
+        let (a, b) = (at[&line.nodes[0]], at[&line.nodes[1]]);
+        let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
+        let (l, oz) = (dx.hypot(dy), dy.atan2(dx));
+        if l == 0.0 && is_beam(&line.model) {
+            return Err(LabelledError::Short { place: place.clone(), line: line.name.clone() });
+        }
+        let told = [line.get("l").unwrap_or(0.0), line.get("oz").unwrap_or(0.0)];
+        let miss = (told[0] * told[1].cos() - dx).hypot(told[0] * told[1].sin() - dy);
+        if miss > ROUNDING * unit {
+            tell(format!("`{}` is drawn {} µm long, its label says {}", line.name, um(l), um(told[0])));
+            line.set("l", l);
+            line.set("oz", oz);
+        }
+        let hidden = line.get("hidden").is_some();
+        line.parameters.retain(|(n, _)| n != "hidden");
+        let Some(w) = line.get("w").filter(|_| is_beam(&line.model) && !hidden) else { continue };
+        let layer = figure.layer_of.get(&line.nodes[0]).copied().unwrap_or(0);
+        match widths.measure(layer, a.map(|x| x / unit), b.map(|x| x / unit), w / unit) {
+            Width::AsTold => {}
+            Width::Other(drawn) => {
+                tell(format!("`{}` is drawn {} µm wide, its label says {}", line.name, um(drawn * unit), um(w)));
+                line.set("w", drawn * unit);
+            }
+            Width::Unclear => {
+                tell(format!(
+                    "the width of `{}` cannot be measured at {place}: its label's {} µm were taken",
+                    line.name,
+                    um(w)
+                ));
+            }
+        }
+    }
+    if changed > TOLD {
+        notes.push(format!("{} more such differences", changed - TOLD));
+    }
+    Ok(notes)
+}
+
+/// Draws the mechanism again and tells what only one of the two drawings has.
+fn compare(
+    drawing: &Drawing,
+    process: &Process,
+    lines: &Lines,
+    at: &HashMap<String, [f64; 2]>,
+    layers: &BTreeMap<Role, Vec<Polygon>>,
+    mut notes: Vec<String>,
+) -> Report {
+    let figure = draw::draw(lines, at, process);
+    let unit = drawing.unit_m;
+    let mut again: BTreeMap<Role, Vec<Polygon>> = BTreeMap::new();
+    for (role, shape) in &figure.shapes {
+        let contour = shape.iter().map(|p| p.map(|x| (x / unit).round() as i32)).collect();
+        again.entry(*role).or_default().push(Polygon::from_contour(contour));
+    }
+    let square = unit * unit;
+    let mut areas = Areas::default();
+    let mut unrecognised = Vec::new();
+    let none = Vec::new();
+    let roles: std::collections::BTreeSet<Role> = layers.keys().chain(again.keys()).copied().collect();
+    for role in roles {
+        let drawn = layers.get(&role).unwrap_or(&none);
+        let ours = regions::union(again.get(&role).unwrap_or(&none));
+        let (more, less) = (regions::difference(drawn, &ours), regions::difference(&ours, drawn));
+        let name = match role {
+            Role::Layer(k) => process.layers[k].name.clone(),
+            Role::Anchor(k) => format!("anchors of {}", process.layers[k].name),
+        };
+        let more = Unrecognised::of(&name, &more, unit, "drawn, but in no part of the mechanism");
+        let less = Unrecognised::of(&name, &less, unit, "in the mechanism, but not drawn");
+        if let Role::Layer(_) = role {
+            areas.drawn_m2 += regions::area(drawn) * square;
+            areas.unrecognised_m2 += more.iter().map(|u| u.area_m2).sum::<f64>();
+        } else {
+            areas.anchored_m2 += regions::area(drawn) * square;
+        }
+        unrecognised.extend(more);
+        for u in less {
+            notes.push(format!("{} µm² on {} at {}: {}", u.area_um2(), u.layer, region(&u), u.why));
+        }
+    }
+    areas.extracted_m2 = areas.drawn_m2 - areas.unrecognised_m2;
+    for (name, polygons) in drawing.layers.iter().filter(|(name, _)| process.role_of(name).is_none()) {
+        let merged = regions::union(polygons);
+        let foreign = Unrecognised::of(name, &merged, unit, "the process has no such layer");
+        let area: f64 = foreign.iter().map(|u| u.area_m2).sum();
+        areas.drawn_m2 += area;
+        areas.unrecognised_m2 += area;
+        unrecognised.extend(foreign);
+    }
+    let mut counts = BTreeMap::new();
+    for line in &lines.elements {
+        *counts.entry(line.model.clone()).or_insert(0) += 1;
+    }
+    Report { by: "labels".to_owned(), counts, areas, unrecognised, notes }
+}

@@ -1,0 +1,410 @@
+//! A structure as lines: each part as the element that makes it, at its place.
+
+use super::{Line, Lines, ProcessLine};
+use crate::structure::{Beam, CircuitKind, GapVoltage, NodeId, Structure};
+use std::collections::{BTreeMap, HashMap, HashSet};
+
+/// Parts that no line stands for.
+pub(crate) type Left = Vec<String>;
+
+/// Makes lines of a structure; also tells what has no line.
+pub(crate) fn lines(structure: &Structure) -> (Lines, Left) {
+    let mut of = OfStructure {
+        structure,
+        processes: Vec::new(),
+        by_key: HashMap::new(),
+        lines: Vec::new(),
+        left: Vec::new(),
+        resistors: structure.resistors.iter().map(|r| r.name.as_str()).zip(0..).collect(),
+        used_resistors: HashSet::new(),
+        bows: HashMap::new(),
+    };
+    of.bows();
+    let inside = of.gaps_with_beams();
+    for (k, beam) in structure.beams.iter().enumerate() {
+        if !inside.contains(beam.name.as_str()) {
+            of.beam(k, beam);
+        }
+    }
+    of.plates();
+    of.links_and_springs();
+    of.supports();
+    of.fields();
+    of.loads();
+    of.circuit();
+    of.islands();
+    // Parts come in the order in which their nodes did; the sort is stable.
+    let order: HashMap<&str, usize> = structure.nodes.iter().map(|n| n.name.as_str()).zip(0..).collect();
+    let first = |line: &Line| line.nodes.iter().filter_map(|n| order.get(n.as_str())).min().copied();
+    of.lines.sort_by_cached_key(|line| (line.model == "pos", line.process == "*" && !places(&line.model), first(line)));
+    (Lines { processes: of.processes, elements: of.lines }, of.left)
+}
+
+/// True for elements that are parts of the drawing rather than something attached to it.
+fn places(model: &str) -> bool {
+    matches!(
+        model,
+        "link2d" | "spring2d" | "damper2d" | "plategap2d" | "anchor" | "hinge" | "slider" | "guide2d" | "mass2d"
+    )
+}
+
+struct OfStructure<'a> {
+    structure: &'a Structure,
+    processes: Vec<ProcessLine>,
+    by_key: HashMap<Vec<u64>, usize>,
+    lines: Vec<Line>,
+    left: Left,
+    resistors: HashMap<&'a str, usize>,
+    used_resistors: HashSet<usize>,
+    /// Rest curvatures' end moments, by beam name [N·m].
+    bows: HashMap<&'a str, f64>,
+}
+
+impl<'a> OfStructure<'a> {
+    fn node(&self, id: NodeId) -> String {
+        self.structure.nodes[id.0].name.clone()
+    }
+
+    fn position(&self, id: NodeId) -> [f64; 2] {
+        self.structure.nodes[id.0].position
+    }
+
+    fn push(&mut self, name: &str, model: &str, process: &str, nodes: &[NodeId], parameters: &[(&str, f64)]) {
+        let nodes = nodes.iter().map(|id| self.node(*id)).collect();
+        let parameters = parameters.iter().map(|(n, v)| ((*n).to_owned(), *v)).collect();
+        let (name, model, process) = (name.to_owned(), model.to_owned(), process.to_owned());
+        self.lines.push(Line { name, model, process, nodes, parameters });
+    }
+
+    /// The process with these entries, new or known.
+    fn process(&mut self, entries: &[(&str, f64)]) -> String {
+        let key: Vec<u64> = entries.iter().flat_map(|(n, v)| [n.len() as u64, v.to_bits()]).collect();
+        let next = self.processes.len();
+        let index = *self.by_key.entry(key).or_insert(next);
+        if index == next {
+            let entries = entries.iter().map(|(n, v)| ((*n).to_owned(), *v)).collect();
+            self.processes.push(ProcessLine { name: format!("p{}", next + 1), entries });
+        }
+        self.processes[index].name.clone()
+    }
+
+    fn process_of(&mut self, beam: &Beam) -> String {
+        let m = &beam.material;
+        let mut entries = vec![
+            ("Youngsmodulus", m.youngs_modulus),
+            ("Poisson", m.poisson),
+            ("density", m.density),
+            ("h", beam.thickness),
+        ];
+        if m.viscosity > 0.0 {
+            entries.extend([("viscosity", m.viscosity), ("fluid", m.fluid)]);
+        }
+        let optional = [
+            ("thermalexpansion", m.thermal_expansion),
+            ("ambienttemperature", m.ambient_temperature),
+            ("stress", m.stress),
+        ];
+        let heated = beam.heater.is_some() || beam.temperature.is_some();
+        entries.extend(optional.into_iter().filter(|(name, v)| *v != 0.0 || (heated && *name == "thermalexpansion")));
+        self.process(&entries)
+    }
+
+    /// Rest curvatures are held as pairs of moments called `BEAM.bow`.
+    fn bows(&mut self) {
+        let structure = self.structure;
+        let ends: HashMap<&str, NodeId> = structure.beams.iter().map(|b| (b.name.as_str(), b.b)).collect();
+        for load in &structure.loads {
+            let Some(beam) = load.name.strip_suffix(".bow") else { continue };
+            if ends.get(beam) == Some(&load.node) {
+                self.bows.insert(beam, load.moment);
+            }
+        }
+    }
+
+    fn beam(&mut self, index: usize, beam: &'a Beam) {
+        let process = self.process_of(beam);
+        let mut parameters = vec![("l", beam.length), ("w", beam.width), ("oz", beam.angle)];
+        let mut model = "beam2d";
+        if let Some(temperature) = beam.temperature {
+            parameters.push(("T", temperature));
+        }
+        if let Some(moment) = self.bows.get(beam.name.as_str()) {
+            let bending = beam.material.youngs_modulus * beam.thickness * beam.width.powi(3) / 12.0;
+            parameters.push(("curvature", moment / bending));
+        }
+        let resistor = self.resistors.get(beam.name.as_str()).map(|k| (*k, &self.structure.resistors[*k]));
+        if let Some(heater) = &beam.heater {
+            model = "beam2det";
+            let conductivity = heater.conductance * beam.length / (beam.width * beam.thickness);
+            parameters.extend([("R", heater.resistance), ("thermcond", conductivity), ("tau", heater.time_constant)]);
+            if let Some(strength) = self.structure.yields.iter().find(|y| y.beam == index) {
+                parameters.extend([("yieldstress", strength.stress), ("softening", strength.softening)]);
+            }
+        } else if let Some((k, r)) = resistor.filter(|(_, r)| (r.a, r.b) == (beam.a, beam.b)) {
+            model = "beam2de";
+            parameters.push(("R", r.resistance));
+            self.used_resistors.insert(k);
+        }
+        self.push(&beam.name, model, &process, &[beam.a, beam.b], &parameters);
+    }
+
+    /// Plates whose mass is that of a layer, else lumped masses with the drag beside them.
+    fn plates(&mut self) {
+        for mass in &self.structure.masses {
+            let [l, w, angle] = mass.outline;
+            if l > 0.0 && w > 0.0 && mass.mass > 0.0 {
+                let film = mass.drag[0] / (l * w);
+                let thickness = self.structure.beams.first().map_or(2e-6, |b| b.thickness);
+                let known = self.structure.beams.iter().find(|b| {
+                    let m = &b.material;
+                    let own = (m.density * b.thickness * l * w - mass.mass).abs() <= 1e-12 * mass.mass;
+                    own && (m.viscosity / m.fluid - film).abs() <= 1e-12 * film
+                });
+                let process = match known {
+                    Some(beam) => self.process_of(beam),
+                    None => {
+                        let mut entries = vec![("density", mass.mass / (l * w * thickness)), ("h", thickness)];
+                        if film > 0.0 {
+                            entries.extend([("viscosity", film * thickness), ("fluid", thickness)]);
+                        }
+                        self.process(&entries)
+                    }
+                };
+                self.push(&mass.name, "plate2d", &process, &[mass.node], &[("l", l), ("w", w), ("oz", angle)]);
+                continue;
+            }
+            let mut parameters = vec![("m", mass.mass)];
+            if mass.inertia != 0.0 {
+                parameters.push(("J", mass.inertia));
+            }
+            self.push(&mass.name, "mass2d", "*", &[mass.node], &parameters);
+            if mass.drag != [0.0; 2] {
+                self.left.push(format!("the gas drag of `{}`", mass.name));
+            }
+        }
+    }
+
+    fn links_and_springs(&mut self) {
+        let structure = self.structure;
+        let apart = |a: NodeId, b: NodeId| {
+            let (p, q) = (structure.nodes[a.0].position, structure.nodes[b.0].position);
+            [q[0] - p[0], q[1] - p[1]]
+        };
+        for link in &structure.links {
+            let [dx, dy] = apart(link.a, link.b);
+            let parameters = [("l", dx.hypot(dy)), ("oz", dy.atan2(dx))];
+            self.push(&link.name, "link2d", "*", &[link.a, link.b], &parameters);
+        }
+        for spring in &structure.springs {
+            let (sin, cos) = spring.angle.sin_cos();
+            let [dx, dy] = apart(spring.a, spring.b);
+            let along = (dx * cos + dy * sin).max(0.0);
+            let place = [("l", along), ("oz", spring.angle)];
+            let given = |names: [&'static str; 3], values: [f64; 3]| {
+                names.into_iter().zip(values).filter(|(_, v)| *v != 0.0).chain(place).collect::<Vec<_>>()
+            };
+            let nodes = [spring.a, spring.b];
+            let damped = spring.damping != [0.0; 3];
+            if spring.stiffness != [0.0; 3] || !damped {
+                self.push(&spring.name, "spring2d", "*", &nodes, &given(["kx", "ky", "krz"], spring.stiffness));
+            }
+            if damped {
+                let both = spring.stiffness != [0.0; 3];
+                let name = if both { format!("{}_damper", spring.name) } else { spring.name.clone() };
+                self.push(&name, "damper2d", "*", &nodes, &given(["bx", "by", "brz"], spring.damping));
+            }
+        }
+    }
+
+    fn supports(&mut self) {
+        let pads: HashMap<usize, [f64; 2]> = self.structure.pads.iter().map(|p| (p.support, p.size)).collect();
+        for (k, support) in self.structure.supports.iter().enumerate() {
+            let model = match support.held {
+                [true, true, true] => "anchor",
+                [true, true, false] => "hinge",
+                [false, false, true] => "slider",
+                [false, true, true] => "guide2d",
+                _ => {
+                    self.left.push(format!("the support `{}`, which holds {:?}", support.name, support.held));
+                    continue;
+                }
+            };
+            let size = pads.get(&k).map(|[l, w]| [("l", *l), ("w", *w)]);
+            let parameters: Vec<_> = size.into_iter().flatten().chain([("oz", support.angle)]).collect();
+            self.push(&support.name, model, "*", &[support.node], &parameters);
+        }
+    }
+
+    /// `gap2d` at a fixed voltage brings its two beams with it; gives their names.
+    fn gaps_with_beams(&mut self) -> HashSet<String> {
+        let structure = self.structure;
+        let beams: HashMap<&str, &Beam> = structure.beams.iter().map(|b| (b.name.as_str(), b)).collect();
+        let mut inside = HashSet::new();
+        for gap in &structure.beam_gaps {
+            let GapVoltage::Fixed(voltage) = gap.voltage else { continue };
+            let parts = ["upper", "lower"].map(|part| format!("{}.{part}", gap.name));
+            let (Some(upper), Some(lower)) = (beams.get(parts[0].as_str()), beams.get(parts[1].as_str())) else {
+                self.left.push(format!("the gap `{}` at a fixed voltage without its beams", gap.name));
+                continue;
+            };
+            let process = self.process_of(upper);
+            let mut parameters = vec![("l", gap.length), ("w1", upper.width), ("w2", lower.width), ("gap", gap.gap)];
+            parameters.extend([("oz", gap.angle), ("V", voltage), ("permittivity", gap.permittivity)]);
+            parameters.extend(gap.touch.map(|t| ("touch", t)));
+            if gap.side < 0.0 {
+                self.left.push(format!("that `{}` is mirrored", gap.name));
+            }
+            self.push(&gap.name, "gap2d", &process, &gap.nodes, &parameters);
+            inside.extend(parts);
+        }
+        inside
+    }
+
+    fn fields(&mut self) {
+        let structure = self.structure;
+        let turned = |axis: [f64; 2]| ("oz", axis[1].atan2(axis[0]));
+        let across: BTreeMap<(NodeId, NodeId), f64> =
+            structure.beams.iter().flat_map(|b| [((b.a, b.b), b.width), ((b.b, b.a), b.width)]).collect();
+        for comb in &structure.combs {
+            let mut parameters = vec![("N", comb.gaps), ("gap", comb.gap), ("l", comb.overlap), ("L", comb.finger[0])];
+            parameters.extend([("h", comb.height), turned(comb.axis), ("permittivity", comb.permittivity)]);
+            if comb.finger[1] > 0.0 {
+                parameters.push(("w", comb.finger[1]));
+            }
+            let model = match comb.voltage {
+                GapVoltage::Fixed(v) => {
+                    parameters.push(("V", v));
+                    "comb2d"
+                }
+                GapVoltage::Nodes(..) => {
+                    if comb.parasitic != 0.0 {
+                        parameters.push(("Cp", comb.parasitic));
+                    }
+                    "comb2de"
+                }
+            };
+            self.push(&comb.name, model, "*", &[comb.a, comb.b], &parameters);
+        }
+        for gap in structure.beam_gaps.iter().filter(|g| matches!(g.voltage, GapVoltage::Nodes(..))) {
+            let [a, b, c, d] = gap.nodes;
+            let (p, q) = (self.position(a), self.position(c));
+            // Both widths come back from the distance of the centre lines and the width of the beam that is there.
+            let both = 2.0 * ((p[0] - q[0]).hypot(p[1] - q[1]) - gap.gap);
+            let w1 = across.get(&(a, b)).copied();
+            let w2 = across.get(&(c, d)).copied();
+            let w1 = w1.or(w2.map(|w| both - w)).unwrap_or(both / 2.0);
+            let w2 = w2.unwrap_or(both - w1);
+            let mut parameters = vec![("l", gap.length), ("w1", w1), ("w2", w2), ("gap", gap.gap), ("h", gap.height)];
+            parameters.extend([("oz", gap.angle), ("permittivity", gap.permittivity)]);
+            parameters.extend(gap.touch.map(|t| ("touch", t)));
+            if gap.side < 0.0 {
+                self.left.push(format!("that `{}` is mirrored", gap.name));
+            }
+            self.push(&gap.name, "gap2dforce", "*", &gap.nodes, &parameters);
+        }
+        for gap in &structure.plate_gaps {
+            if matches!(gap.voltage, GapVoltage::Fixed(_)) {
+                self.left.push(format!("the fixed voltage of `{}`", gap.name));
+            }
+            let mut parameters =
+                vec![("A", gap.area), ("gap", gap.gap), turned(gap.axis), ("permittivity", gap.permittivity)];
+            parameters.extend(gap.touch.map(|t| ("touch", t)));
+            self.push(&gap.name, "plategap2d", "*", &[gap.a, gap.b], &parameters);
+        }
+        for stop in &structure.stops {
+            let mut parameters = vec![("A", stop.area), turned(stop.axis)];
+            let optional = [("gap", stop.ways[0]), ("back", stop.ways[1]), ("k", stop.stiffness)];
+            parameters.extend(optional.into_iter().filter_map(|(n, v)| Some((n, v?))));
+            let nodes: Vec<NodeId> = [Some(stop.a), stop.b].into_iter().flatten().collect();
+            self.push(&stop.name, "stop2d", "*", &nodes, &parameters);
+        }
+    }
+
+    fn loads(&mut self) {
+        for load in &self.structure.loads {
+            if load.name.strip_suffix(".bow").is_some_and(|beam| self.bows.contains_key(beam)) {
+                continue;
+            }
+            let [fx, fy] = load.force;
+            let mut parameters = vec![("F", fx.hypot(fy)), ("oz", fy.atan2(fx))];
+            if load.moment != 0.0 {
+                parameters.push(("M", load.moment));
+            }
+            self.push(&load.name, "f2d", "*", &[load.node], &parameters);
+        }
+    }
+
+    fn circuit(&mut self) {
+        let structure = self.structure;
+        let drawn: HashSet<&str> = structure.circuit.iter().map(|c| c.name.as_str()).collect();
+        for (k, r) in structure.resistors.iter().enumerate() {
+            if !self.used_resistors.contains(&k) && !drawn.contains(r.name.as_str()) {
+                self.push(&r.name, "R", "*", &[r.a, r.b], &[("R", r.resistance)]);
+            }
+        }
+        for source in structure.voltage_sources.iter().filter(|s| !drawn.contains(s.name.as_str())) {
+            self.push(&source.name, "Vsrc", "*", &[source.plus, source.minus], &[("V", source.voltage)]);
+        }
+        for element in &structure.circuit {
+            let (model, parameter) = match element.kind {
+                CircuitKind::Resistor => ("R", "R"),
+                CircuitKind::Capacitor => ("C", "C"),
+                CircuitKind::Inductor => ("L", "L"),
+                CircuitKind::VoltageSource => ("Vsrc", "V"),
+                CircuitKind::CurrentSource => ("Isrc", "I"),
+                CircuitKind::OpAmp => ("opamp", ""),
+                CircuitKind::Amplifier => ("vcvs", "A"),
+            };
+            let value = element.value.map(|v| (parameter, v));
+            self.push(&element.name, model, "*", &element.nodes, value.as_slice());
+        }
+        for (k, ground) in structure.electrical_grounds.iter().enumerate() {
+            self.push(&format!("ground{}", k + 1), "eground", "*", &[*ground], &[]);
+        }
+        for port in &structure.ports {
+            let nodes: Vec<NodeId> = [Some(port.plus), port.minus].into_iter().flatten().collect();
+            self.push(&port.name, "port", "*", &nodes, &[]);
+        }
+    }
+
+    /// Places parts that no element connects to the first one.
+    fn islands(&mut self) {
+        let structure = self.structure;
+        let ids: HashMap<&str, usize> = structure.nodes.iter().map(|n| n.name.as_str()).zip(0..).collect();
+        let mut root: Vec<usize> = (0..structure.nodes.len()).collect();
+        fn find(root: &mut [usize], mut k: usize) -> usize {
+            while root[k] != k {
+                root[k] = root[root[k]];
+                k = root[k];
+            }
+            k
+        }
+        let placing = |line: &&Line| {
+            line.process != "*"
+                || matches!(
+                    line.model.as_str(),
+                    "link2d" | "spring2d" | "damper2d" | "plategap2d" | "gap2dforce" | "comb2d" | "comb2de"
+                )
+        };
+        let mut placed = vec![false; structure.nodes.len()];
+        for line in self.lines.iter().filter(placing) {
+            let nodes: Vec<usize> = line.nodes.iter().map(|n| ids[n.as_str()]).collect();
+            for k in &nodes {
+                placed[*k] = true;
+                let (a, b) = (find(&mut root, nodes[0]), find(&mut root, *k));
+                root[a.max(b)] = a.min(b);
+            }
+        }
+        for support in &structure.supports {
+            placed[support.node.0] = true;
+        }
+        let firsts: Vec<usize> = (0..placed.len()).filter(|k| placed[*k] && find(&mut root, *k) == *k).collect();
+        let Some((&origin, others)) = firsts.split_first() else { return };
+        let start = structure.nodes[origin].position;
+        for (n, &k) in others.iter().enumerate() {
+            let [x, y] = structure.nodes[k].position;
+            let parameters = [("x", x - start[0]), ("y", y - start[1])];
+            self.push(&format!("place{}", n + 1), "pos", "*", &[NodeId(origin), NodeId(k)], &parameters);
+        }
+    }
+}

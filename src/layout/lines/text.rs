@@ -1,0 +1,187 @@
+//! Lines to a netlist that a person reads: names with dots become instances of subnets, equal ones of the same subnet.
+//!
+//! Every element keeps its full name, and so does every node that only elements of its own instance touch. A node of an instance
+//! that something outside touches is called `INSTANCE_NODE` there; an element that has the name of an instance makes
+//! that instance's elements `INSTANCE_NAME`. Nodes and names are not changed otherwise.
+
+use super::{Line, Lines};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::fmt::Write;
+
+/// Instances nest at most this deep; deeper names are flattened.
+const DEEPEST: usize = 32;
+
+/// An instance: its own elements, and those in it.
+#[derive(Default)]
+struct Group<'a> {
+    /// Indices of lines and names of instances in order of appearance.
+    parts: Vec<Part>,
+    inside: BTreeMap<String, Group<'a>>,
+    lines: Vec<&'a Line>,
+}
+
+enum Part {
+    Line(usize),
+    Group(String),
+}
+
+/// The netlist.
+pub(crate) fn netlist(lines: &Lines, heading: &str) -> String {
+    let lines = &unclashed(lines);
+    let mut text = String::new();
+    for line in heading.lines() {
+        let _ = writeln!(text, "% {line}");
+    }
+    for process in &lines.processes {
+        let _ = writeln!(text, "{process}");
+    }
+    let mut top = Group::default();
+    for line in &lines.elements {
+        let path: Vec<&str> = line.name.split('.').collect();
+        let mut group = &mut top;
+        for part in &path[..path.len() - 1] {
+            if !group.inside.contains_key(*part) {
+                group.parts.push(Part::Group((*part).to_owned()));
+            }
+            group = group.inside.entry((*part).to_owned()).or_default();
+        }
+        group.parts.push(Part::Line(group.lines.len()));
+        group.lines.push(line);
+    }
+    let mut writer =
+        Writer { subnets: HashMap::new(), taken: BTreeSet::new(), definitions: String::new(), outside: outside(lines) };
+    let body = writer.body(&top, "", &HashMap::new());
+    text.push_str(&writer.definitions);
+    if !writer.definitions.is_empty() {
+        text.push('\n');
+    }
+    text.push_str(&body);
+    text
+}
+
+/// Lines whose names are neither those of instances nor nested too deep.
+fn unclashed(lines: &Lines) -> Lines {
+    let mut lines = lines.clone();
+    let names: BTreeSet<String> = lines.elements.iter().map(|l| l.name.clone()).collect();
+    for name in lines.elements.iter_mut().flat_map(|line| std::iter::once(&mut line.name).chain(&mut line.nodes)) {
+        // From the first dot on that follows an element's name, dots are no dots.
+        let dots: Vec<usize> = name.match_indices('.').map(|(k, _)| k).collect();
+        if let Some(at) = dots.into_iter().find(|at| names.contains(&name[..*at])) {
+            *name = format!("{}{}", &name[..at], name[at..].replace('.', "_"));
+        }
+    }
+    for line in &mut lines.elements {
+        if line.name.matches('.').count() > DEEPEST {
+            line.name = line.name.replace('.', "_");
+        }
+    }
+    lines
+}
+
+/// Nodes of instances that something outside the instance touches.
+fn outside(lines: &Lines) -> BTreeSet<String> {
+    let mut all = BTreeSet::new();
+    for line in &lines.elements {
+        let own = line.name.rsplit_once('.').map_or("", |(group, _)| group);
+        for node in &line.nodes {
+            if let Some((group, _)) = node.rsplit_once('.')
+                && !within(own, group)
+            {
+                all.insert(node.clone());
+            }
+        }
+    }
+    all
+}
+
+/// True when the instance `inner` is `outer` or lies in it.
+fn within(inner: &str, outer: &str) -> bool {
+    inner.strip_prefix(outer).is_some_and(|rest| outer.is_empty() || rest.is_empty() || rest.starts_with('.'))
+}
+
+struct Writer {
+    /// Names of subnets by their text.
+    subnets: HashMap<String, String>,
+    taken: BTreeSet<String>,
+    definitions: String,
+    outside: BTreeSet<String>,
+}
+
+impl Writer {
+    /// The elements of an instance; `formals` are the names that nodes from outside have in it.
+    fn body(&mut self, group: &Group<'_>, path: &str, formals: &HashMap<String, String>) -> String {
+        let mut text = String::new();
+        for part in &group.parts {
+            match part {
+                Part::Line(k) => {
+                    let line = group.lines[*k];
+                    let name = line.name.rsplit('.').next().unwrap_or(&line.name).to_owned();
+                    let nodes = line.nodes.iter().map(|n| self.local(n, path, formals)).collect();
+                    let local = Line { name, nodes, ..line.clone() };
+                    let _ = writeln!(text, "{local}");
+                }
+                Part::Group(name) => {
+                    let inner = if path.is_empty() { name.clone() } else { format!("{path}.{name}") };
+                    let given = self.given(&group.inside[name], &inner);
+                    let inside: HashMap<String, String> =
+                        given.iter().enumerate().map(|(k, n)| (n.clone(), format!("n{}", k + 1))).collect();
+                    let body = self.body(&group.inside[name], &inner, &inside);
+                    let subnet = self.subnet(name, given.len(), &body);
+                    let nodes: Vec<String> = given.iter().map(|n| self.local(n, path, formals)).collect();
+                    let _ = writeln!(text, "{name} {subnet} * [{}] []", nodes.join(" "));
+                }
+            }
+        }
+        text
+    }
+
+    /// Nodes that an instance is given: those that are not its own, in order of appearance.
+    fn given(&self, group: &Group<'_>, path: &str) -> Vec<String> {
+        let (mut seen, mut given) = (BTreeSet::new(), Vec::new());
+        let mut stack = vec![group];
+        let mut all: Vec<&Line> = Vec::new();
+        while let Some(group) = stack.pop() {
+            all.extend(&group.lines);
+            stack.extend(group.inside.values().rev());
+        }
+        for node in all.iter().flat_map(|line| &line.nodes) {
+            let own = node.strip_prefix(path).is_some_and(|rest| rest.starts_with('.'));
+            if (!own || self.outside.contains(node)) && seen.insert(node) {
+                given.push(node.clone());
+            }
+        }
+        given
+    }
+
+    /// What a node is called in an instance.
+    fn local(&self, node: &str, path: &str, formals: &HashMap<String, String>) -> String {
+        if let Some(formal) = formals.get(node) {
+            return formal.clone();
+        }
+        let rest = node.strip_prefix(path).and_then(|r| if path.is_empty() { Some(r) } else { r.strip_prefix('.') });
+        rest.unwrap_or(node).replace('.', "_")
+    }
+
+    /// The subnet of that text: one that is there, or a new one.
+    fn subnet(&mut self, instance: &str, nodes: usize, body: &str) -> String {
+        let key = format!("{nodes}\n{body}");
+        if let Some(name) = self.subnets.get(&key) {
+            return name.clone();
+        }
+        let word: String = instance.chars().take_while(|c| c.is_ascii_alphanumeric() || *c == '_').collect();
+        let mut name = format!("{word}_part");
+        let mut k = 1;
+        while !self.taken.insert(name.clone()) {
+            k += 1;
+            name = format!("{word}_part{k}");
+        }
+        let formals: Vec<String> = (1..=nodes).map(|k| format!("n{k}")).collect();
+        let _ = write!(self.definitions, "\nsubnet {name} [{}] []\n[\n", formals.join(" "));
+        for line in body.lines() {
+            let _ = writeln!(self.definitions, "  {line}");
+        }
+        self.definitions.push_str("]\n");
+        self.subnets.insert(key, name.clone());
+        name
+    }
+}
