@@ -21,6 +21,7 @@ pub mod device;
 pub mod discretize;
 pub mod equations;
 pub mod export;
+pub mod front;
 pub mod gaps;
 pub mod jobs;
 pub mod layout;

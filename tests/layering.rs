@@ -8,7 +8,7 @@ const FLOORS: [&[&str]; 10] = [
     &["budget", "sets"],
     &["structure", "multibody"],
     &["netlist", "layout", "gaps", "results"],
-    &["options", "equations"],
+    &["options", "equations", "front"],
     &["discretize", "solve"],
     &["refine"],
     &["compile", "device", "analysis"],

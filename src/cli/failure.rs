@@ -6,7 +6,12 @@ use bimorph::compile::CompileError;
 use bimorph::cosim::CosimError;
 use bimorph::cosim::around::AroundError;
 use bimorph::export::ExportError;
+use bimorph::front::FrontError;
 use bimorph::jobs::sweep::SweepError;
+use bimorph::layout::LayoutError;
+use bimorph::layout::convert::ConvertError;
+use bimorph::layout::gds::{GdsError, GdsFault};
+use bimorph::layout::mask::MaskError;
 use bimorph::options::Refused;
 use bimorph::results::format::UnknownFormat;
 use bimorph::results::plot::render::RenderError;
@@ -69,6 +74,12 @@ pub(crate) enum Failure {
     #[error(transparent)]
     Serve(#[from] ServeError),
     #[error(transparent)]
+    Front(FrontError),
+    #[error(transparent)]
+    Layout(#[from] LayoutError),
+    #[error(transparent)]
+    Mask(#[from] MaskError),
+    #[error(transparent)]
     Address(#[from] AddressError),
 }
 
@@ -78,6 +89,20 @@ impl From<CompileError> for Failure {
         match error {
             CompileError::Option(refused) => refused.into(),
             other => Self::Compile(other),
+        }
+    }
+}
+
+/// A file that cannot be read fails in the same words whatever it is; an interruption is none.
+impl From<FrontError> for Failure {
+    fn from(error: FrontError) -> Self {
+        match error {
+            FrontError::Read { path, source } => Self::Read { path, source },
+            FrontError::Convert(ConvertError::Layout(LayoutError::Gds(GdsError {
+                fault: GdsFault::Interrupted,
+                ..
+            }))) => Self::Interrupted,
+            other => Self::Front(other),
         }
     }
 }

@@ -5,6 +5,8 @@
 
 mod chart;
 mod check;
+mod convert;
+mod convert_picture;
 mod cosim;
 mod cosim_check;
 mod cosim_netlist;
@@ -13,6 +15,7 @@ mod draw_motion;
 mod export;
 mod failure;
 mod interrupt;
+mod layout;
 mod model;
 mod modes;
 mod options;
@@ -47,6 +50,8 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Check(check::Check),
+    Convert(convert::Convert),
+    Layout(layout::Layout),
     Static(statics::Static),
     Path(path::PathCommand),
     Modes(modes::Modes),
@@ -66,6 +71,8 @@ pub(crate) fn main() -> ExitCode {
     let cli = Cli::parse();
     let done = match &cli.command {
         Command::Check(command) => command.run(),
+        Command::Convert(command) => command.run(),
+        Command::Layout(command) => command.run(),
         Command::Static(command) => command.run(),
         Command::Path(command) => command.run(),
         Command::Modes(command) => command.run(),

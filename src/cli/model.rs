@@ -2,20 +2,22 @@
 
 use super::failure::Failure;
 use super::options::Chosen;
-use super::{interrupt, value};
-use bimorph::compile::{CompileOptions, Compiled, Junctions, compile};
+use super::{interrupt, progress, value};
+use bimorph::compile::{CompileOptions, Compiled, Drawn, Junctions, compile, draw};
+use bimorph::front::{self, Asked, Source};
+use bimorph::layout::drawing::Drawing;
 use bimorph::netlist::{Bundle, DroppedInclude, Setting};
 use bimorph::options::{MODEL, Value};
 use clap::Args;
 use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
 use std::io::{self, IsTerminal};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Options of every command that reads a netlist.
 #[derive(Debug, Args)]
 pub(crate) struct ModelArgs {
-    /// SUGAR netlist
+    /// SUGAR netlist, or a layout: .cif or .gds
     file: PathBuf,
 
     /// Set a netlist parameter: a number with suffix (2.1u) or text. Repeatable
@@ -27,16 +29,74 @@ pub(crate) struct ModelArgs {
     include: Vec<PathBuf>,
 
     #[command(flatten)]
+    layout: LayoutArgs,
+
+    #[command(flatten)]
     chosen: Chosen,
 }
 
+/// How a layout is to be read.
+#[derive(Debug, Args)]
+pub(crate) struct LayoutArgs {
+    /// Layouts only: what their layers are; a process inside (polymumps, soi) or a process file (.toml, docs/layout.md)
+    #[arg(long, value_name = "NAME|FILE")]
+    process: Option<String>,
+
+    /// Layouts only: the cell to read, where several are called by no other
+    #[arg(long, value_name = "NAME")]
+    cell: Option<String>,
+}
+
+impl LayoutArgs {
+    pub(crate) fn asked(&self) -> Asked {
+        Asked { process: self.process.clone(), cell: self.cell.clone() }
+    }
+}
+
+/// Reads and converts a file with a bar; gives the drawing too.
+pub(crate) fn front_telling(path: &Path, asked: &Asked) -> Result<(Drawing, Source), Failure> {
+    interrupt::listen();
+    let bar = progress::bar("reading");
+    let read = front::drawing_and_source(path, asked, &mut progress::watch(&bar));
+    bar.finish_and_clear();
+    Ok(read?)
+}
+
 impl ModelArgs {
-    /// The netlist with everything it uses.
+    /// The netlist with everything it uses; a layout is converted, and what its report has to say goes to standard error.
     pub(crate) fn bundle(&self) -> Result<Bundle, Failure> {
         interrupt::listen();
         let warn = &mut |dropped: DroppedInclude| eprintln!("warning: {dropped}");
-        Bundle::read_telling(&self.file, &self.include, warn)
-            .map_err(|source| Failure::Read { path: self.file.clone(), source })
+        let bar = progress::bar("reading");
+        let read = front::read(&self.file, &self.include, &self.asked(), warn, &mut progress::watch(&bar));
+        bar.finish_and_clear();
+        let source = read?;
+        if let Some(converted) = &source.converted {
+            let report = &converted.report;
+            for note in &report.notes {
+                eprintln!("warning: {note}");
+            }
+            if report.areas.unrecognised_m2 > 0.0 {
+                let [part, all] =
+                    [report.areas.unrecognised_m2, report.areas.drawn_m2].map(|a| (a * 1e14).round() / 1e2);
+                eprintln!("warning: {part} of {all} µm² were not understood: `bimorph convert` lists them");
+            }
+        }
+        Ok(source.bundle)
+    }
+
+    /// How a layout is to be read.
+    pub(crate) fn asked(&self) -> Asked {
+        self.layout.asked()
+    }
+
+    /// What was drawn, with warnings on standard error.
+    pub(crate) fn draw(&self) -> Result<Drawn, Failure> {
+        let drawn = draw(&bimorph::netlist::Source::new(&self.bundle()?), &self.options()?)?;
+        if !drawn.warnings.items.is_empty() {
+            eprint!("{}", drawn.warnings.render(io::stderr().is_terminal()));
+        }
+        Ok(drawn)
     }
 
     /// The options of the compilation, checked.

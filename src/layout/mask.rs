@@ -1,7 +1,7 @@
 //! A mechanism as a layout file: its outlines on the masks of a process, with its names and what outlines cannot tell as labels.
 //!
 //! docs/layout.md describes the labels. Nodes are texts on the layer that they belong to. On the layer of notes (`BIMORPH` in CIF,
-//! 255/0 in GDSII) stand a text `bimorph layout 1`, one for each process and one for each element, numbered and at its place.
+//! 255/0 in GDSII) stand a text `bimorph layout 1 PROCESS`, one for each process and one for each element, numbered and at its place.
 
 use super::cells::{Cell, Library, Shape, Text};
 use super::chords::Chords;
@@ -266,7 +266,7 @@ impl Drawn<'_> {
             self.text(&layer, node.name.clone(), node.position);
         }
         let places: HashMap<&str, [f64; 2]> = structure.nodes.iter().map(|n| (n.name.as_str(), n.position)).collect();
-        self.text(notes, MARK.to_owned(), [0.0; 2]);
+        self.text(notes, format!("{MARK} {}", self.process.name), [0.0; 2]);
         for process in &lines.processes {
             self.text(notes, process.to_string(), [0.0; 2]);
         }
@@ -279,9 +279,10 @@ impl Drawn<'_> {
     }
 }
 
-/// True for a drawing that carries its mechanism as labels.
-pub fn is_ours(drawing: &Drawing) -> bool {
-    drawing.labels.iter().any(|l| l.text == MARK && on_notes(&l.layer))
+/// The process on whose masks a drawing of ours was drawn, by name; none: the drawing does not carry its mechanism as labels.
+pub fn drawn_on(drawing: &Drawing) -> Option<&str> {
+    let marks = drawing.labels.iter().filter(|l| on_notes(&l.layer));
+    marks.filter_map(|l| l.text.strip_prefix(MARK)?.strip_prefix(' ')).next()
 }
 
 /// True for the layer of notes in any spelling.

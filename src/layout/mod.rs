@@ -7,6 +7,7 @@
 mod cells;
 mod chords;
 pub mod cif;
+pub mod convert;
 mod draw;
 pub mod drawing;
 pub mod extract;

@@ -136,6 +136,48 @@ pub fn draw(drawing: &Drawing<'_>) -> Picture {
     picture
 }
 
+/// What a mechanism is laid over.
+#[derive(Debug, Clone, Default)]
+pub struct Ground {
+    /// Contours of a layout [m].
+    pub drawn: Vec<Vec<[f64; 2]>>,
+    /// Contours that no part of the mechanism covers [m].
+    pub foreign: Vec<Vec<[f64; 2]>>,
+}
+
+/// Draws a mechanism over the layout that it came from: the layout pale, the mechanism in blue, what is in no part of it red.
+pub fn over(title: &str, structure: &Structure, ground: &Ground) -> Picture {
+    let rest = outlines(structure, &Moved::default());
+    let points = rest.iter().flat_map(|o| &o.shape).chain(ground.drawn.iter().flatten()).copied();
+    let (low, high) = bounds(points, structure);
+    let (across, up) = ((high[0] - low[0]).max(f64::MIN_POSITIVE), (high[1] - low[1]).max(f64::MIN_POSITIVE));
+    let scale = ((WIDTH - 2.0 * MARGIN) / across).min(MOST_HEIGHT / up);
+    let height = up * scale;
+    let mut picture = Picture::new(WIDTH, height + 116.0);
+    let view = View { low, scale, bottom: 52.0 + height, left: (WIDTH - across * scale) / 2.0 };
+    picture.text(MARGIN, 24.0, 15.0, Align::Start, INK, title);
+    for contour in &ground.drawn {
+        picture.polygon(&view.all(contour), Paint { fill: "#f0e2b8", stroke: "#c9b06b", width: 0.5, opacity: 1.0 });
+    }
+    for outline in &rest {
+        picture.polygon(&view.all(&outline.shape), Paint { fill: MOVED, stroke: MOVED, width: 0.8, opacity: 0.45 });
+    }
+    draw_supports(&mut picture, structure, &view, 0.012 * across.max(up));
+    draw_lines(&mut picture, structure, &Moved::default(), &view, MOVED);
+    for contour in &ground.foreign {
+        picture.polygon(&view.all(contour), Paint { fill: "#D55E00", stroke: "#D55E00", width: 1.2, opacity: 0.8 });
+    }
+    draw_ports(&mut picture, structure, &view);
+    let y = height + 76.0;
+    let length = nice_step(110.0 / scale / 2.0);
+    picture.polyline(&[[MARGIN, y], [MARGIN + length * scale, y]], Paint::line(INK, 3.0));
+    picture.text(MARGIN, y + 17.0, 12.0, Align::Start, INK, &round_length(length));
+    let red = if ground.foreign.is_empty() { "nothing was left over" } else { "red: in no part of it" };
+    let legend = format!("pale: the layout  ·  blue: the mechanism  ·  {red}");
+    picture.text(WIDTH - MARGIN, y + 17.0, 12.0, Align::End, INK, &legend);
+    picture
+}
+
 /// Draws several states of mechanisms side by side, each under its own title, all to one scale of length.
 pub fn grid(title: &str, drawings: &[Drawing<'_>]) -> Picture {
     let mut prepared: Vec<Prepared<'_>> = drawings.iter().map(Prepared::new).collect();

@@ -1,0 +1,126 @@
+//! `bimorph convert`: a layout to a netlist.
+
+use super::failure::Failure;
+use super::model::{LayoutArgs, front_telling};
+use super::output;
+use bimorph::layout::report::{Report, region};
+use bimorph::netlist;
+use bimorph::results::atomic;
+use bimorph::results::format::Format;
+use clap::Args;
+use serde::Serialize;
+use std::fmt::Write;
+use std::path::PathBuf;
+
+/// Make a netlist of a layout: CIF or GDSII.
+///
+/// A drawing that `bimorph layout` made is read by its labels, checked against its polygons; any other by its geometry: limbs become beams,
+/// wide parts bodies, what the process says holds them anchors. What was not understood is listed with its area and place, and drawn red
+/// in the picture. Every other command takes layouts too, with the same --process and --cell.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  bimorph convert resonator.gds -o resonator.net --picture resonator.png\n  \
+    bimorph convert chip.gds --cell tuning_fork --process soi -o fork.net\n  bimorph modes resonator.gds --count 3")]
+pub(crate) struct Convert {
+    /// Layout: .cif or .gds
+    file: PathBuf,
+
+    #[command(flatten)]
+    layout: LayoutArgs,
+
+    /// Netlist to write; without it the netlist goes to standard output and the report to standard error
+    #[arg(long, short = 'o', value_name = "FILE")]
+    out: Option<PathBuf>,
+
+    /// Picture to write, the mechanism over the polygons: .svg, .png or .html
+    #[arg(long, value_name = "FILE")]
+    picture: Option<PathBuf>,
+
+    /// Print one JSON document
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Debug, Serialize)]
+struct Document<'a> {
+    file: String,
+    cell: &'a str,
+    process: &'a str,
+    #[serde(flatten)]
+    report: &'a Report,
+    netlist: &'a str,
+}
+
+impl Convert {
+    pub(crate) fn run(&self) -> Result<(), Failure> {
+        if let Some(path) = &self.picture {
+            if !matches!(Format::from_path(path)?, Format::Svg | Format::Png | Format::Html) {
+                let got = format!("\"{}\"", path.display());
+                return Err(Failure::bad("--picture", "a file that ends in .svg, .png or .html", got));
+            }
+            output::check_folder(path)?;
+        }
+        if let Some(path) = &self.out {
+            output::check_folder(path)?;
+        }
+        let name = self.file.display().to_string();
+        if bimorph::layout::Format::of(&name).is_none() {
+            return Err(bimorph::layout::LayoutError::Format { file: name }.into());
+        }
+        let (drawing, source) = front_telling(&self.file, &self.layout.asked())?;
+        let Some(converted) = &source.converted else { return Ok(()) };
+        // What comes out must be a netlist that loads: anything else is a fault of the conversion, and told before it is written.
+        let loaded = netlist::load(&source.bundle, &[]).map_err(bimorph::compile::CompileError::Netlist)?;
+        let report = self.report(&drawing.top, &converted.process, &converted.report);
+        if let Some(path) = &self.picture {
+            let picture = super::convert_picture::draw(&self.file, &drawing, &loaded.structure, &converted.report);
+            output::write_picture(path, Format::from_path(path)?, &picture)?;
+        }
+        if let Some(path) = &self.out {
+            let failed = |source| Failure::Write { path: path.clone(), source };
+            atomic::write(path, |out| out.write_all(converted.netlist.as_bytes())).map_err(failed)?;
+        }
+        if self.json {
+            let document = Document {
+                file: name,
+                cell: &drawing.top,
+                process: &converted.process,
+                report: &converted.report,
+                netlist: &converted.netlist,
+            };
+            let text = serde_json::to_string(&document).map_err(|e| Failure::Stdout(e.into()))?;
+            return output::print(&(text + "\n"));
+        }
+        if self.out.is_some() {
+            return output::print(&report);
+        }
+        eprint!("{report}");
+        output::print(&converted.netlist)
+    }
+
+    fn report(&self, cell: &str, process: &str, report: &Report) -> String {
+        const MOST: usize = 20;
+        let um2 = |m2: f64| (m2 * 1e14).round() / 1e2;
+        let mut text = format!("{}: cell {cell}, process {process}, by {}\n", self.file.display(), report.by);
+        let counts: Vec<String> = report.counts.iter().map(|(what, n)| format!("{n} {what}")).collect();
+        let _ = writeln!(text, "  {}", counts.join(", "));
+        let a = &report.areas;
+        let _ = writeln!(
+            text,
+            "  drawn {} µm², in the mechanism {}, anchored {}, not understood {}",
+            um2(a.drawn_m2),
+            um2(a.extracted_m2),
+            um2(a.anchored_m2),
+            um2(a.unrecognised_m2)
+        );
+        for piece in report.unrecognised.iter().take(MOST) {
+            let _ = writeln!(text, "  {} µm² on {} at {}: {}", piece.area_um2(), piece.layer, region(piece), piece.why);
+        }
+        if report.unrecognised.len() > MOST {
+            let _ = writeln!(text, "  … and {} more pieces (--json has all)", report.unrecognised.len() - MOST);
+        }
+        for note in &report.notes {
+            let _ = writeln!(text, "  {note}");
+        }
+        text
+    }
+}
