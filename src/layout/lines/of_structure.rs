@@ -33,18 +33,21 @@ pub(crate) fn lines(structure: &Structure) -> (Lines, Left) {
     of.loads();
     of.circuit();
     of.islands();
-    // Parts come in the order in which their nodes did; the sort is stable.
-    let order: HashMap<&str, usize> = structure.nodes.iter().map(|n| n.name.as_str()).zip(0..).collect();
-    let first = |line: &Line| line.nodes.iter().filter_map(|n| order.get(n.as_str())).min().copied();
-    of.lines.sort_by_cached_key(|line| (line.model == "pos", line.process == "*" && !places(&line.model), first(line)));
+    // The first node of all lies at the origin: a line that begins with it comes first, unless that would change the order of beams.
+    if let Some(first) = structure.nodes.iter().find(|n| n.mechanical)
+        && let Some(k) = of.lines.iter().position(|line| places(&line.model) && line.nodes[0] == first.name)
+    {
+        let line = of.lines.remove(k);
+        of.lines.insert(0, line);
+    }
     (Lines { processes: of.processes, elements: of.lines }, of.left)
 }
 
-/// True for elements that are parts of the drawing rather than something attached to it.
+/// True for elements that touch nodes and are no beams.
 fn places(model: &str) -> bool {
     matches!(
         model,
-        "link2d" | "spring2d" | "damper2d" | "plategap2d" | "anchor" | "hinge" | "slider" | "guide2d" | "mass2d"
+        "link2d" | "spring2d" | "damper2d" | "anchor" | "hinge" | "slider" | "guide2d" | "mass2d" | "plate2d"
     )
 }
 

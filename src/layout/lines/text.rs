@@ -117,8 +117,11 @@ impl Writer {
                     let line = group.lines[*k];
                     let name = line.name.rsplit('.').next().unwrap_or(&line.name).to_owned();
                     let nodes = line.nodes.iter().map(|n| self.local(n, path, formals)).collect();
-                    let local = Line { name, nodes, ..line.clone() };
-                    let _ = writeln!(text, "{local}");
+                    let local = Line { name, nodes, ..line.clone() }.to_string();
+                    // A netlist numbers its nameless elements itself.
+                    let unnamed =
+                        local.strip_prefix("anon").map(|rest| rest.trim_start_matches(|c: char| c.is_ascii_digit()));
+                    let _ = writeln!(text, "{}", unnamed.and_then(|rest| rest.strip_prefix(' ')).unwrap_or(&local));
                 }
                 Part::Group(name) => {
                     let inner = if path.is_empty() { name.clone() } else { format!("{path}.{name}") };
