@@ -1,11 +1,14 @@
 //! A drawing to a netlist: by its labels where it carries its mechanism, else by its geometry.
 
 use super::drawing::Drawing;
+use super::extract::{self, ExtractError, ExtractOptions, Extraction};
 use super::labelled::{self, LabelledError};
+use super::lines::Line;
 use super::mask;
 use super::process::{Process, ProcessError};
 use super::read::LayoutError;
-use super::report::Report;
+use super::report::{Areas, Report, Unrecognised};
+use std::fmt::Write;
 use thiserror::Error;
 
 /// The process of drawings that say none.
@@ -24,21 +27,9 @@ pub enum ConvertError {
     /// Its labels.
     #[error(transparent)]
     Labels(#[from] LabelledError),
-    /// Nothing that moves is drawn.
-    #[error(
-        "{source_name}: none of its layers ({drawn}) is one that moves in process `{process}` ({wanted}): choose another with --process, \
-         or write one (docs/layout.md)"
-    )]
-    NothingMoves {
-        /// Name of the file.
-        source_name: String,
-        /// The drawing's layers.
-        drawn: String,
-        /// The process.
-        process: String,
-        /// Layers that would move.
-        wanted: String,
-    },
+    /// Its geometry.
+    #[error(transparent)]
+    Extract(#[from] ExtractError),
 }
 
 /// What came out.
@@ -66,15 +57,67 @@ pub fn convert(drawing: &Drawing, process: Option<&Process>) -> Result<Converted
             &builtin
         }
     };
-    if !drawing.layers.keys().any(|name| process.layer_of(name).is_some()) {
-        let list = |names: Vec<&str>| if names.is_empty() { "none".to_owned() } else { names.join(", ") };
-        return Err(ConvertError::NothingMoves {
-            source_name: drawing.source.clone(),
-            drawn: list(drawing.layers.keys().map(String::as_str).take(20).collect()),
-            process: process.name.clone(),
-            wanted: list(process.layers.iter().flat_map(|l| &l.drawn).map(String::as_str).collect()),
-        });
+    if named.is_none() {
+        return by_geometry(drawing, process);
     }
     let (netlist, report) = labelled::read(drawing, process)?;
     Ok(Converted { netlist, report, process: process.name.clone() })
+}
+
+/// Limbs, bodies and anchors as they are drawn, with what labels on the layer of notes add.
+fn by_geometry(drawing: &Drawing, process: &Process) -> Result<Converted, ConvertError> {
+    let extraction = extract::extract(drawing, process, &ExtractOptions::default())?;
+    let mut netlist = extract::netlist(&extraction);
+    let mut report = report(&extraction, drawing.unit_m);
+    for label in drawing.labels.iter().filter(|l| mask::on_notes(&l.layer)) {
+        match Line::parse(&label.text) {
+            Ok(line) => {
+                let _ = writeln!(netlist, "{line}");
+                *report.counts.entry(line.model).or_insert(0) += 1;
+            }
+            Err(error) => {
+                report.notes.push(format!("{} was passed over: {error}", drawing.place(label.at.map(f64::from))));
+            }
+        }
+    }
+    Ok(Converted { netlist, report, process: process.name.clone() })
+}
+
+fn report(extraction: &Extraction, unit_m: f64) -> Report {
+    let mut areas = Areas::default();
+    for layer in &extraction.layers {
+        areas.drawn_m2 += layer.drawn;
+        areas.extracted_m2 += layer.extracted;
+        areas.anchored_m2 += layer.anchored;
+        areas.unrecognised_m2 += layer.unrecognised;
+    }
+    let counts = [
+        ("beams", extraction.beams.len()),
+        ("bodies", extraction.bodies.len()),
+        ("links", extraction.links.len()),
+        ("anchors", extraction.anchors.len()),
+    ];
+    let pieces = extraction.unrecognised.iter().map(|lost| {
+        let metres = |p: &[i32; 2]| p.map(|x| f64::from(x) * unit_m);
+        let boxes = lost.polygons.iter().filter_map(super::Polygon::extent);
+        let [low, high] = boxes
+            .map(|[low, high]| [metres(&low), metres(&high)])
+            .reduce(|[a, b], [c, d]| [[a[0].min(c[0]), a[1].min(c[1])], [b[0].max(d[0]), b[1].max(d[1])]])
+            .unwrap_or([lost.at; 2]);
+        let contours = lost.polygons.iter().flat_map(|p| &p.contours).map(|c| c.iter().map(metres).collect());
+        Unrecognised {
+            layer: lost.layer.clone(),
+            area_m2: lost.area,
+            box_m: [low, high],
+            why: lost.why.clone(),
+            contours: contours.collect(),
+        }
+    });
+    Report {
+        by: "geometry".to_owned(),
+        counts: counts.into_iter().map(|(what, n)| (what.to_owned(), n)).collect(),
+        areas,
+        unrecognised: pieces.collect(),
+        notes: extraction.notes.clone(),
+    }
 }

@@ -352,6 +352,11 @@ fn shifted(p: [f64; 2], pitch: &[[f64; 2]; 2], column: f64, row: f64) -> [f64; 2
     [p[0] + column * pitch[0][0] + row * pitch[1][0], p[1] + column * pitch[0][1] + row * pitch[1][1]]
 }
 
+/// "1 shape", "2 shapes".
+fn count(n: usize, what: &str) -> String {
+    format!("{n} {what}{}", if n == 1 { "" } else { "s" })
+}
+
 /// The largest coordinate, or what is no number [units].
 fn reach(count: &Count) -> f64 {
     let extent = count.extent.unwrap_or_default();
@@ -451,11 +456,12 @@ impl Flat<'_> {
 
     fn finish(mut self, placements: u64) -> (Drawing, Vec<Vec<Polygon>>) {
         if self.crossing > 0 {
-            let text = format!("{} polygons cross or touch themselves: what they enclose was taken", self.crossing);
+            let text =
+                format!("{} cross or touch themselves: what they enclose was taken", count(self.crossing, "polygon"));
             self.drawing.notes.push(text);
         }
         if self.vanished > 0 {
-            self.drawing.notes.push(format!("{} shapes have no area and were left out", self.vanished));
+            self.drawing.notes.push(format!("{} without area left out", count(self.vanished, "shape")));
         }
         if !self.places {
             self.drawing

@@ -241,6 +241,8 @@ impl Reading {
                 Some(cell) if cell.name.is_empty() => {
                     return Err(GdsFault::Incomplete { element: "cell", lacks: "STRNAME" });
                 }
+                // KLayout keeps data of its own in a cell that calls all others.
+                Some(cell) if cell.name == "$$$CONTEXT_INFO$$$" => {}
                 Some(cell) => self.library.cells.push(cell),
                 None => return Err(GdsFault::Order { expected: "BGNSTR before it" }),
             },
