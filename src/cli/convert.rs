@@ -72,7 +72,7 @@ impl Convert {
         let loaded = netlist::load(&source.bundle, &[]).map_err(bimorph::compile::CompileError::Netlist)?;
         let report = self.report(&drawing.top, &converted.process, &converted.report);
         if let Some(path) = &self.picture {
-            let picture = super::convert_picture::draw(&self.file, &drawing, &loaded.structure, &converted.report);
+            let picture = super::convert_picture::draw(&self.file, &drawing, &loaded.structure, converted);
             output::write_picture(path, Format::from_path(path)?, &picture)?;
         }
         if let Some(path) = &self.out {

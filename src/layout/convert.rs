@@ -41,6 +41,8 @@ pub struct Converted {
     pub report: Report,
     /// Name of the process.
     pub process: String,
+    /// A node of the netlist and where it lies in the drawing [m]: netlists have an origin of their own.
+    pub landmark: Option<(String, [f64; 2])>,
 }
 
 /// Makes a netlist of a drawing. Without a process it is the one that the drawing names, or [`DEFAULT_PROCESS`].
@@ -60,8 +62,8 @@ pub fn convert(drawing: &Drawing, process: Option<&Process>) -> Result<Converted
     if named.is_none() {
         return by_geometry(drawing, process);
     }
-    let (netlist, report) = labelled::read(drawing, process)?;
-    Ok(Converted { netlist, report, process: process.name.clone() })
+    let (netlist, report, landmark) = labelled::read(drawing, process)?;
+    Ok(Converted { netlist, report, process: process.name.clone(), landmark })
 }
 
 /// Limbs, bodies and anchors as they are drawn, with what labels on the layer of notes add.
@@ -80,7 +82,8 @@ fn by_geometry(drawing: &Drawing, process: &Process) -> Result<Converted, Conver
             }
         }
     }
-    Ok(Converted { netlist, report, process: process.name.clone() })
+    let landmark = extraction.nodes.first().map(|n| (n.name.clone(), n.at));
+    Ok(Converted { netlist, report, process: process.name.clone(), landmark })
 }
 
 fn report(extraction: &Extraction, unit_m: f64) -> Report {

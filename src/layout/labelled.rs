@@ -68,11 +68,14 @@ fn has_places(model: &str) -> bool {
     !matches!(model, "R" | "L" | "C" | "Vsrc" | "Isrc" | "opamp" | "vcvs" | "eground" | "port")
 }
 
+/// A node and where it lies [m].
+type Landmark = Option<(String, [f64; 2])>;
+
 /// Reads the labels of a drawing and checks them against its polygons.
 ///
 /// # Errors
 /// See [`LabelledError`].
-pub(crate) fn read(drawing: &Drawing, process: &Process) -> Result<(String, Report), LabelledError> {
+pub(crate) fn read(drawing: &Drawing, process: &Process) -> Result<(String, Report, Landmark), LabelledError> {
     let mut notes = drawing.notes.clone();
     let (mut lines, places) = lines_of(drawing)?;
     let at = nodes_of(drawing, &lines, &mut notes);
@@ -87,7 +90,10 @@ pub(crate) fn read(drawing: &Drawing, process: &Process) -> Result<(String, Repo
     notes.extend(measured);
     let report = compare(drawing, process, &lines, &at, &layers, notes);
     let heading = format!("from {}, cell {}, by its labels", drawing.source, drawing.top);
-    Ok((text::netlist(&lines, &heading), report))
+    // A name without dots is the same in the netlist.
+    let landmark = at.iter().filter(|(name, _)| !name.contains('.')).min_by_key(|(name, _)| name.as_str());
+    let landmark = landmark.map(|(name, place)| (name.clone(), *place));
+    Ok((text::netlist(&lines, &heading), report, landmark))
 }
 
 /// Lines in the order of their numbers, with where they stand.
