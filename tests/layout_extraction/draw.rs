@@ -50,6 +50,7 @@ impl Sheet {
         self.rectangle("ANCHOR1", low.map(|x| x + 2.0), high.map(|x| x - 2.0));
     }
 
+    #[allow(dead_code)]
     pub(crate) fn label(&mut self, text: &str, at: [f64; 2]) {
         let at = self.point(at);
         self.drawing.labels.push(Label { layer: "POLY1".into(), text: text.into(), at });
