@@ -1,10 +1,11 @@
 # Every target does its own set-up on a fresh Debian or Ubuntu with a Rust toolchain, and says what it does.
-.PHONY: help demo test soak bench pictures charts clean
+.PHONY: help demo test soak fuzz bench pictures charts clean
 
 help:
 	@echo "make demo    build, run the bank in ngspice here and through a server, compare, draw (out/demo)"
 	@echo "make test    everything that must hold: format, lints, tests, documentation, Python, ngspice decks"
 	@echo "make soak    a thousand sessions for a minute, ten thousand in turn: what a server bears (some minutes)"
+	@echo "make fuzz    any text as netlist, ten minutes a language (FUZZ_MINUTES)"
 	@echo "make bench   measure (criterion)"
 	@echo "make pictures draw the scenes and the figures of docs/paper.md (docs/pictures)"
 	@echo "make charts  draw the charts of the README from counted work (docs/pictures); scripts/charts --time measures"
@@ -21,6 +22,10 @@ test:
 soak:
 	@scripts/setup build
 	cargo test --release --test service -- --ignored --nocapture --test-threads=1 soak::
+
+fuzz:
+	@scripts/setup build
+	cargo test --release --workspace --test fuzz -- --ignored --nocapture --test-threads=1
 
 bench:
 	@scripts/setup build
