@@ -279,6 +279,19 @@ fn members_out_of_the_plane() {
     }
 }
 
+/// Sizes that are in range one by one and not in their products are refused, where they would become infinite.
+#[test]
+fn products_out_of_range() {
+    for text in [
+        "beam2d p1 [a b] [l=10u w=1u]\nprestressedbeam p1 [a b] [l=1e-200 w=2u qx=1n qoz=1]",
+        "beam2d p1 [a b] [l=10u w=1e-150]",
+        "freehinge p1 [a b] [l=1e-300 w=1e9]",
+        "beam2d p1 [a b] [l=1e308 w=1u]\nbeam2d p1 [b c] [l=1e308 w=1u]",
+    ] {
+        assert_eq!(refused(text)[0].0, "E060", "{text}");
+    }
+}
+
 /// A parameter called like an angle is given with it, and turns the instance as well.
 #[test]
 fn angles_are_parameters_too() {

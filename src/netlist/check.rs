@@ -7,12 +7,56 @@ use super::suggest::did_you_mean;
 use super::value::short;
 use crate::sets::Sets;
 use crate::structure::{GapVoltage, NodeId, Structure};
+use std::collections::HashSet;
 
 /// So many loose parts or floating nodes are told one by one.
 const TOLD: usize = 3;
 
 /// So many loose nodes are told.
 const MOST_LOOSE: usize = 20;
+
+/// Reports what has become infinite or vanished: sizes may be in range one by one and not in their products.
+pub(crate) fn finite(drawing: &Drawing, sink: &mut Sink) {
+    let s = &drawing.structure;
+    let mut told = HashSet::new();
+    let mut look = |name: &str, node: NodeId, good: bool| {
+        if !good && told.len() < TOLD && told.insert(name.to_owned()) {
+            let message = format!("what `{name}` has in the model is not finite: its sizes are out of any range");
+            let help = "check its numbers, their suffixes and exponents";
+            sink.error("E060", drawing.first_named[node.0], message, help);
+        }
+    };
+    let all = |values: &[f64]| values.iter().all(|x| x.is_finite());
+    for (index, node) in s.nodes.iter().enumerate() {
+        look(&node.name, NodeId(index), all(&node.position));
+    }
+    for b in &s.beams {
+        let sizes = [b.length, b.width, b.thickness];
+        let products = [b.material.density * b.width * b.thickness * b.length, b.thickness * b.width.powi(3)];
+        look(&b.name, b.a, all(&sizes) && all(&products) && sizes.iter().chain([&products[1]]).all(|x| *x > 0.0));
+    }
+    for m in &s.masses {
+        look(&m.name, m.node, all(&[m.mass, m.inertia, m.drag[0], m.drag[1]]));
+    }
+    for k in &s.springs {
+        look(&k.name, k.a, all(&k.stiffness) && all(&k.damping));
+    }
+    for f in &s.loads {
+        look(&f.name, f.node, all(&f.force) && f.moment.is_finite());
+    }
+    for r in &s.resistors {
+        look(&r.name, r.a, r.resistance.is_finite() && r.resistance > 0.0);
+    }
+    for c in &s.combs {
+        look(&c.name, c.a, all(&[c.gaps * c.permittivity * c.height / c.gap, c.overlap, c.parasitic]));
+    }
+    for g in &s.beam_gaps {
+        look(&g.name, g.nodes[0], all(&[g.permittivity * g.height * g.fringe, g.length, g.gap]));
+    }
+    for b in s.beams.iter().filter_map(|b| b.heater.as_ref().map(|h| (b, h))) {
+        look(&b.0.name, b.0.a, all(&[b.1.resistance, b.1.conductance, b.1.time_constant]));
+    }
+}
 
 /// Checks a drawing whose nodes are placed.
 pub(crate) fn check(drawing: &Drawing, sink: &mut Sink) {

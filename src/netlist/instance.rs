@@ -69,6 +69,11 @@ impl<'p> Elaborator<'p> {
             };
             let axis = ["ox", "oy", "oz"].iter().position(|o| **o == *def.name.name);
             match (axis, &value) {
+                (Some(_), Value::Number(angle)) if !angle.is_finite() => {
+                    let message = format!("`{}` must be a finite number, this is {angle}", def.name.name);
+                    self.sink.error("E050", def.value.span, message, "");
+                    failed = true;
+                }
                 (Some(axis), Value::Number(angle)) => {
                     angles[axis] = *angle;
                     self.check_angle(*angle, def.value.span);

@@ -103,6 +103,9 @@ fn finish(
     elements::upright::settle(&mut drawing, &mut sink);
     if !sink.failed() {
         place::place(&mut drawing, &mut sink);
+        check::finite(&drawing, &mut sink);
+    }
+    if !sink.failed() {
         check::check(&drawing, &mut sink);
     }
     if sink.failed() {

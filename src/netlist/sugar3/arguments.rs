@@ -89,6 +89,10 @@ impl Call {
             match (key.as_str(), axis, &value) {
                 ("name", _, Value::Text(name)) => call.name = Some(plain(name)),
                 ("model", _, Value::Text(model)) => call.model = Some(model.to_string()),
+                (_, Some(_), Value::Number(angle)) if !angle.is_finite() => {
+                    let message = format!("`{key}` must be a finite number, this is {angle}");
+                    return Ok(Err(Fault { code: "E050", message, help: "" }));
+                }
                 (_, Some(axis), Value::Number(angle)) => call.angles[axis] = *angle,
                 _ => call.given.push((key, value)),
             }

@@ -340,6 +340,11 @@ fn subnet(
         let mut angles = [0.0; 3];
         for (angle, axis) in angles.iter_mut().zip(["ox", "oy", "oz"]) {
             *angle = table.raw_get::<Option<f64>>(axis)?.unwrap_or(0.0) * degree;
+            if !angle.is_finite() {
+                let message = format!("`{axis}` must be a finite number, this is {angle}");
+                state.sink.error("E050", span, message, "");
+                return Err(told(&state));
+            }
         }
         let full = format!("{}{local}", state.scope().prefix);
         state.name(&full, given, span);
