@@ -292,6 +292,37 @@ fn products_out_of_range() {
     }
 }
 
+/// A load per length is its nodal forces: p·l/2 and p·l²/12 of an even one, 3/20, 7/20 of p·l and p·l²/30, −p·l²/20 of one that grows.
+#[test]
+fn loads_per_length() {
+    let of = |p: &str| {
+        let s = drawn(&format!("beam2d p1 [a b] [l=100u w=2u oz=1]\np3d * [a b] [l=100u P={p}]"));
+        [s.loads[0].force[1], s.loads[0].moment, s.loads[1].force[1], s.loads[1].moment]
+    };
+    let l: f64 = 100e-6;
+    for (got, want) in of("2").into_iter().zip([l, l * l / 6.0, l, -l * l / 6.0]) {
+        near(got, want, 1e-12);
+    }
+    assert_eq!(of("2"), of("\"2\""));
+    let full = 2.0 * l;
+    for (got, share) in of("'2.*x'").into_iter().zip([0.15 * l, l * l / 30.0, 0.35 * l, -l * l / 20.0]) {
+        near(got, full * share, 1e-9);
+    }
+    assert_eq!(refused("beam2d p1 [a b] [l=1u w=1u]\np3d * [a b] [l=1u P='y+1']")[0].0, "E050");
+}
+
+/// What only places its nodes: a beam of no section, a tracer.
+#[test]
+fn placing_beams() {
+    let s = drawn(
+        "beam2d p1 [a z] [l=1u w=1u]\nbeam2d p1 [a b] [l=10u w=0u h=0u oz=pi/2]\ntracer p1 [b c] [l=5u w=1u L1=2u]\nbeam2d p1 [c d] [l=1u w=1u]",
+    );
+    assert_eq!(s.beams.len(), 2);
+    let c = at(&s, "c");
+    near(c[0], 7e-6, 1e-12);
+    near(c[1], 10e-6, 1e-12);
+}
+
 /// A parameter called like an angle is given with it, and turns the instance as well.
 #[test]
 fn angles_are_parameters_too() {

@@ -169,6 +169,16 @@ fn facts(drawing: &Drawing, sink: &mut Sink) {
                 ),
                 "what lies above each other moves together; compare with the stiffness of what it carries",
             ),
+            Fact::Weight => (
+                "W039",
+                format!("the weight of `beam_link_grav` is left out; this one has {number} N ({elements})"),
+                "write `beam3dlink` to say that this is meant; a port `frame.ay` moves everything",
+            ),
+            Fact::NoSection => (
+                "W006",
+                format!("a beam of width and height 0 holds nothing: it places its nodes ({elements})"),
+                "write `pos` to say that this is meant",
+            ),
             Fact::TrialGap => (
                 "W039",
                 format!(

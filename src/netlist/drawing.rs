@@ -64,6 +64,10 @@ pub(crate) enum Fact {
     BetweenAnchors,
     /// Members normal to the plane that are taken as rigid; the number is the stiffness across one of them [N/m].
     Post,
+    /// Weights that are left out; the number is one of them [N].
+    Weight,
+    /// Beams without a section.
+    NoSection,
     /// Gaps of models that SUGAR's tree holds as trials.
     TrialGap,
     /// Nodes after the first of an anchor.

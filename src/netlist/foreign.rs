@@ -16,6 +16,8 @@ pub(crate) enum Kind {
     Netlist,
 }
 
+/// So many statements that end with a semicolon, and no list of nodes, make a MATLAB script.
+const ENDED: usize = 3;
 /// Lines that only a MATLAB file begins with.
 const MATLAB: [&str; 9] =
     ["clear all", "clear;", "close all", "clc", "figure(", "figure;", "addpath(", "cho_load(", "hold on"];
@@ -23,6 +25,8 @@ const MATLAB: [&str; 9] =
 /// What the text of file number `file` is, by its first line that decides.
 pub(crate) fn kind(text: &str, file: u16) -> Kind {
     let mut start = 0;
+    // statements that end with a semicolon, and the first of them; lines with a list of nodes
+    let (mut ended, mut first, mut lists) = (0, None, 0);
     for line in text.split_inclusive('\n') {
         let at = |offset: usize| u32::try_from(offset).unwrap_or(u32::MAX);
         let span = Span { file, start: at(start), end: at(start + line.trim_end().len()) };
@@ -37,8 +41,17 @@ pub(crate) fn kind(text: &str, file: u16) -> Kind {
         if matlab(body) {
             return Kind::Matlab(span);
         }
+        let code = body.split('%').next().unwrap_or("").trim_end();
+        if code.ends_with(';') && !code.contains('[') {
+            ended += 1;
+            first.get_or_insert(span);
+        }
+        lists += usize::from(code.contains('['));
     }
-    Kind::Netlist
+    match first {
+        Some(span) if ended >= ENDED && lists == 0 => Kind::Matlab(span),
+        _ => Kind::Netlist,
+    }
 }
 
 /// True for a line of Lua: `use(…)`, `use"…"`, a `--` comment, a `local`, a call with a table, `[NAME =] NAME {`, a `subnet` with
@@ -107,6 +120,8 @@ mod tests {
         assert_eq!(told("functions = 3\nfunction_of beam2d p1 [a b] [l=1u]\n"), ('n', 0));
         assert_eq!(told("local = 3\nlocal beam2d p1 [a b] [l=1u]\n"), ('n', 0));
         assert_eq!(told("x = 1\nlocal y = 3\n"), ('l', 6));
+        assert_eq!(told("u = 1e-6; %m\nh = 2*u;\nw = 2*u;\n"), ('m', 0));
+        assert_eq!(told("u = 1;\nh = 2;\nw = 2;\nanchor p1 [a] []\n"), ('n', 0));
         assert_eq!(told("clear all\n"), ('m', 0));
         assert_eq!(told("used = 1\nuser = 2\nuses a.net\n"), ('n', 0));
         assert_eq!(told(""), ('n', 0));

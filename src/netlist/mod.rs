@@ -93,6 +93,11 @@ impl Source {
     }
 }
 
+/// A bundle in SUGAR 2, whatever it looks like.
+fn read(bundle: &Bundle) -> sugar2::Sugar2 {
+    sugar2::Sugar2::new(bundle)
+}
+
 /// What every front end of netlists does with the elements that it has built: members out of the plane, positions, loose ends.
 fn finish(
     mut drawing: Drawing,
@@ -103,6 +108,8 @@ fn finish(
     elements::upright::settle(&mut drawing, &mut sink);
     if !sink.failed() {
         place::place(&mut drawing, &mut sink);
+    }
+    if !sink.failed() {
         check::finite(&drawing, &mut sink);
     }
     if !sink.failed() {

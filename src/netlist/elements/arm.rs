@@ -8,6 +8,8 @@ use super::super::sink::Reported;
 use super::arguments::Site;
 use crate::structure::{Link, NodeId};
 
+/// Standard gravity [m/s²].
+const GRAVITY: f64 = 9.806_65;
 /// Arms shorter than this part of their length, seen in the plane, are none [1].
 const SEEN: f64 = 1e-9;
 
@@ -53,6 +55,9 @@ impl Site<'_, '_> {
 /// beam3dlink and its kin: a beam between two rigid arms.
 pub(super) fn beam3dlink(site: &mut Site<'_, '_>) -> Result<(), Reported> {
     site.drawing.note(Fact::OutOfPlane, site.instance.span);
+    if site.has_no_section()? {
+        return tracer(site);
+    }
     let width = site.positive("w")?;
     let length = site.positive("l")?;
     if site.leaves_plane() {
@@ -62,6 +67,24 @@ pub(super) fn beam3dlink(site: &mut Site<'_, '_>) -> Result<(), Reported> {
         return site.upright(site.name(), [site.node(0), site.node(1)], width, offset);
     }
     site.between_arms(|site, ends| site.add_beam(site.name(), ends, width))
+}
+
+/// beam_link_grav: the same with its weight, which is left out.
+pub(super) fn beam_link_grav(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+    let volume = site.positive("l")? * site.positive("w")? * site.positive("h")?;
+    let weight = GRAVITY * volume * site.density()?;
+    site.drawing.note_number(Fact::Weight, site.instance.span, weight);
+    beam3dlink(site)
+}
+
+/// tracer: a conductor that is drawn between two nodes and neither holds nor weighs; it places them.
+pub(super) fn tracer(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+    let length = site.positive("l")?;
+    let along = site.instance.rotation.apply([length, 0.0, 0.0]);
+    let (first, second) = (site.arm(1)?, site.arm(2)?);
+    let way = [0, 1].map(|i| first[i] + along[i] + second[i]);
+    site.drawing.lay(site.instance.span, &[site.node(0), site.node(1)], &[[0.0; 2], way]);
+    Ok(())
 }
 
 /// rigidlinkbeam: the same, where SUGAR's places its node b as if it had no arms.

@@ -101,7 +101,22 @@ impl Site<'_, '_> {
     }
 }
 
+impl Site<'_, '_> {
+    /// True for a beam that is given the width or the height 0: in SUGAR it has no stiffness and no mass, and places its nodes.
+    pub(super) fn has_no_section(&mut self) -> Result<bool, Reported> {
+        let none = |size: Option<f64>| size == Some(0.0);
+        let gone = none(self.number("w")?) && none(self.number("h")?) && self.number("l")?.is_some();
+        if gone {
+            self.drawing.note(Fact::NoSection, self.instance.span);
+        }
+        Ok(gone)
+    }
+}
+
 pub(super) fn beam2d(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+    if site.has_no_section()? {
+        return super::arm::tracer(site);
+    }
     let width = site.positive("w")?;
     site.add_beam(site.name(), [site.node(0), site.node(1)], width)
 }

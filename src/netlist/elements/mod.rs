@@ -11,6 +11,7 @@ mod load;
 mod lumped;
 mod material;
 mod pinned;
+mod pressure;
 mod section;
 mod stop;
 mod support;

@@ -2,7 +2,7 @@
 
 use super::super::sink::Reported;
 use super::arguments::Site;
-use super::{arm, beam, circuit, comb, curve, gap, load, lumped, pinned, section, stop, support};
+use super::{arm, beam, circuit, comb, curve, gap, load, lumped, pinned, pressure, section, stop, support};
 
 /// An element of the language.
 pub(crate) struct Model {
@@ -137,11 +137,15 @@ pub(crate) const MODELS: &[Model] = &[
     sugar("beam3dnl4", &[2], "[a b]", BEAM, beam::beam3d),
     sugar("beam3dnl5", &[2], "[a b]", BEAM, beam::beam3d),
     sugar("beam3dnl6", &[2], "[a b]", BEAM, beam::beam3d),
+    sugar("beam_R", &[2], "[a b]", BEAM, beam::beam3d),
     sugar("beam_R2", &[2], "[a b]", BEAM, beam::beam3d),
+    sugar("nls_beam", &[2], "[a b]", BEAM, beam::beam3d),
     sugar("prestressed", &[2], "[a b]", BEAM, beam::beam3d),
     sugar("beam3dlink", &[2], "[a b]", LINK, arm::beam3dlink),
     sugar("beam3dlinkcorner", &[2], "[a b]", LINK, arm::beam3dlink),
     sugar("beam3dlink_cloak", &[2], "[a b]", LINK, arm::beam3dlink),
+    sugar("beam_link_grav", &[2], "[a b]", LINK, arm::beam_link_grav),
+    sugar("tracer", &[2], "[a b]", LINK, arm::tracer),
     sugar("rigidlinkbeam", &[2], "[a b]", LINK, arm::rigidlinkbeam),
     sugar("rigidlinkbeamcorner", &[2], "[a b]", LINK, arm::beam3dlink),
     sugar("rigidlinkbeamcloaked", &[2], "[a b]", LINK, arm::beam3dlink),
@@ -169,6 +173,7 @@ pub(crate) const MODELS: &[Model] = &[
     sugar("slider2", &[2], "[a b]", SLIDER, support::slider2),
     sugar("f2d", &[1], "[a]", LOAD, load::f2d),
     sugar("f3d", &[1], "[a]", LOAD, load::f3d),
+    sugar("p3d", &[2], "[a b]", &["l", "P"], pressure::p3d),
     sugar("gap2d", &[4], "[a b c d]", GAP, gap::gap2d),
     sugar("gap2dV", &[4], "[a b c d]", GAP, gap::gap2d),
     sugar("gap3dV", &[4], "[a b c d]", GAP, gap::gap3d),
@@ -295,6 +300,7 @@ pub(super) fn meaning(name: &str) -> &'static str {
         "curvature" => "rest curvature [1/m]",
         "radius" => "radius [m]",
         "wtop" | "wbottom" => "width of the top or the bottom [m]",
+        "P" => "load per length [N/m]",
         "len" => "length of the picture [m]",
         "qx2" | "qy2" | "qz2" | "qx" | "qy" | "qz" => "displacement of the end [m]",
         "qox" | "qoy" | "qoz" => "rotation of the end [°]",
