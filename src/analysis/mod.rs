@@ -7,6 +7,7 @@ pub mod continuation;
 pub mod formulation;
 pub mod frame;
 mod gap_pieces;
+pub mod harmonic;
 pub mod integrator;
 pub mod joint_transient;
 mod linear_stress;

@@ -3,6 +3,7 @@
 //! Every subcommand is an [`clap::Args`] struct with a `run` method. It reads, computes, writes its `--out` file, and
 //! only then prints to standard output, so that a failure leaves standard output empty and no file behind.
 
+mod ac;
 mod chart;
 mod check;
 mod convert;
@@ -55,6 +56,7 @@ enum Command {
     Static(statics::Static),
     Path(path::PathCommand),
     Modes(modes::Modes),
+    Ac(ac::Ac),
     Pullin(pull_in::Pullin),
     Tran(tran::Tran),
     Export(export::Export),
@@ -76,6 +78,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Static(command) => command.run(),
         Command::Path(command) => command.run(),
         Command::Modes(command) => command.run(),
+        Command::Ac(command) => command.run(),
         Command::Pullin(command) => command.run(),
         Command::Tran(command) => command.run(),
         Command::Export(command) => command.run(),

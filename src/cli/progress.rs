@@ -31,8 +31,17 @@ const DEAR: f64 = 20.0;
 /// Where no person watches, a line is written this often [s].
 const LINES: f64 = 30.0;
 
-/// The watch of an analysis: moves the bar, tells the price of a long run, and says whether to go on.
+/// What makes a run in time cheaper.
+const OF_A_RUN: &str = "a shorter --stop, a larger --tol, or --method generalized-alpha with --step, which damps what is faster than \
+                        its steps, cost less";
+
+/// The watch of a run in time: moves the bar, tells the price of a long one, and says whether to go on.
 pub(crate) fn watch(bar: &ProgressBar) -> impl FnMut(f64) -> bool + '_ {
+    watch_with(bar, OF_A_RUN)
+}
+
+/// The same for another analysis, with what makes it cheaper.
+pub(crate) fn watch_with<'a>(bar: &'a ProgressBar, advice: &'a str) -> impl FnMut(f64) -> bool + 'a {
     let begun = Instant::now();
     let (mut priced, mut line) = (false, LINES);
     let watched = std::io::stderr().is_terminal();
@@ -43,10 +52,7 @@ pub(crate) fn watch(bar: &ProgressBar) -> impl FnMut(f64) -> bool + '_ {
             priced = true;
             let all = spent / fraction;
             if all > DEAR {
-                let price = format!(
-                    "this run is going to take some {all:.0} s; a shorter --stop, a larger --tol, or --method generalized-alpha with \
-                     --step, which damps what is faster than its steps, cost less"
-                );
+                let price = format!("this run is going to take some {all:.0} s; {advice}");
                 bar.suspend(|| eprintln!("{price}"));
             }
         }

@@ -22,7 +22,7 @@ pub mod ports;
 mod saved;
 pub mod scale;
 pub mod shown;
-mod small_signal;
+pub(crate) mod small_signal;
 pub mod states;
 mod trial;
 

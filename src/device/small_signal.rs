@@ -1,16 +1,254 @@
-//! The small-signal answer: how ports and signals of a state respond to a small sinusoid at one port.
+//! The small-signal answer: how ports and signals of a state respond to a small change at one port that goes as e^(st).
+//!
+//! [`Perturbed`] is the physics at any complex s [rad/s]: what a unit at a port does to the forces, and what is seen of the motion
+//! that follows. [`Session::respond`] asks at s = iω; [`crate::analysis::harmonic`] at poles and zeros, too.
 
 use super::local::Session;
 use super::ports::Answer;
 use super::states::Snapshot;
 use super::{DeviceError, SmallSignal, Token};
-use crate::analysis::signal::View;
+use crate::analysis::signal::{Signal, View};
 use crate::compile::Compiled;
-use crate::gaps::System;
+use crate::gaps::{Drive, System};
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
 use crate::solve::frequency::gyroscopic;
+use crate::solve::harmonic::ComplexPose;
 use crate::solve::time::gyration::{held_out, skew};
+use nalgebra::Complex;
+
+/// A state and what holds it there.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Perturbed<'a> {
+    pub(crate) compiled: &'a Compiled,
+    /// The model with the inputs among its sources.
+    pub(crate) system: &'a System,
+    pub(crate) q: &'a [Pose],
+    pub(crate) v: &'a [Pose],
+    pub(crate) rise: &'a [f64],
+    pub(crate) sources: &'a [f64],
+    pub(crate) drive: &'a Drive,
+}
+
+/// What a unit at one source does before anything moves.
+#[derive(Debug, Clone)]
+pub(crate) struct Push {
+    /// Force on each body [N, N·m].
+    pub(crate) force: Vec<ComplexPose>,
+    /// Change of the voltage of each gap [V].
+    pub(crate) volts: Vec<f64>,
+    /// Change of the rise of each heater [K].
+    pub(crate) rise: Vec<Complex<f64>>,
+}
+
+/// How a part of a push depends on s.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Law {
+    /// Not at all.
+    AtOnce,
+    /// As 1/(1 + sτ), τ in seconds.
+    Lagged(f64),
+    /// As s.
+    Rate,
+}
+
+impl Law {
+    /// What it is at s [rad/s].
+    pub(crate) fn factor(self, s: Complex<f64>) -> Complex<f64> {
+        match self {
+            Self::AtOnce => Complex::from(1.0),
+            Self::Lagged(tau) => (Complex::from(1.0) + s * tau).inv(),
+            Self::Rate => s,
+        }
+    }
+}
+
+/// A part of a push.
+#[derive(Debug, Clone)]
+pub(crate) struct Constituent {
+    /// How it depends on s.
+    pub(crate) law: Law,
+    /// Force on each body for a factor of 1 [N, N·m].
+    pub(crate) force: Vec<Pose>,
+    /// Change of the voltage of each gap [V].
+    pub(crate) volts: Vec<f64>,
+    /// Change of the rise of each heater [K].
+    pub(crate) rise: Vec<f64>,
+}
+
+/// A motion of the bodies with what pushed them, in its real and imaginary parts.
+#[derive(Debug, Clone)]
+pub(crate) struct Moved {
+    parts: [Part; 2],
+}
+
+#[derive(Debug, Clone)]
+struct Part {
+    q: Vec<Pose>,
+    v: Vec<Pose>,
+    rise: Vec<f64>,
+    volts: Vec<f64>,
+}
+
+impl Moved {
+    /// The motion `q` that goes as e^(st), with the push that it follows.
+    pub(crate) fn new(push: &Push, q: &[ComplexPose], s: Complex<f64>) -> Self {
+        let part = |imaginary: bool| {
+            let of = |c: Complex<f64>| if imaginary { c.im } else { c.re };
+            // rates are s times displacements
+            let rate = |c: Complex<f64>| {
+                if imaginary { s.im * c.re + s.re * c.im } else { s.re * c.re - s.im * c.im }
+            };
+            Part {
+                q: q.iter().map(|x| x.map(of)).collect(),
+                v: q.iter().map(|x| x.map(rate)).collect(),
+                rise: push.rise.iter().map(|r| of(*r)).collect(),
+                volts: if imaginary { vec![0.0; push.volts.len()] } else { push.volts.clone() },
+            }
+        };
+        Self { parts: [part(false), part(true)] }
+    }
+}
+
+impl Moved {
+    /// A real motion `q` that does not change, with these voltages and rises.
+    pub(crate) fn held(q: Vec<Pose>, volts: Vec<f64>, rise: Vec<f64>) -> Self {
+        let v = vec![Pose::zeros(); q.len()];
+        let none = Part { q: v.clone(), v: v.clone(), rise: vec![0.0; rise.len()], volts: vec![0.0; volts.len()] };
+        Self { parts: [Part { q, v, rise, volts }, none] }
+    }
+}
+
+impl Perturbed<'_> {
+    fn view(&self) -> View<'_> {
+        View { q: self.q, v: self.v, rise: self.rise, volts: &self.drive.volts }
+    }
+
+    /// What a unit e^(st) at source `source` does.
+    pub(crate) fn push(&self, source: usize, s: Complex<f64>) -> Push {
+        let system = self.system;
+        let electrics = &system.electrics;
+        let heaters = &electrics.heating.heaters;
+        let mut unit = vec![0.0; electrics.sources()];
+        unit[source] = 1.0;
+        // heaters lag: δT = (2Qu·δV + Z·δW)/(1 + sτ)
+        let rise: Vec<Complex<f64>> = (0..heaters.len())
+            .map(|k| {
+                let steady = electrics.heating.slope(k, self.sources, &unit);
+                Complex::from(steady) / (Complex::from(1.0) + s * heaters[k].time_constant)
+            })
+            .collect();
+        let volts: Vec<f64> = (0..self.drive.volts.len()).map(|g| electrics.gap_rows[(g, source)]).collect();
+        let turns = system.is_rate(source);
+        let [re, im] = [false, true].map(|imaginary| {
+            let mut change = electrics.drive();
+            for ((strain, heater), rise) in change.expansion.iter_mut().zip(heaters).zip(&rise) {
+                *strain = heater.expansion * if imaginary { rise.im } else { rise.re };
+            }
+            change.load = 0.0;
+            if !imaginary {
+                change.volts.copy_from_slice(&volts);
+                change.inputs.copy_from_slice(&unit[electrics.voltages()..]);
+            }
+            if turns {
+                // the rate of the frame changes by s for each unit of it
+                change.turning = if imaginary { s.im } else { s.re };
+            }
+            let mut force = vec![Pose::zeros(); system.bodies()];
+            system.drive_force(self.q, self.drive, &change, &mut force);
+            if turns && !imaginary {
+                // Coriolis' force of the motion that the state has
+                for ((force, body), v) in force.iter_mut().zip(&system.model.bodies).zip(self.v) {
+                    *force += held_out(body, skew(body, 2.0, v));
+                }
+            }
+            force
+        });
+        let force = re.iter().zip(&im).map(|(re, im)| re.zip_map(im, |re, im| Complex::new(-re, -im))).collect();
+        Push { force, volts, rise }
+    }
+
+    /// [`Perturbed::push`] in parts that do not depend on s: its sum over them, each times [`Law::factor`].
+    pub(crate) fn constituents(&self, source: usize) -> Vec<Constituent> {
+        let system = self.system;
+        let electrics = &system.electrics;
+        let heaters = &electrics.heating.heaters;
+        let mut unit = vec![0.0; electrics.sources()];
+        unit[source] = 1.0;
+        let slopes: Vec<f64> = (0..heaters.len()).map(|k| electrics.heating.slope(k, self.sources, &unit)).collect();
+        let law = |k: usize| match heaters[k].time_constant {
+            tau if tau > 0.0 => Law::Lagged(tau),
+            _ => Law::AtOnce,
+        };
+        let mut laws = vec![Law::AtOnce];
+        for k in 0..heaters.len() {
+            if slopes[k] != 0.0 && !laws.contains(&law(k)) {
+                laws.push(law(k));
+            }
+        }
+        if system.is_rate(source) {
+            laws.push(Law::Rate);
+        }
+        let one = |own: Law| {
+            let rise: Vec<f64> = (0..heaters.len()).map(|k| if law(k) == own { slopes[k] } else { 0.0 }).collect();
+            let mut change = electrics.drive();
+            change.load = 0.0;
+            for ((strain, heater), rise) in change.expansion.iter_mut().zip(heaters).zip(&rise) {
+                *strain = heater.expansion * rise;
+            }
+            if own == Law::AtOnce {
+                for (g, volts) in change.volts.iter_mut().enumerate() {
+                    *volts = electrics.gap_rows[(g, source)];
+                }
+                change.inputs.copy_from_slice(&unit[electrics.voltages()..]);
+            }
+            if own == Law::Rate {
+                change.turning = 1.0;
+            }
+            let volts = change.volts.clone();
+            let mut force = vec![Pose::zeros(); system.bodies()];
+            system.drive_force(self.q, self.drive, &change, &mut force);
+            if own == Law::AtOnce && system.is_rate(source) {
+                for ((force, body), v) in force.iter_mut().zip(&system.model.bodies).zip(self.v) {
+                    *force += held_out(body, skew(body, 2.0, v));
+                }
+            }
+            force.iter_mut().for_each(|f| *f = -*f);
+            Constituent { law: own, force, volts, rise }
+        };
+        laws.into_iter().map(one).collect()
+    }
+
+    /// Change of a signal.
+    pub(crate) fn seen(&self, signal: Signal, moved: &Moved) -> Complex<f64> {
+        let [re, im] = moved.parts.each_ref().map(|part| {
+            let change = View { q: &part.q, v: &part.v, rise: &part.rise, volts: &part.volts };
+            signal.slope(self.compiled, &self.view(), &change)
+        });
+        Complex::new(re, im)
+    }
+
+    /// Change of the charge that each source has brought [C].
+    pub(crate) fn charges(&self, sources: &[usize], moved: &Moved) -> Vec<Complex<f64>> {
+        let mut charges = vec![Complex::from(0.0); sources.len()];
+        for g in 0..self.drive.volts.len() {
+            let [re, im] = moved.parts.each_ref().map(|part| {
+                self.system.capacitance(g, self.q) * part.volts[g]
+                    + self.system.capacitance_slope(g, self.q, &part.q) * self.drive.volts[g]
+            });
+            for (charge, &source) in charges.iter_mut().zip(sources) {
+                let row = self.system.electrics.gap_rows[(g, source)];
+                *charge += Complex::new(row * re, row * im);
+            }
+        }
+        charges
+    }
+
+    /// Change of the rise of a heater [K].
+    pub(crate) fn warmed(push: &Push, heater: usize) -> Complex<f64> {
+        push.rise[heater]
+    }
+}
 
 impl Session {
     /// Sets the drive of a state and factors the dynamic stiffness about it.
@@ -46,96 +284,34 @@ impl Session {
     ) -> Result<(), DeviceError> {
         let own = self.ports.system.clone();
         let system = Self::system(&own, compiled);
-        let electrics = &system.electrics;
         self.factor_about(system, token, state, omega)?;
         let rate = system.frame(&self.drive).map_or(0.0, |frame| frame.rate);
-        let (ports, gaps, heaters) = (self.ports.len(), self.drive.volts.len(), state.rise.len());
+        let ports = self.ports.len();
         reply.admittance.clear();
         reply.admittance.resize(ports * ports, [0.0; 2]);
         reply.outputs.clear();
         reply.outputs.resize(self.signals.len() * ports, [0.0; 2]);
-        let view = View { q: &state.q, v: &state.v, rise: &state.rise, volts: &self.drive.volts };
+        let (q, v, rise, sources) = (&state.q, &state.v, &state.rise, &state.sources);
+        let about = Perturbed { compiled, system, q, v, rise, sources, drive: &self.drive };
+        let s = Complex::new(0.0, omega);
+        let pair = |c: Complex<f64>| [c.re, c.im];
         for (p, &port) in self.ports.sources.iter().enumerate() {
-            self.unit.fill(0.0);
-            self.unit[port] = 1.0;
-            // heaters lag: δT = (2Qu·δV + Z·δW)/(1 + iωτ)
-            let rise: Vec<[f64; 2]> = (0..heaters)
-                .map(|k| {
-                    let steady = electrics.heating.slope(k, &state.sources, &self.unit);
-                    let x = omega * electrics.heating.heaters[k].time_constant;
-                    [steady / (1.0 + x * x), -steady * x / (1.0 + x * x)]
-                })
-                .collect();
-            let gap_row: Vec<f64> = (0..gaps).map(|g| electrics.gap_rows[(g, port)]).collect();
-            let still = vec![0.0; gaps];
-            let turns = system.is_rate(port);
-            let parts = [0, 1].map(|part| {
-                let mut change = electrics.drive();
-                change.volts.copy_from_slice(if part == 0 { &gap_row } else { &still });
-                for ((strain, heater), rise) in change.expansion.iter_mut().zip(&electrics.heating.heaters).zip(&rise) {
-                    *strain = heater.expansion * rise[part];
-                }
-                change.load = 0.0;
-                // the rate of the frame changes by iω for each unit of it
-                match part {
-                    0 => change.inputs.copy_from_slice(&self.unit[electrics.voltages()..]),
-                    _ if turns => change.turning = omega,
-                    _ => {}
-                }
-                let mut force = self.zeros.clone();
-                system.drive_force(&state.q, &self.drive, &change, &mut force);
-                if turns && part == 0 {
-                    // Coriolis' force of the motion that the state has
-                    for ((force, body), v) in force.iter_mut().zip(&system.model.bodies).zip(&state.v) {
-                        *force += held_out(body, skew(body, 2.0, v));
-                    }
-                }
-                force
-            });
-            for ((x, re), im) in self.response.iter_mut().zip(&parts[0]).zip(&parts[1]) {
-                *x = re.zip_map(im, |re, im| nalgebra::Complex::new(-re, -im));
-            }
+            let push = about.push(port, s);
+            self.response.copy_from_slice(&push.force);
             gyroscopic::solve(&mut self.harmonic, system, (omega, rate), &mut self.response);
-            for part in 0..2 {
-                let q: Vec<Pose> =
-                    self.response.iter().map(|x| x.map(|c| if part == 0 { c.re } else { c.im })).collect();
-                // rates are iω times displacements
-                let v: Vec<Pose> = (self.response.iter())
-                    .map(|x| x.map(|c| if part == 0 { -omega * c.im } else { omega * c.re }))
-                    .collect();
-                let volts = if part == 0 { &gap_row } else { &still };
-                let warm: Vec<f64> = rise.iter().map(|r| r[part]).collect();
-                for (g, volts) in volts.iter().enumerate() {
-                    let dq =
-                        system.capacitance(g, view.q) * volts + system.capacitance_slope(g, view.q, &q) * view.volts[g];
-                    for (row, &other) in self.ports.sources.iter().enumerate() {
-                        if self.ports.answers[row] != Answer::Current {
-                            continue;
-                        }
-                        let y = &mut reply.admittance[row * ports + p];
-                        // i = iω·dq
-                        let current = omega * electrics.gap_rows[(g, other)] * dq;
-                        if part == 0 { y[1] += current } else { y[0] -= current }
-                    }
-                }
-                let change = View { q: &q, v: &v, rise: &warm, volts };
-                for (row, signal) in self.signals.iter().enumerate() {
-                    reply.outputs[row * ports + p][part] = signal.slope(compiled, &view, &change);
-                }
-                for (row, answer) in self.ports.answers.iter().enumerate() {
-                    match answer {
-                        Answer::Motion(signal) => {
-                            reply.admittance[row * ports + p][part] = signal.slope(compiled, &view, &change);
-                        }
-                        Answer::Rise(heater) => reply.admittance[row * ports + p][part] = change.rise[*heater],
-                        Answer::Current | Answer::Nothing => {}
-                    }
-                }
+            let moved = Moved::new(&push, &self.response, s);
+            for (row, signal) in self.signals.iter().enumerate() {
+                reply.outputs[row * ports + p] = pair(about.seen(*signal, &moved));
             }
-            for (row, &other) in self.ports.sources.iter().enumerate() {
-                if self.ports.answers[row] == Answer::Current {
-                    reply.admittance[row * ports + p][0] += electrics.conductance[(other, port)];
-                }
+            let charges = about.charges(&self.ports.sources, &moved);
+            for (row, (answer, &other)) in self.ports.answers.iter().zip(&self.ports.sources).enumerate() {
+                reply.admittance[row * ports + p] = match answer {
+                    // i = G + s·dq
+                    Answer::Current => pair(s * charges[row] + system.electrics.conductance[(other, port)]),
+                    Answer::Motion(signal) => pair(about.seen(*signal, &moved)),
+                    Answer::Rise(heater) => pair(Perturbed::warmed(&push, *heater)),
+                    Answer::Nothing => [0.0; 2],
+                };
             }
         }
         Ok(())

@@ -49,6 +49,53 @@ pub static TRAN_RHO: Described = Described {
     help: "Of generalized-alpha: factor by which an infinitely fast motion shrinks in a step, 0 to 1",
 };
 
+/// Most frequencies of a response.
+pub const MOST_FREQUENCIES: usize = 1_000_000;
+
+/// `ac`: the lowest frequency.
+pub static AC_FROM: Described = Described {
+    name: "from",
+    wire: "from_hz",
+    unit: "Hz",
+    range: Range::Above(0.0, 1e12),
+    default: Value::Unset,
+    unset: "must be given",
+    help: "Lowest frequency",
+};
+
+/// `ac`: the highest frequency.
+pub static AC_TO: Described = Described {
+    name: "to",
+    wire: "to_hz",
+    unit: "Hz",
+    range: Range::Above(0.0, 1e12),
+    default: Value::Unset,
+    unset: "must be given",
+    help: "Highest frequency",
+};
+
+/// `ac`: frequencies.
+pub static AC_POINTS: Described = Described {
+    name: "points",
+    wire: "points",
+    unit: "",
+    range: Range::Count(2, MOST_FREQUENCIES),
+    default: Value::Count(201),
+    unset: "",
+    help: "Frequencies of the even grid, both ends included; more are added about resonances",
+};
+
+/// `ac`: modes of a sum over modes.
+pub static AC_MODES: Described = Described {
+    name: "modes",
+    wire: "modes",
+    unit: "",
+    range: Range::Count(1, 1000),
+    default: Value::Unset,
+    unset: "those to twice the highest frequency",
+    help: "Of a sum over modes: how many, from the lowest",
+};
+
 /// `modes`: how many.
 pub static MODES_COUNT: Described = Described {
     name: "count",
@@ -94,11 +141,15 @@ pub static CHART_POINTS: Described = Described {
 };
 
 /// The commands and their options, as documented.
-pub static ANALYSES: [(&str, &Described); 8] = [
+pub static ANALYSES: [(&str, &Described); 12] = [
     ("tran", &TRAN_STOP),
     ("tran", &TRAN_POINTS),
     ("tran", &TRAN_STEP),
     ("tran", &TRAN_RHO),
+    ("ac", &AC_FROM),
+    ("ac", &AC_TO),
+    ("ac", &AC_POINTS),
+    ("ac", &AC_MODES),
     ("modes", &MODES_COUNT),
     ("pullin", &PULL_IN_MAX),
     ("path", &PATH_POINTS),

@@ -15,7 +15,7 @@ use super::work::{Results, Work, guarded};
 use super::{proto, status};
 use crate::analysis::integrator::Integrator;
 use crate::analysis::transient::TransientOptions;
-use crate::analysis::{mesh, modes, pull_in, statics};
+use crate::analysis::{harmonic, mesh, modes, pull_in, statics};
 use crate::budget::Budget;
 use crate::compile::{CompileError, CompileOptions, compile};
 use crate::device::Token;
@@ -249,6 +249,29 @@ impl proto::bimorph_server::Bimorph for Calls {
             Ok(results::modes_to_wire(&result))
         };
         self.analyse(&request.model, job).await
+    }
+
+    async fn frequency_response(
+        &self,
+        request: Request<proto::FrequencyResponseRequest>,
+    ) -> Reply<proto::FrequencyResponseReply> {
+        let request = request.into_inner();
+        let id = request.model.clone();
+        count("signals", request.signals.len(), &self.0.limits)?;
+        let options = convert::harmonic::request_from_wire(request).map_err(status::violation)?;
+        options.check().map_err(status::analysis)?;
+        let most = self.0.limits.message_bytes;
+        let bytes = options.bytes();
+        if bytes > most {
+            return Err(status::limit("message_bytes", most, bytes));
+        }
+        let job = move |model: &Model| {
+            let (fitted, mut result) =
+                harmonic::harmonic_fitted(&model.compiled, &options, &mut |_| true).map_err(status::analysis)?;
+            result.warnings.extend(mesh::warnings(&fitted));
+            Ok(convert::harmonic::result_to_wire(&result))
+        };
+        self.analyse(&id, job).await
     }
 
     async fn pull_in(&self, request: Request<proto::PullInRequest>) -> Reply<proto::PullInResponse> {

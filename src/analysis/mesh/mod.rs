@@ -6,6 +6,7 @@
 //! | static | the deformed state, compared with that of twice the segments | `equilibrium` |
 //! | modes | the highest mode asked for; about a loaded state, that state and its frequencies too | here |
 //! | pull-in | both voltages, compared with those of twice the segments | here |
+//! | frequency response | the response itself and the modes within the band, compared with those of twice the segments | `in_band` |
 //! | transient | the states it starts from and goes to, and the modes that the difference of the two excites | `excited` |
 //!
 //! Who gives a number of segments gets them, and the estimate of their error. Who gives a band gets the mesh for that band at
@@ -14,6 +15,7 @@
 mod equilibrium;
 mod excited;
 pub(crate) mod given;
+mod in_band;
 mod warnings;
 
 use super::linear_stress::left_out;
@@ -141,6 +143,17 @@ pub fn fitted_in_time(
         warn_of_stress(&mut moving, share);
     }
     Ok((moving, start))
+}
+
+/// The model on the mesh for a frequency response.
+///
+/// # Errors
+/// See [`fitted`].
+pub fn fitted_in_band(
+    compiled: &Compiled,
+    options: &super::harmonic::HarmonicOptions,
+) -> Result<Compiled, AnalysisError> {
+    in_band::fitted(compiled, options)
 }
 
 /// What stress would change in the way that a linear run goes: from its first state to where it would rest.

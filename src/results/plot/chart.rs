@@ -158,7 +158,7 @@ fn loudest(series: &[Series]) -> Vec<&Series> {
 }
 
 /// At most four points for each column of pixels (first, lowest, highest, last), so that no spike is lost.
-fn thin_out(x: &[f64], y: &[f64], to_x: impl Fn(f64) -> f64, to_y: impl Fn(f64) -> f64) -> Vec<[f64; 2]> {
+pub(super) fn thin_out(x: &[f64], y: &[f64], to_x: impl Fn(f64) -> f64, to_y: impl Fn(f64) -> f64) -> Vec<[f64; 2]> {
     let mut points: Vec<[f64; 2]> = Vec::new();
     let mut column: Vec<[f64; 2]> = Vec::new();
     let flush = |column: &mut Vec<[f64; 2]>, points: &mut Vec<[f64; 2]>| {

@@ -5,6 +5,7 @@
 
 pub mod animation;
 pub mod axis;
+pub mod bode;
 pub mod chart;
 pub mod log_axis;
 pub mod loglog;

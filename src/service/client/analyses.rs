@@ -1,6 +1,7 @@
 //! Analyses and sweeps on a server.
 
 use super::link::{Link, reason};
+use crate::analysis::harmonic::{HarmonicOptions, HarmonicResult};
 use crate::analysis::integrator::Integrator;
 use crate::analysis::modes::ModesResult;
 use crate::analysis::pull_in::PullInResult;
@@ -12,7 +13,7 @@ use crate::jobs::sweep::{SweepProgress, SweepSpec, SweepTable};
 use crate::netlist::Bundle;
 use crate::service::convert::model::bundle_to_wire;
 use crate::service::convert::options::options_to_wire;
-use crate::service::convert::{analysis as results, named, sweep as sweeps};
+use crate::service::convert::{analysis as results, harmonic as harmonics, named, sweep as sweeps};
 use crate::service::proto;
 use proto::sweep_status::State;
 use proto::transient_event::Kind as EventKind;
@@ -111,6 +112,20 @@ impl Client {
         let request = proto::ModesRequest { model: model.to_owned(), count, voltages: named(voltages) };
         let mut rpc = self.link.rpc.clone();
         self.call(rpc.modes(request)).map(results::modes_from_wire)
+    }
+
+    /// Frequency response.
+    ///
+    /// # Errors
+    /// [`ClientError`].
+    pub fn frequency_response(
+        &mut self,
+        model: &str,
+        options: &HarmonicOptions,
+    ) -> Result<HarmonicResult, ClientError> {
+        let request = harmonics::request_to_wire(model, options);
+        let mut rpc = self.link.rpc.clone();
+        self.call(rpc.frequency_response(request)).map(|reply| harmonics::result_from_wire(&options.drive, reply))
     }
 
     /// Pull-in and release.

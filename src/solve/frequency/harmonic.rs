@@ -1,4 +1,4 @@
-//! Small-signal response at one angular frequency: (K − ω²M + iωC)·x = f.
+//! Small-signal response at one complex frequency: (K + sC + s²M)·x = f; at one angular frequency, s = iω.
 //!
 //! The same block factorization over complex numbers; the matrix is symmetric. An undamped structure close to a local
 //! resonance of one of its branches can have a small pivot, so each solution is refined once against its own residual.
@@ -14,9 +14,9 @@ pub type ComplexPose = Vector3<Complex<f64>>;
 /// Solver with its storage.
 #[derive(Debug, Clone)]
 pub struct Harmonic {
-    matrix: BlockMatrix<Complex<f64>, 3>,
+    pub(super) matrix: BlockMatrix<Complex<f64>, 3>,
     factor: BlockMatrix<Complex<f64>, 3>,
-    damping: BlockMatrix<f64, 3>,
+    pub(super) damping: BlockMatrix<f64, 3>,
     rest: Vec<ComplexPose>,
 }
 
@@ -36,9 +36,24 @@ impl Harmonic {
     /// # Errors
     /// [`SolveError::Singular`] at an undamped resonance.
     pub fn factor(&mut self, system: &System, stiffness: &BlockMatrix<f64, 3>, omega: f64) -> Result<(), SolveError> {
+        self.factor_at(system, stiffness, Complex::new(0.0, omega))
+    }
+
+    /// Factors K + sC + s²M, s in rad/s.
+    ///
+    /// # Errors
+    /// [`SolveError::Singular`] at an eigenvalue.
+    pub fn factor_at(
+        &mut self,
+        system: &System,
+        stiffness: &BlockMatrix<f64, 3>,
+        s: Complex<f64>,
+    ) -> Result<(), SolveError> {
         let model = &system.model;
-        let blend =
-            |k: &nalgebra::Matrix3<f64>, c: &nalgebra::Matrix3<f64>| k.zip_map(c, |k, c| Complex::new(k, omega * c));
+        let blend = |k: &nalgebra::Matrix3<f64>, c: &nalgebra::Matrix3<f64>| {
+            k.zip_map(c, |k, c| Complex::new(k + s.re * c, s.im * c))
+        };
+        let square = s * s;
         for (out, (k, c)) in self.matrix.diagonal.iter_mut().zip(stiffness.diagonal.iter().zip(&self.damping.diagonal))
         {
             *out = blend(k, c);
@@ -49,7 +64,7 @@ impl Harmonic {
         for (j, block) in self.matrix.diagonal.iter_mut().enumerate() {
             let m = model.mass(j);
             for i in 0..3 {
-                block[(i, i)] -= Complex::from(omega * omega * m[i]);
+                block[(i, i)] += square * m[i];
             }
         }
         model.project_matrix(&mut self.matrix);

@@ -10,6 +10,7 @@
 //! | [`subspace`] | many of them at once |
 //! | [`fastest`] | the highest natural frequency in joint coordinates |
 //! | [`harmonic`] | small-signal response at one frequency: the same factorization over complex numbers |
+//! | [`pole`] | where that has no bound: a damped mode |
 //! | [`gyroscopic`] | the same in a frame that turns |
 
 pub mod eigen;
@@ -19,5 +20,6 @@ pub mod harmonic;
 pub mod inverse_iteration;
 pub mod lanczos;
 pub mod mac;
+pub mod pole;
 pub mod refined;
 pub mod subspace;

@@ -1,0 +1,344 @@
+//! Frequency response without a circuit: what a small sinusoid at one place does to all that is asked for, about the operating point.
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | `named` | what drives and what is seen, by name |
+//! | `exact` | the response of the whole model at a complex frequency |
+//! | `modal` | the same as a sum over modes, with static correction |
+//! | `roots` | poles and zeros |
+//! | [`grid`] | the frequencies |
+//!
+//! The mesh for it is chosen by [`super::mesh`].
+
+pub(crate) mod exact;
+pub mod grid;
+pub(crate) mod modal;
+pub(crate) mod named;
+mod roots;
+
+use super::{AnalysisError, Watch};
+use crate::compile::Compiled;
+use crate::options::Value;
+use crate::options::analysis::{AC_FROM, AC_MODES, AC_POINTS, AC_TO};
+use exact::Exact;
+use grid::Spacing;
+use modal::Sum;
+use nalgebra::Complex;
+use std::f64::consts::TAU;
+
+pub use roots::Root;
+
+/// Frequencies times signals at most: each value is a complex number in doubles.
+pub const MOST_VALUES: usize = 50_000_000;
+/// Modes within the band beyond which poles, zeros and points about resonances are left out.
+const MOST_MODES: usize = 100;
+/// Modes are known to this multiple of the band, where they are not too many.
+const BEYOND: f64 = 2.0;
+/// Modes beyond those, so that the last is apart from what follows.
+const GUARDS: usize = 2;
+/// Signals whose zeros are looked for at most.
+const MOST_ZEROS: usize = 8;
+/// Frequencies at which a sum over modes is compared with the exact response.
+const COMPARED: usize = 60;
+/// Share of the sum of its parts below which a value is a zero of the curve.
+const ZERO: f64 = 0.01;
+
+/// What is asked for.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct HarmonicOptions {
+    /// What is driven: `NODE.fx`, `NODE.fy`, `NODE.m`, a port, `BEAM.T`, `frame.ax`, `frame.ay`, `frame.wz`.
+    pub drive: String,
+    /// Signals wanted, `PORT.i` among them; none: what the driven place itself answers.
+    pub signals: Vec<String>,
+    /// Lowest frequency [Hz].
+    pub from: f64,
+    /// Highest frequency [Hz].
+    pub to: f64,
+    /// Points of the even grid, or of each decade of it.
+    pub points: usize,
+    /// How the even grid lies.
+    pub spacing: Spacing,
+    /// No points about resonances: the even grid alone.
+    pub even: bool,
+    /// As a sum over modes with static correction instead of exactly.
+    pub by_modes: bool,
+    /// Modes of that sum; none: those to twice the highest frequency.
+    pub modes: Option<usize>,
+    /// Port voltages of the operating point.
+    pub voltages: Vec<(String, f64)>,
+}
+
+/// What a signal answers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SignalResponse {
+    /// Its name.
+    pub name: String,
+    /// Its unit over that of the drive.
+    pub unit: String,
+    /// Value at each frequency, [re, im]; NaN where it has no bound.
+    pub values: Vec<[f64; 2]>,
+    /// Value at rest; none where nothing holds the mechanism.
+    pub at_rest: Option<f64>,
+    /// Zeros within the band; none where they were not looked for.
+    pub zeros: Option<Vec<Root>>,
+}
+
+/// A frequency response.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HarmonicResult {
+    /// What was driven.
+    pub drive: String,
+    /// Its unit.
+    pub drive_unit: String,
+    /// Frequencies, ascending [Hz].
+    pub frequencies_hz: Vec<f64>,
+    /// The signals in the order asked for.
+    pub signals: Vec<SignalResponse>,
+    /// Poles within the band; none where they were not looked for.
+    pub poles: Option<Vec<Root>>,
+    /// Points that were added about resonances.
+    pub added: usize,
+    /// Modes of the sum; none: exact.
+    pub modes: Option<usize>,
+    /// Largest relative deviation of the sum over modes from the exact response; none: it is exact.
+    pub modal_error: Option<f64>,
+    /// Mechanical unknowns.
+    pub unknowns: usize,
+    /// Largest estimated relative error by the mesh, of a value or of the frequency at which it stands; none without an estimate.
+    pub estimated_error: Option<f64>,
+    /// What the numbers do not say by themselves.
+    pub warnings: Vec<String>,
+}
+
+impl HarmonicOptions {
+    /// Refuses what cannot be computed, before anything is laid out for it.
+    ///
+    /// # Errors
+    /// [`AnalysisError::BadRequest`].
+    pub fn check(&self) -> Result<(), AnalysisError> {
+        let refused = |what: &str, detail: String| Err(AnalysisError::BadRequest { what: what.into(), detail });
+        let given = [(&AC_FROM, Value::Number(self.from)), (&AC_TO, Value::Number(self.to))];
+        for (option, value) in given.into_iter().chain([(&AC_POINTS, Value::Count(self.points))]) {
+            if let Err(e) = option.check(&value) {
+                return refused(option.name, format!("expected {}, got {}", e.expected, e.got));
+            }
+        }
+        if let Some(count) = self.modes
+            && let Err(e) = AC_MODES.check(&Value::Count(count))
+        {
+            return refused("modes", format!("expected {}, got {}", e.expected, e.got));
+        }
+        if self.from >= self.to {
+            return refused(
+                "to",
+                format!("expected a frequency above from ({:e} Hz), got {:e} Hz", self.from, self.to),
+            );
+        }
+        let most = crate::options::analysis::MOST_FREQUENCIES;
+        let count = grid::count(self.spacing, self.points, [self.from, self.to]).filter(|count| *count <= most);
+        let Some(count) = count else {
+            return refused("points", format!("expected at most {most} in all; take fewer, or a narrower band"));
+        };
+        if count.saturating_mul(self.signals.len().max(1)) > MOST_VALUES {
+            let got = self.signals.len();
+            return refused(
+                "points",
+                format!("{count} for {got} signals are more than {MOST_VALUES} values; take fewer"),
+            );
+        }
+        Ok(())
+    }
+}
+
+impl HarmonicOptions {
+    /// Bytes that the numbers of the answer take at most, as doubles.
+    pub fn bytes(&self) -> usize {
+        let even = grid::count(self.spacing, self.points, [self.from, self.to]).unwrap_or(usize::MAX);
+        let more = if self.even { 0 } else { grid::MOST_ABOUT * MOST_MODES };
+        even.saturating_add(more).saturating_mul(1 + 2 * self.signals.len().max(1)).saturating_mul(8)
+    }
+}
+
+/// The response on the mesh that holds the tolerance, which comes with it.
+///
+/// # Errors
+/// See [`AnalysisError`].
+pub fn harmonic_fitted(
+    compiled: &Compiled,
+    options: &HarmonicOptions,
+    watch: Watch<'_>,
+) -> Result<(Compiled, HarmonicResult), AnalysisError> {
+    options.check()?;
+    let fitted = super::mesh::fitted_in_band(compiled, options)?;
+    let mut result = harmonic(&fitted, options, watch)?;
+    result.estimated_error = fitted.order.estimated_error;
+    Ok((fitted, result))
+}
+
+/// The response on the mesh as it is.
+///
+/// # Errors
+/// See [`AnalysisError`].
+pub fn harmonic(
+    compiled: &Compiled,
+    options: &HarmonicOptions,
+    watch: Watch<'_>,
+) -> Result<HarmonicResult, AnalysisError> {
+    options.check()?;
+    let band = [options.from, options.to];
+    let mut exact = Exact::new(compiled, options)?;
+    let mut warnings = warnings(&exact);
+    let (inside, wanted) = (modal::below(&exact, TAU * options.to), modal::below(&exact, TAU * BEYOND * options.to));
+    let count = match options.modes {
+        Some(count) => count,
+        None => (wanted + GUARDS).min(MOST_MODES),
+    };
+    let many = inside > MOST_MODES;
+    if many {
+        warnings.push(format!(
+            "{inside} modes lie below {:e} Hz, more than {MOST_MODES}: poles, zeros and points about resonances are left out",
+            options.to
+        ));
+    }
+    let sum = match many && !options.by_modes {
+        true => None,
+        false => {
+            let found = modal::lowest(
+                exact.system(),
+                (&exact.point.q, &exact.drive),
+                &exact.tangent,
+                count.max(if many { 0 } else { inside + 1 }),
+            )?;
+            let shown = if options.by_modes { found.lambda.len().min(count.max(1)) } else { found.lambda.len() };
+            let mut kept = found;
+            kept.lambda.truncate(shown);
+            kept.shapes.truncate(shown);
+            Some(Sum::new(&exact, &kept)?)
+        }
+    };
+    let poles = sum.as_ref().filter(|_| !many).map(|sum| {
+        let (poles, rough) = roots::poles(&mut exact, sum, band);
+        if rough > 0 {
+            warnings
+                .push(format!("{rough} poles did not settle on the whole model: they are those of its lowest modes"));
+        }
+        poles
+    });
+    let known = poles.clone().unwrap_or_default();
+    let even = grid::even(options.spacing, options.points, band);
+    let (frequencies_hz, added) = if options.even { (even, 0) } else { grid::with_resonances(even, &known, band) };
+    crate::budget::lay_out_matrix(frequencies_hz.len(), 2 * exact.rows.len());
+    let modal_error = match (&sum, options.by_modes) {
+        (Some(sum), true) => Some(deviation(&mut exact, sum, &frequencies_hz, &known)),
+        _ => None,
+    };
+    let (values, lost) = swept(&mut exact, sum.as_ref().filter(|_| options.by_modes), &frequencies_hz, &known, watch)?;
+    if lost > 0 {
+        warnings.push(format!(
+            "nothing damps a resonance at {lost} of the frequencies: the response has no bound there, and no value is given"
+        ));
+    }
+    let at_rest = if exact.floats { None } else { exact.at(Complex::from(0.0)) };
+    let rows = exact.rows.len();
+    if rows > MOST_ZEROS && poles.is_some() {
+        warnings.push(format!("zeros are those of the first {MOST_ZEROS} signals"));
+    }
+    let zeros: Vec<Option<Vec<roots::Root>>> = (0..rows)
+        .map(|row| {
+            let sum = sum.as_ref().filter(|_| poles.is_some() && row < MOST_ZEROS)?;
+            Some(roots::zeros(&mut exact, sum, row, band))
+        })
+        .collect();
+    let columns = exact.shown.iter().cloned().zip(values).zip(zeros).enumerate();
+    let signals = columns.map(|(row, (((name, unit), values), zeros))| SignalResponse {
+        name,
+        unit,
+        values,
+        at_rest: at_rest.as_ref().map(|values| values[row].re),
+        zeros,
+    });
+    Ok(HarmonicResult {
+        drive: options.drive.clone(),
+        drive_unit: exact.drive_unit.to_owned(),
+        frequencies_hz,
+        signals: signals.collect(),
+        poles,
+        added,
+        modes: sum.as_ref().filter(|_| options.by_modes).map(|sum| sum.lambda.len()),
+        modal_error,
+        unknowns: compiled.parts.system.model.unknowns(),
+        estimated_error: compiled.order.estimated_error,
+        warnings,
+    })
+}
+
+/// What the operating point does not say by itself.
+fn warnings(exact: &Exact<'_>) -> Vec<String> {
+    let mut warnings = Vec::new();
+    let model = &exact.system().model;
+    let mut factor = exact.tangent.clone();
+    model.project_matrix(&mut factor);
+    let negative = factor.factor(&model.pattern).map_or(0, |inertia| inertia.negative);
+    if negative > 0 && !exact.floats {
+        warnings.push(format!(
+            "the equilibrium is unstable in {negative} direction(s): what moves there grows, and never settles to this response"
+        ));
+    }
+    if exact.point.path.fold.is_some() {
+        warnings.push(
+            "the part pulled in, snapped or buckled on the way to this operating point: the response is about where it went".into(),
+        );
+    }
+    if exact.floats {
+        warnings.push("nothing holds the mechanism in some direction: it has no response at rest".into());
+    }
+    warnings
+}
+
+/// Every row at every frequency, and at how many there is no bound.
+fn swept(
+    exact: &mut Exact<'_>,
+    sum: Option<&Sum>,
+    frequencies: &[f64],
+    poles: &[Root],
+    watch: Watch<'_>,
+) -> Result<(Vec<Vec<[f64; 2]>>, usize), AnalysisError> {
+    let rows = exact.rows.len();
+    let mut columns = vec![Vec::with_capacity(frequencies.len()); rows];
+    let mut lost = 0;
+    for (k, frequency) in frequencies.iter().enumerate() {
+        if !watch(k as f64 / frequencies.len() as f64) {
+            return Err(AnalysisError::Cancelled);
+        }
+        let s = Complex::new(0.0, TAU * frequency);
+        let values = match sum {
+            _ if grid::unbounded(*frequency, poles) => None,
+            Some(sum) => sum.at(s),
+            // a pivot may vanish where a branch alone resonates: rounding away from there none does
+            None => exact.at(s).or_else(|| exact.at(s * (1.0 + 1e-11))),
+        };
+        lost += usize::from(values.is_none());
+        for (row, column) in columns.iter_mut().enumerate() {
+            column.push(values.as_ref().map_or([f64::NAN; 2], |values| [values[row].re, values[row].im]));
+        }
+    }
+    Ok((columns, lost))
+}
+
+/// Largest deviation of a sum from the exact response, relative to each value, or to a hundredth of the largest of its signal where it is a zero.
+fn deviation(exact: &mut Exact<'_>, sum: &Sum, frequencies: &[f64], poles: &[Root]) -> f64 {
+    let every = frequencies.len().div_ceil(COMPARED).max(1);
+    let usable = frequencies.iter().step_by(every).chain(frequencies.last());
+    let mut worst = 0.0f64;
+    for frequency in usable.filter(|f| !grid::unbounded(**f, poles)) {
+        let s = Complex::new(0.0, TAU * frequency);
+        let (Some(values), Some(sums)) = (exact.at(s), sum.at(s)) else { continue };
+        for (row, (a, b)) in values.iter().zip(&sums).enumerate() {
+            let size = a.norm().max(ZERO * sum.reach(s, row));
+            if size > 0.0 {
+                worst = worst.max((a - b).norm() / size);
+            }
+        }
+    }
+    worst
+}

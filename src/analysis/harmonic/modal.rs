@@ -1,0 +1,260 @@
+//! The response as a sum over modes, with static correction.
+//!
+//! ```text
+//! q(s) = Σ_j φ_j·η_j + Σ_c f_c(s)·z_c,     (s² + s·D + Λ)·η = Σ_c f_c(s)·φᵀb_c,     z_c = K⁻¹b_c − Σ_j φ_j·(φ_jᵀb_c)/λ_j
+//! ```
+//! φ are the lowest undamped modes with φᵀMφ = 1, D = φᵀCφ, b_c the parts of the push of the drive and f_c(s) how each depends on s.
+//! z, the static correction, is what the modes that are left out yield at rest.
+//!
+//! Reference: R. R. Craig, A. J. Kurdila, "Fundamentals of Structural Dynamics" (2006), §11.4.
+
+use super::exact::Exact;
+use super::named::Row;
+use crate::analysis::AnalysisError;
+use crate::analysis::signal::Signal;
+use crate::device::small_signal::{Constituent, Law, Moved};
+use crate::gaps::{Drive, System};
+use crate::multibody::BlockMatrix;
+use crate::multibody::forces::{add_damping, add_inertia};
+use crate::multibody::planar::Pose;
+use crate::solve::eigen::{Modes, RELIABLE, lowest_modes};
+use crate::solve::frequency::refined::{ROUNDING, Refined};
+use crate::solve::subspace;
+use nalgebra::{Complex, DMatrix, DVector};
+
+/// Modes beyond those asked for that an iteration of a block takes along, and the change of λ at which it ends [1].
+const GUARDS: usize = 6;
+const SETTLED: f64 = 1e-14;
+/// Of a mechanism that floats the correction is taken at this share of the frequency up to which modes are known [1].
+const ASIDE: f64 = 0.03;
+
+/// The lowest modes of the small-signal problem, or all there are: about a nonlinear state those of its tangent; of a linear model those
+/// of the tangent as it is, without what stress adds to it.
+///
+/// # Errors
+/// [`AnalysisError::NotConverged`] rather than modes that cannot be trusted.
+pub(crate) fn lowest(
+    system: &System,
+    (q, drive): (&[Pose], &Drive),
+    tangent: &BlockMatrix<f64, 3>,
+    count: usize,
+) -> Result<Modes, AnalysisError> {
+    if system.model.linear {
+        return linear(system, (q, drive), tangent, count);
+    }
+    let found = lowest_modes(system, (q, drive), tangent, count).map_err(AnalysisError::from)?;
+    let bad = found.residuals.iter().any(|r| r.is_nan() || *r > RELIABLE) || found.missed;
+    if bad || found.lambda.is_empty() {
+        return Err(unsettled(count));
+    }
+    Ok(found)
+}
+
+fn linear(
+    system: &System,
+    (q, drive): (&[Pose], &Drive),
+    tangent: &BlockMatrix<f64, 3>,
+    count: usize,
+) -> Result<Modes, AnalysisError> {
+    let model = &system.model;
+    let mut factor = tangent.clone();
+    model.project_matrix(&mut factor);
+    if factor.factor(&model.pattern).is_err() {
+        return lowest_modes(system, (q, drive), tangent, count).map_err(AnalysisError::from);
+    }
+    let mut block = count + GUARDS;
+    while block > 0 {
+        let start = subspace::start(model.bodies.len(), block, system.length_scale);
+        if let Some(found) = subspace::iterate(model, (&factor, 0.0), start, count.min(block), SETTLED) {
+            let (mut lambda, mut shapes) = (found.lambda, found.shapes);
+            lambda.truncate(count);
+            shapes.truncate(count);
+            let residuals = vec![0.0; lambda.len()];
+            return Ok(Modes { lambda, shapes, residuals, missed: false, rounding: 0.0 });
+        }
+        // there are fewer
+        block -= 1;
+    }
+    Err(unsettled(count))
+}
+
+fn unsettled(count: usize) -> AnalysisError {
+    let detail =
+        format!("the {count} lowest modes at the operating point cannot be told apart from rounding; ask for fewer");
+    AnalysisError::NotConverged { detail }
+}
+
+/// How many modes lie below `omega` [rad/s]: negative pivots of K − ω²M (Sylvester).
+pub(crate) fn below(exact: &Exact<'_>, omega: f64) -> usize {
+    let model = &exact.system().model;
+    let mut shifted = exact.tangent.clone();
+    add_inertia(model, -omega * omega, 0.0, &mut shifted);
+    model.project_matrix(&mut shifted);
+    shifted.factor(&model.pattern).map_or(0, |inertia| inertia.negative)
+}
+
+/// The sum, with what each row sees of each mode.
+#[derive(Debug, Clone)]
+pub(super) struct Sum {
+    /// λ of each mode, ascending [rad²/s²].
+    pub(super) lambda: Vec<f64>,
+    /// D, modes × modes [1/s].
+    pub(super) damping: DMatrix<f64>,
+    /// How each part of the push depends on s.
+    pub(super) laws: Vec<Law>,
+    /// φᵀb, modes × parts.
+    pub(super) push: DMatrix<f64>,
+    /// What rows see of a mode, rows × modes.
+    pub(super) seen: DMatrix<f64>,
+    /// What rows see of the rest, rows × parts.
+    pub(super) rest: DMatrix<f64>,
+    /// Rows that see the rate of it.
+    pub(super) rates: Vec<bool>,
+    /// Conductance between drive and row [S].
+    pub(super) conducted: Vec<f64>,
+    /// Σ_j M·φ_j: a force that stirs every mode.
+    pub(super) stir: Vec<Pose>,
+}
+
+impl Sum {
+    /// Over these modes.
+    pub(super) fn new(exact: &Exact<'_>, found: &Modes) -> Result<Self, AnalysisError> {
+        let (system, about) = (exact.system(), exact.perturbed());
+        let model = &system.model;
+        let constituents = about.constituents(exact.source());
+        let n = found.lambda.len();
+        let rests = rests(exact, found, &constituents)?;
+        let mut drag = vec![Pose::zeros(); system.bodies()];
+        let mut damping = DMatrix::zeros(n, n);
+        for k in 0..n {
+            crate::budget::check();
+            drag.fill(Pose::zeros());
+            add_damping(model, &found.shapes[k], &mut drag);
+            for j in 0..n {
+                damping[(j, k)] = dot(&found.shapes[j], &drag);
+            }
+        }
+        let none = (vec![0.0; exact.drive.volts.len()], vec![0.0; exact.point.rise.len()]);
+        let read = |row: &Row, moved: &Moved| match row {
+            Row::Signal(Signal::Rate(point, direction)) => {
+                about.seen(Signal::Displacement(*point, *direction), moved).re
+            }
+            Row::Signal(signal) => about.seen(*signal, moved).re,
+            Row::Current(port) => about.charges(&[*port], moved)[0].re,
+        };
+        let rows = &exact.rows;
+        let mut seen = DMatrix::zeros(rows.len(), n);
+        for (j, shape) in found.shapes.iter().enumerate() {
+            crate::budget::check();
+            let moved = Moved::held(shape.clone(), none.0.clone(), none.1.clone());
+            rows.iter().enumerate().for_each(|(r, row)| seen[(r, j)] = read(row, &moved));
+        }
+        let mut rest = DMatrix::zeros(rows.len(), constituents.len());
+        for (c, (part, z)) in constituents.iter().zip(rests).enumerate() {
+            let moved = Moved::held(z, part.volts.clone(), part.rise.clone());
+            rows.iter().enumerate().for_each(|(r, row)| rest[(r, c)] = read(row, &moved));
+        }
+        let conducted = |row: &Row| match row {
+            Row::Current(port) => system.electrics.conductance[(*port, exact.source())],
+            Row::Signal(_) => 0.0,
+        };
+        let mut stir = vec![Pose::zeros(); system.bodies()];
+        for shape in &found.shapes {
+            for (j, (s, x)) in stir.iter_mut().zip(shape).enumerate() {
+                *s += model.mass(j).component_mul(x);
+            }
+        }
+        Ok(Self {
+            lambda: found.lambda.clone(),
+            damping,
+            laws: constituents.iter().map(|c| c.law).collect(),
+            push: DMatrix::from_fn(n, constituents.len(), |j, c| dot(&found.shapes[j], &constituents[c].force)),
+            seen,
+            rest,
+            rates: rows.iter().map(|r| matches!(r, Row::Current(_) | Row::Signal(Signal::Rate(..)))).collect(),
+            conducted: rows.iter().map(conducted).collect(),
+            stir,
+        })
+    }
+
+    /// Magnitudes of what modes and the rest bring to a row, added up: what its value is small against where they cancel.
+    pub(super) fn reach(&self, s: Complex<f64>, row: usize) -> f64 {
+        let factors: Vec<f64> = self.laws.iter().map(|law| law.factor(s).norm()).collect();
+        let rest: f64 = factors.iter().enumerate().map(|(c, f)| f * self.rest[(row, c)].abs()).sum();
+        let mode = |j: usize| {
+            let force: f64 = factors.iter().enumerate().map(|(c, f)| f * self.push[(j, c)].abs()).sum();
+            let stiff = s * s + s * self.damping[(j, j)] + self.lambda[j];
+            self.seen[(row, j)].abs() * force / stiff.norm()
+        };
+        let level = rest + (0..self.lambda.len()).map(mode).sum::<f64>();
+        if self.rates[row] { s.norm() * level + self.conducted[row].abs() } else { level }
+    }
+
+    /// Nothing damps any of its modes.
+    pub(super) fn undamped(&self) -> bool {
+        self.damping.iter().all(|d| *d == 0.0)
+    }
+
+    /// Each row for a unit e^(st) of the drive; none at a pole.
+    pub(super) fn at(&self, s: Complex<f64>) -> Option<Vec<Complex<f64>>> {
+        crate::budget::check();
+        let n = self.lambda.len();
+        let factors: Vec<Complex<f64>> = self.laws.iter().map(|law| law.factor(s)).collect();
+        let force = DVector::from_fn(n, |j, _| factors.iter().zip(self.push.row(j).iter()).map(|(f, b)| f * b).sum());
+        let shares: DVector<Complex<f64>> = if self.undamped() {
+            DVector::from_fn(n, |j, _| force[j] / (s * s + self.lambda[j]))
+        } else {
+            let own = |j, k| if j == k { s * s + self.lambda[j] } else { Complex::from(0.0) };
+            DMatrix::from_fn(n, n, |j, k| own(j, k) + s * self.damping[(j, k)]).lu().solve(&force)?
+        };
+        let value = |r: usize| {
+            let modes: Complex<f64> = (0..n).map(|j| shares[j] * self.seen[(r, j)]).sum();
+            let rest: Complex<f64> = factors.iter().enumerate().map(|(c, f)| f * self.rest[(r, c)]).sum();
+            let level = modes + rest;
+            if self.rates[r] { s * level + self.conducted[r] } else { level }
+        };
+        let values: Vec<Complex<f64>> = (0..self.rates.len()).map(value).collect();
+        values.iter().all(|v| v.re.is_finite() && v.im.is_finite()).then_some(values)
+    }
+}
+
+/// z of each part of the push.
+fn rests(exact: &Exact<'_>, found: &Modes, parts: &[Constituent]) -> Result<Vec<Vec<Pose>>, AnalysisError> {
+    let system = exact.system();
+    let model = &system.model;
+    let highest = found.lambda.last().map_or(0.0, |l| l.abs());
+    let mut shift = 0.0;
+    let mut factor = exact.tangent.clone();
+    model.project_matrix(&mut factor);
+    if exact.floats || factor.factor(&model.pattern).is_err() {
+        shift = -ASIDE * ASIDE * highest;
+        factor = exact.tangent.clone();
+        add_inertia(model, -shift, 0.0, &mut factor);
+        model.project_matrix(&mut factor);
+        if let Err(pivot) = factor.factor(&model.pattern) {
+            return Err(crate::solve::SolveError::singular(system, pivot).into());
+        }
+    }
+    let mut refined = Refined::new(system, &exact.point.q, &exact.drive);
+    let rest = |part: &Constituent| {
+        crate::budget::check();
+        let mut z = part.force.clone();
+        if model.linear {
+            model.project(&mut z);
+            factor.solve(&model.pattern, &mut z);
+            model.project(&mut z);
+        } else {
+            refined.solve(&factor, shift, &mut z, ROUNDING);
+        }
+        for (x, lambda) in found.shapes.iter().zip(&found.lambda) {
+            let share = dot(x, &part.force) / (lambda - shift);
+            z.iter_mut().zip(x).for_each(|(z, x)| *z -= x * share);
+        }
+        z
+    };
+    Ok(parts.iter().map(rest).collect())
+}
+
+fn dot(a: &[Pose], b: &[Pose]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a.dot(b)).sum()
+}

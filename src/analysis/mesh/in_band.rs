@@ -1,0 +1,145 @@
+//! The mesh for a frequency response: it is compared with that of twice the segments at frequencies over the band, and so are the
+//! frequencies of the modes within it.
+//!
+//! What is off by e is either a value or the frequency at which it stands. Next to a sharp resonance a small error of its frequency
+//! changes the value there at once, and next to a zero of the curve the value itself is nothing; so the error of a value H is taken
+//! relative to
+//! ```text
+//! |H| + |dH/d ln f|
+//! ```
+//! which is e for a curve that is e too high, and e too for one that is shifted by the share e. Frequencies next to a resonance of the
+//! first mesh are left out: what is there is known from the frequency of the mode.
+
+use super::super::harmonic::exact::Exact;
+use super::super::harmonic::{HarmonicOptions, modal};
+use super::super::{AnalysisError, PortVoltages};
+use super::{chosen, frequency_outputs, meshed, on, told_of_static};
+use crate::analysis::modes::modes;
+use crate::compile::Compiled;
+use crate::discretize::DiscretizeError;
+use crate::refine::counted;
+use crate::refine::doubling::{self, Output};
+use crate::refine::model_order::{self, Aim, ModelOrder};
+use nalgebra::Complex;
+use std::f64::consts::TAU;
+
+/// Frequencies that are compared.
+const COMPARED: usize = 24;
+/// Relative step over which the slope is taken.
+const STEP: f64 = 1e-4;
+/// Frequencies this near to a resonance are left out, as a share.
+const NEAR: f64 = 0.02;
+/// Signals that are compared at most, and modes.
+const MOST_SIGNALS: usize = 32;
+const MOST_MODES: usize = 64;
+/// Sizes below this share of the largest of a signal over the band are errors of that.
+const SMALL: f64 = 1e-9;
+
+/// The model on the mesh for a response.
+pub(in crate::analysis) fn fitted(compiled: &Compiled, options: &HarmonicOptions) -> Result<Compiled, AnalysisError> {
+    let fewer =
+        HarmonicOptions { signals: options.signals.iter().take(MOST_SIGNALS).cloned().collect(), ..options.clone() };
+    // every name is looked up once, whatever is compared
+    let exact = Exact::new(compiled, options)?;
+    drop(exact);
+    let order = order(compiled, &fewer)?;
+    let mut fitted = on(compiled, order)?;
+    let point = Exact::new(&fitted, options)?.into_point();
+    let (_, told) = told_of_static(&fitted, point);
+    fitted.warnings.items.extend(told);
+    Ok(fitted)
+}
+
+fn order(compiled: &Compiled, options: &HarmonicOptions) -> Result<ModelOrder, AnalysisError> {
+    if compiled.structure.beams.is_empty() {
+        return Ok(ModelOrder { estimated_error: Some(0.0), ..compiled.order.clone() });
+    }
+    let given = chosen(compiled);
+    let start = if given || compiled.options.band.is_some() {
+        compiled.order.segments.clone()
+    } else {
+        for_band(compiled, options)?
+    };
+    let mut sample: Option<Sample> = None;
+    let mut analyse = |segments: &[usize]| {
+        let model = meshed(compiled, segments)?;
+        let sample = match &sample {
+            Some(known) => known,
+            None => sample.insert(Sample::new(&model, options)?),
+        };
+        sample.outputs(&model, options)
+    };
+    match given {
+        true => doubling::estimate(&compiled.options, start, &mut analyse),
+        false => doubling::fit(&compiled.structure, &compiled.options, start, &mut analyse),
+    }
+}
+
+/// The mesh for the modes up to the end of the band, about the drawing.
+fn for_band(compiled: &Compiled, options: &HarmonicOptions) -> Result<Vec<usize>, AnalysisError> {
+    let detail = |error: DiscretizeError| AnalysisError::NotConverged { detail: error.to_string() };
+    let tolerances = vec![counted::SAFETY * compiled.options.tol; MOST_MODES];
+    let aim = Aim { band: options.to, tolerances, rigid: false };
+    let order = model_order::choose_for(&compiled.structure, &compiled.options, &aim).map_err(detail)?;
+    Ok(order.segments.iter().zip(&compiled.order.segments).map(|(a, b)| *a.max(b)).collect())
+}
+
+/// Where meshes are compared.
+struct Sample {
+    frequencies: Vec<f64>,
+    modes: usize,
+}
+
+impl Sample {
+    fn new(model: &Compiled, options: &HarmonicOptions) -> Result<Self, AnalysisError> {
+        let mut exact = Exact::new(model, options)?;
+        let count = modal::below(&exact, TAU * options.to);
+        let modes = if count <= MOST_MODES { count } else { 0 };
+        let last = (COMPARED - 1) as f64;
+        let at = |k: usize| options.from * (options.to / options.from).powf(k as f64 / last);
+        let mut frequencies: Vec<f64> = (0..COMPARED).map(at).collect();
+        let near =
+            |f: f64| modal::below(&exact, TAU * f * (1.0 + NEAR)) != modal::below(&exact, TAU * f * (1.0 - NEAR));
+        let apart: Vec<f64> = frequencies.iter().copied().filter(|f| !near(*f)).collect();
+        if !apart.is_empty() {
+            frequencies = apart;
+        }
+        frequencies.retain(|f| exact.at(Complex::new(0.0, TAU * f)).is_some());
+        Ok(Self { frequencies, modes })
+    }
+
+    fn outputs(&self, model: &Compiled, options: &HarmonicOptions) -> Result<Vec<Output>, AnalysisError> {
+        let mut exact = Exact::new(model, options)?;
+        let mut outputs = self.of_modes(model, &options.voltages)?;
+        let mut values: Vec<Vec<(Complex<f64>, f64)>> = Vec::new();
+        for frequency in &self.frequencies {
+            let s = Complex::new(0.0, TAU * frequency);
+            let pair = exact.at(s).zip(exact.at(s * (1.0 + STEP)));
+            values.push(match pair {
+                Some((here, there)) => {
+                    let one = |(a, b): (&Complex<f64>, &Complex<f64>)| (*a, a.norm() + (b - a).norm() / STEP);
+                    here.iter().zip(&there).map(one).collect()
+                }
+                None => vec![(Complex::new(f64::NAN, f64::NAN), 1.0); exact.rows.len()],
+            });
+        }
+        for row in 0..exact.rows.len() {
+            let most = values.iter().map(|v| v[row].1).filter(|s| s.is_finite()).fold(0.0, f64::max);
+            for value in &values {
+                let (value, size) = value[row];
+                let scale = size.max(SMALL * most).max(f64::MIN_POSITIVE);
+                outputs.extend([Output { value: value.re, scale }, Output { value: value.im, scale }]);
+            }
+        }
+        Ok(outputs)
+    }
+
+    fn of_modes(&self, model: &Compiled, voltages: &PortVoltages) -> Result<Vec<Output>, AnalysisError> {
+        if self.modes == 0 {
+            return Ok(Vec::new());
+        }
+        let mut found = frequency_outputs(&modes(model, self.modes, voltages)?, self.modes);
+        found.resize(self.modes, Output { value: f64::NAN, scale: 1.0 });
+        Ok(found)
+    }
+}
