@@ -275,6 +275,11 @@ fn analyses_take_the_same_options() {
         let mut words = vec![command.to_owned(), "c.net".into()];
         match command {
             "tran" => words.extend(["--stop", "1u"].into_iter().filter(|_| about.name != "stop").map(str::to_owned)),
+            "ac" => {
+                words.extend(["--drive".to_owned(), "b.fy".into(), "--by-modes".into()]);
+                let band = [("from", "1"), ("to", "2")].into_iter().filter(|(name, _)| *name != about.name);
+                words.extend(band.flat_map(|(name, value)| [format!("--{name}"), value.to_owned()]));
+            }
             "path" => words.extend(["--along".to_owned(), "loads=0:1".into()]),
             "chart" => words.extend(["--signals".to_owned(), "b.x".into()]),
             _ => {}

@@ -26,7 +26,7 @@ const MOST_NAMED: usize = 12;
 /// Signals: those of `tran` over the unit of the drive, and PORT.i [A], the current into a port.
 /// JSON: "frequencies_hz"; "signals": by name "re" and "im", null where an undamped resonance has no bound; "units" by name;
 /// "at_rest" by name; "poles" and, by name, "zeros": "re", "im" [rad/s], "frequency_hz", "quality" (null: undamped), "width_hz";
-/// "points_added" about resonances; "modes" and "modal_error" with --by-modes.
+/// "points_added" about resonances and zeros; "modes" and "modal_error" with --by-modes.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     bimorph ac stage.net --drive c.fx --signals c.x,c.y --from 10k --to 1M --out stage.png\n  \
@@ -54,7 +54,7 @@ pub(crate) struct Ac {
     #[arg(long, value_name = "HZ", value_parser = value::number, allow_negative_numbers = true)]
     to: f64,
 
-    /// Frequencies of the even grid, both ends included; more are added about resonances
+    /// Frequencies of the even grid, both ends included; more are added about resonances and zeros
     #[arg(long, short = 'n', default_value_t = AC_POINTS.count())]
     points: usize,
 
@@ -66,7 +66,7 @@ pub(crate) struct Ac {
     #[arg(long)]
     linear_scale: bool,
 
-    /// No points about resonances: exactly those of the even grid
+    /// No points about resonances and zeros: exactly those of the even grid
     #[arg(long)]
     even: bool,
 
@@ -74,7 +74,7 @@ pub(crate) struct Ac {
     #[arg(long)]
     by_modes: bool,
 
-    /// Of --by-modes: how many modes, from the lowest [default: those to twice the highest frequency]
+    /// Of a sum over modes: how many, from the lowest [default: those to twice the highest frequency]
     #[arg(long, value_name = "N", requires = "by_modes")]
     modes: Option<usize>,
 
@@ -226,6 +226,12 @@ fn quotient(value: f64, unit: &str) -> String {
     format!("{scaled:.digits$} {name}{unit}")
 }
 
+/// Four digits.
+fn four(x: f64) -> String {
+    let digits = (3 - x.abs().max(1e-3).log10().floor() as i32).clamp(0, 6) as usize;
+    format!("{x:.digits$}")
+}
+
 fn size([re, im]: [f64; 2]) -> f64 {
     re.hypot(im)
 }
@@ -296,7 +302,7 @@ fn text(result: &HarmonicResult) -> String {
     }
     let _ = write!(text, "\n{} frequencies", result.frequencies_hz.len());
     if result.added > 0 {
-        let _ = write!(text, ", {} of them added about resonances", result.added);
+        let _ = write!(text, ", {} of them added about resonances and zeros", result.added);
     }
     if let (Some(error), Some(modes)) = (result.modal_error, result.modes) {
         let _ = write!(text, "; a sum over {modes} modes, within {error:.1e} of the exact response");
@@ -318,7 +324,7 @@ fn resonances(result: &HarmonicResult, poles: &[Root]) -> String {
         let rows: Vec<Vec<String>> = (ringing.iter().take(MOST_NAMED))
             .map(|pole| {
                 let own = pole.im / TAU;
-                let q = pole.quality().map_or("undamped".into(), |q| format!("{q:.4}"));
+                let q = pole.quality().map_or("undamped".into(), four);
                 let (height, phase) = match (pole.quality(), nearest(result, 0, own)) {
                     (Some(_), v) if size(v).is_finite() => (quotient(size(v), &first.unit), degrees(v)),
                     _ => ("no bound".into(), "–".into()),
@@ -343,11 +349,11 @@ fn zero(root: &Root) -> String {
     match root.quality() {
         None => own,
         Some(_) if root.im == 0.0 => {
-            format!("{own} ({} real)", if root.re > 0.0 { "right, " } else { "left, " }.trim_end_matches(", "))
+            format!("{own} (real, {} half plane)", if root.re > 0.0 { "right" } else { "left" })
         }
         Some(q) => {
             let side = if root.re > 0.0 { ", right half plane" } else { "" };
-            format!("{own} (Q {q:.4}{side})")
+            format!("{own} (Q {}{side})", four(q))
         }
     }
 }

@@ -15,6 +15,7 @@
 //! | [`contact`] | pressure between surfaces that touch |
 //! | [`facing`] | two facing beams: pressure along a gap that varies over their length |
 //! | [`network`] | potentials of a resistive network driven by ports and sources |
+//! | `laplacian` | potentials in a network of conductors |
 //! | [`thermal`] | mean temperature rise of beams that carry current |
 //! | [`lag`] | how a rise lags behind its steady value |
 //! | [`drive`] | ports → gap voltages and free strains, at a time within a step |
@@ -33,6 +34,7 @@ pub mod energy;
 pub mod facing;
 pub mod inputs;
 pub mod lag;
+mod laplacian;
 pub mod network;
 mod pull;
 pub mod stop;

@@ -2,9 +2,13 @@
 //!
 //! Quasi-static: a displacement current is taken to flow without a voltage drop in the mechanism's own resistances, whose
 //! RC times (10 kΩ × 1 pF = 10 ns) are far below mechanical ones. Then every potential is a fixed linear function of the
-//! source voltages, found once by modified nodal analysis (Ho, Ruehli, Brennan 1975), and by reciprocity the same numbers
-//! divide displacement currents among the ports.
+//! source voltages, found once by nodal analysis, and by reciprocity the same numbers divide displacement currents among the ports.
+//!
+//! Ideal sources form a forest: the nodes of a tree have one unknown potential, or none where it touches ground, and differ by the sources
+//! between them. What is left is a network of conductors ([`super::laplacian`]); the current of each source is what leaves the part of its tree
+//! that hangs on it.
 
+use super::laplacian::Laplacian;
 use crate::sets::Sets;
 use nalgebra::{DMatrix, DVector};
 use thiserror::Error;
@@ -57,63 +61,182 @@ impl Circuit {
             }
         }
         for &(a, b, _) in &self.resistors {
+            crate::budget::check();
             part.join(a, b);
         }
-        let mut fixed = vec![false; self.nodes];
-        for &node in &self.grounds {
-            fixed[node] = true;
-        }
-        for (node, fix) in fixed.iter_mut().enumerate() {
-            if !part.together(node, ground) {
-                *fix = true;
-                part.join(node, ground);
-            }
-        }
-        let mut row = vec![usize::MAX; self.nodes];
-        let mut free = 0;
-        for (row, fixed) in row.iter_mut().zip(&fixed) {
-            if !fixed {
-                *row = free;
-                free += 1;
-            }
-        }
-        let size = free + self.sources.len();
-        // the matrix and its factor, the right-hand sides and the solution, potentials and conductances
+        let known = Known::new(self, &mut part, ground);
         let count = self.sources.len();
-        crate::budget::lay_out_matrix(size, 2 * size + 2 * count);
-        crate::budget::lay_out_matrix(self.nodes + count, count);
-        let mut a = DMatrix::<f64>::zeros(size, size);
-        for &(i, k, r) in &self.resistors {
-            let (i, k, g) = (row[i], row[k], 1.0 / r);
-            for (p, q) in [(i, k), (k, i)] {
-                if p != usize::MAX {
-                    a[(p, p)] += g;
-                    if q != usize::MAX {
-                        a[(p, q)] -= g;
+        let free = known.free;
+        // right-hand sides with their solutions, potentials with what sources fix of them, and conductances
+        crate::budget::lay_out_matrix(free + 2 * self.nodes + 2 * count, count);
+        let conductors = self.resistors.iter().map(|&(a, b, r)| (known.row[a], known.row[b], 1.0 / r));
+        let laplacian = Laplacian::new(free, conductors).ok_or(SourceLoop { source_index: 0 })?;
+        let mut flows = vec![0.0; free * count];
+        for &(a, b, r) in &self.resistors {
+            crate::budget::check();
+            for (from, to) in [(a, b), (b, a)] {
+                let Some(row) = known.row[from] else { continue };
+                for (s, sign) in known.offset(from) {
+                    flows[s * free + row] -= sign / r;
+                }
+                for (s, sign) in known.offset(to) {
+                    flows[s * free + row] += sign / r;
+                }
+            }
+        }
+        laplacian.solve(&mut flows);
+        let mut potential = DMatrix::zeros(self.nodes, count);
+        for node in 0..self.nodes {
+            if let Some(row) = known.row[node] {
+                for s in 0..count {
+                    potential[(node, s)] = flows[s * free + row];
+                }
+            }
+            for (s, sign) in known.offset(node) {
+                potential[(node, s)] += sign;
+            }
+        }
+        Ok(Potentials { conductance: self.conductance(&known, &potential), potential })
+    }
+
+    /// Current into the network at the plus of each source: what leaves the nodes that hang on it.
+    fn conductance(&self, known: &Known, potential: &DMatrix<f64>) -> DMatrix<f64> {
+        let count = self.sources.len();
+        // what leaves each node that a source touches
+        let mut place = vec![usize::MAX; self.nodes];
+        for (k, node) in known.order.iter().map(|step| step.node).enumerate() {
+            place[node] = k;
+        }
+        let mut leaves = DMatrix::<f64>::zeros(known.order.len(), count);
+        for &(a, b, r) in &self.resistors {
+            for (from, to) in [(a, b), (b, a)] {
+                if place[from] != usize::MAX {
+                    for s in 0..count {
+                        leaves[(place[from], s)] += (potential[(from, s)] - potential[(to, s)]) / r;
                     }
                 }
             }
         }
-        for (s, &(plus, minus)) in self.sources.iter().enumerate() {
-            for (node, sign) in [(Some(plus), 1.0), (minus, -1.0)] {
-                if let Some(p) = node.map(|n| row[n]).filter(|&p| p != usize::MAX) {
-                    a[(p, free + s)] -= sign;
-                    a[(free + s, p)] += sign;
+        let mut conductance = DMatrix::zeros(count, count);
+        for (k, step) in known.order.iter().enumerate().rev() {
+            let row = leaves.row(k).into_owned();
+            if let Some((source, sign, parent)) = step.by {
+                conductance.set_row(source, &(&row * sign));
+                if let Some(parent) = parent.map(|node| place[node]).filter(|k| *k != usize::MAX) {
+                    let mut above = leaves.row_mut(parent);
+                    above += row;
                 }
             }
         }
-        let mut rhs = DMatrix::<f64>::zeros(size, count);
-        for s in 0..count {
-            rhs[(free + s, s)] = 1.0;
+        conductance
+    }
+}
+
+/// A node that a source touches, reached from the one before it.
+struct Step {
+    node: usize,
+    /// The source that it hangs on, 1 where it is at its plus and −1 where at its minus, and the node at the other end; none: ground.
+    by: Option<(usize, f64, Option<usize>)>,
+}
+
+/// What sources say of potentials: nodes that they join have one unknown between them, and differ by the sources in between.
+struct Known {
+    /// The unknown that a node's potential stands on; none: it is at ground but for sources.
+    row: Vec<Option<usize>>,
+    /// Number of unknowns.
+    free: usize,
+    /// Nodes that sources touch, each after the one that it hangs on.
+    order: Vec<Step>,
+    /// For each node that a source touches the sources between it and where its unknown is, with signs, in `sources`.
+    offsets: Vec<(usize, usize)>,
+    sources: Vec<(usize, f64)>,
+}
+
+impl Known {
+    /// Of a circuit whose parts are joined in `part`; one that nothing ties to ground has its first node there.
+    fn new(circuit: &Circuit, part: &mut Sets, ground: usize) -> Self {
+        let nodes = circuit.nodes;
+        let mut grounded = vec![false; nodes];
+        for &node in &circuit.grounds {
+            grounded[node] = true;
         }
-        let solution = if size == 0 { rhs } else { a.lu().solve(&rhs).ok_or(SourceLoop { source_index: 0 })? };
-        let mut potential = DMatrix::zeros(self.nodes, count);
-        for (node, &row) in row.iter().enumerate() {
-            if row != usize::MAX {
-                potential.set_row(node, &solution.row(row));
+        for (node, at_ground) in grounded.iter_mut().enumerate() {
+            if !part.together(node, ground) {
+                *at_ground = true;
+                part.join(node, ground);
             }
         }
-        Ok(Potentials { potential, conductance: solution.rows(free, count).into_owned() })
+        // the sources at each node, ground last
+        let index = |node: Option<usize>| node.filter(|n| !grounded[*n]).unwrap_or(nodes);
+        let mut first = vec![0usize; nodes + 2];
+        let ends = |&(plus, minus): &(usize, Option<usize>)| [index(Some(plus)), index(minus)];
+        for end in circuit.sources.iter().flat_map(ends) {
+            first[end + 1] += 1;
+        }
+        for k in 0..=nodes {
+            first[k + 1] += first[k];
+        }
+        let (mut next, mut at) = (first.clone(), vec![0usize; 2 * circuit.sources.len()]);
+        for (s, source) in circuit.sources.iter().enumerate() {
+            for end in ends(source) {
+                at[next[end]] = s;
+                next[end] += 1;
+            }
+        }
+        let mut known = Self {
+            row: vec![None; nodes],
+            free: 0,
+            order: Vec::new(),
+            offsets: vec![(0, 0); nodes],
+            sources: Vec::new(),
+        };
+        let mut reached = grounded.clone();
+        reached.push(true);
+        let mut waiting: Vec<usize> = Vec::new();
+        let spread = |known: &mut Self, reached: &mut Vec<bool>, waiting: &mut Vec<usize>, from: usize| {
+            waiting.push(from);
+            while let Some(node) = waiting.pop() {
+                crate::budget::check();
+                for &s in &at[first[node]..first[node + 1]] {
+                    let [plus, minus] = ends(&circuit.sources[s]);
+                    let (other, sign) = if plus == node { (minus, -1.0) } else { (plus, 1.0) };
+                    if reached[other] {
+                        continue;
+                    }
+                    reached[other] = true;
+                    let begin = known.sources.len();
+                    if node < nodes {
+                        let (from, to) = known.offsets[node];
+                        crate::budget::lay_out((to - from + 1) * 16);
+                        known.sources.extend_from_within(from..to);
+                        known.row[other] = known.row[node];
+                    }
+                    known.sources.push((s, sign));
+                    known.offsets[other] = (begin, known.sources.len());
+                    known.order.push(Step { node: other, by: Some((s, sign, (node < nodes).then_some(node))) });
+                    waiting.push(other);
+                }
+            }
+        };
+        spread(&mut known, &mut reached, &mut waiting, nodes);
+        for node in 0..nodes {
+            if !reached[node] {
+                reached[node] = true;
+                known.row[node] = Some(known.free);
+                known.free += 1;
+                if first[node] < first[node + 1] {
+                    known.order.push(Step { node, by: None });
+                    spread(&mut known, &mut reached, &mut waiting, node);
+                }
+            }
+        }
+        known
+    }
+
+    /// The sources that a node's potential lies above its unknown, with signs.
+    fn offset(&self, node: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
+        let (from, to) = self.offsets[node];
+        self.sources[from..to].iter().copied()
     }
 }
 
@@ -141,6 +264,91 @@ mod tests {
         assert!((p.potential[(1, 0)] - 0.75).abs() < 1e-14);
         assert!((p.conductance[(0, 0)] - 0.25e-3).abs() < 1e-17);
         assert_eq!(p.potential[(3, 0)], 0.0);
+    }
+
+    /// Sources in a chain above ground, one that floats between resistors, and one to ground the other way round: potentials and currents as
+    /// by modified nodal analysis (Ho, Ruehli, Brennan 1975) with a dense matrix.
+    #[test]
+    fn like_modified_nodal_analysis() {
+        let circuit = Circuit {
+            nodes: 9,
+            resistors: vec![
+                (1, 2, 1e3),
+                (2, 3, 2e3),
+                (4, 5, 500.0),
+                (5, 0, 300.0),
+                (3, 6, 50.0),
+                (6, 1, 7e3),
+                (7, 8, 1e3),
+            ],
+            sources: vec![(1, None), (2, Some(1)), (3, Some(4)), (0, Some(5)), (7, None)],
+            grounds: vec![8],
+        };
+        let (n, count) = (circuit.nodes, circuit.sources.len());
+        let mut a = DMatrix::<f64>::zeros(n + count, n + count);
+        for &(i, k, r) in &circuit.resistors {
+            for (p, q) in [(i, k), (k, i)] {
+                a[(p, p)] += 1.0 / r;
+                a[(p, q)] -= 1.0 / r;
+            }
+        }
+        for (s, &(plus, minus)) in circuit.sources.iter().enumerate() {
+            for (node, sign) in [(Some(plus), 1.0), (minus, -1.0)] {
+                if let Some(node) = node {
+                    a[(node, n + s)] -= sign;
+                    a[(n + s, node)] += sign;
+                }
+            }
+        }
+        for k in 0..n + count {
+            a[(8, k)] = if k == 8 { 1.0 } else { 0.0 };
+        }
+        let mut rhs = DMatrix::<f64>::zeros(n + count, count);
+        (0..count).for_each(|s| rhs[(n + s, s)] = 1.0);
+        let dense = a.lu().solve(&rhs).unwrap();
+        let found = circuit.solve().unwrap();
+        assert!((&found.potential - dense.rows(0, n)).amax() < 1e-12, "{} {}", found.potential, dense.rows(0, n));
+        let currents = dense.rows(n, count);
+        assert!((&found.conductance - currents).amax() < 1e-12 * currents.amax(), "{} {currents}", found.conductance);
+    }
+
+    /// A ladder of 100 000 nodes, 1 kΩ along and 1 MΩ to ground: far from its end it has its characteristic resistance
+    /// R/2 + √(R²/4 + R·G⁻¹).
+    #[test]
+    fn a_long_ladder() {
+        let n = 100_000;
+        let mut resistors: Vec<(usize, usize, f64)> = (0..n - 1).map(|k| (k, k + 1, 1e3)).collect();
+        resistors.extend((1..n).map(|k| (k, n, 1e6)));
+        let circuit = Circuit { nodes: n + 1, resistors, sources: vec![(0, Some(n))], grounds: vec![n] };
+        let found = circuit.solve().unwrap();
+        let characteristic = 500.0 + (500.0f64.powi(2) + 1e9).sqrt();
+        assert!((found.conductance[(0, 0)] * characteristic - 1.0).abs() < 1e-12);
+        let ratio = 1.0 - 1e3 / characteristic;
+        assert!((found.potential[(50, 0)] - ratio.powi(50)).abs() < 1e-12);
+    }
+
+    /// A grid of 300 × 300 nodes of 1 Ω with a volt between two opposite corners: by symmetry the other diagonal is at half of it, and as much
+    /// flows into one corner as out of the other.
+    #[test]
+    fn a_grid() {
+        let side = 300;
+        let at = |x: usize, y: usize| y * side + x;
+        let along = (0..side).flat_map(|y| (0..side - 1).map(move |x| (at(x, y), at(x + 1, y), 1.0)));
+        let across = (0..side - 1).flat_map(|y| (0..side).map(move |x| (at(x, y), at(x, y + 1), 1.0)));
+        let corner = at(side - 1, side - 1);
+        let circuit = Circuit {
+            nodes: side * side,
+            resistors: along.chain(across).collect(),
+            sources: vec![(0, Some(corner))],
+            grounds: vec![corner],
+        };
+        let found = circuit.solve().unwrap();
+        assert!((0..side).all(|x| (found.potential[(at(x, side - 1 - x), 0)] - 0.5).abs() < 1e-11));
+        // two resistors leave the corner
+        let out = 2.0 * (1.0 - found.potential[(1, 0)]);
+        assert!((found.conductance[(0, 0)] / out - 1.0).abs() < 1e-12);
+        let into = 2.0 * found.potential[(at(side - 2, side - 1), 0)];
+        assert!((out / into - 1.0).abs() < 1e-9);
     }
 
     /// Two ideal sources in parallel contradict each other and are refused by index.

@@ -14,8 +14,10 @@
 //! With a time constant the rise follows its steady value: [`super::lag`].
 
 use super::inputs::Input;
+use super::laplacian::Laplacian;
 use super::network::Potentials;
-use nalgebra::{DMatrix, DVector};
+use crate::sets::Sets;
+use nalgebra::DVector;
 use thiserror::Error;
 
 /// A conductor of heat and current between two nodes.
@@ -74,20 +76,21 @@ impl Heating {
         sink: &[bool],
     ) -> Result<Self, NoHeatSink> {
         let driven = potentials.potential.ncols();
-        let node_rise = Conduction::new(&heaters, sink)?;
-        crate::budget::lay_out_matrix(heaters.len(), sources.saturating_mul(sources).saturating_add(driven));
+        let conduction = Conduction::new(&heaters, sink)?;
+        crate::budget::lay_out_matrix(heaters.len(), sources.saturating_mul(sources).saturating_add(2 * driven));
         let currents: Vec<DVector<f64>> =
             heaters.iter().map(|h| potentials.difference(h.a, h.b) / h.resistance).collect();
         let mut form = vec![0.0; heaters.len() * sources * sources];
-        for k in 0..heaters.len() {
-            crate::budget::check();
-            for (c, source) in heaters.iter().enumerate() {
-                let per_watt = node_rise.per_watt(&heaters, k, c);
-                for i in 0..driven {
-                    for j in 0..driven {
-                        form[(k * sources + i) * sources + j] +=
-                            per_watt * source.resistance * currents[c][i] * currents[c][j];
-                    }
+        let mut watts = vec![0.0; heaters.len()];
+        for i in 0..driven {
+            for j in 0..=i {
+                crate::budget::check();
+                for ((watts, h), current) in watts.iter_mut().zip(&heaters).zip(&currents) {
+                    *watts = h.resistance * current[i] * current[j];
+                }
+                for (k, rise) in conduction.rises(&heaters, &watts).into_iter().enumerate() {
+                    form[(k * sources + i) * sources + j] = rise;
+                    form[(k * sources + j) * sources + i] = rise;
                 }
             }
         }
@@ -102,8 +105,10 @@ impl Heating {
         {
             for (i, input) in inputs.iter().enumerate() {
                 let Input::Heat { heater } = input else { continue };
-                for k in 0..self.heaters.len() {
-                    heat[k * inputs.len() + i] = conduction.per_watt(&self.heaters, k, *heater);
+                let mut watts = vec![0.0; self.heaters.len()];
+                watts[*heater] = 1.0;
+                for (k, rise) in conduction.rises(&self.heaters, &watts).into_iter().enumerate() {
+                    heat[k * inputs.len() + i] = rise;
                 }
             }
         }
@@ -171,24 +176,24 @@ impl Heating {
     }
 }
 
-/// Rise of every node for each watt in each heater.
+/// Conduction of heat between nodes and to those at ambient.
 struct Conduction {
     /// Row of each node; none for one at ambient.
-    row: Vec<usize>,
-    /// Rows × heaters [K/W].
-    rise: DMatrix<f64>,
+    row: Vec<Option<usize>>,
+    free: usize,
+    laplacian: Laplacian,
 }
 
 impl Conduction {
     /// # Errors
     /// [`NoHeatSink`].
     fn new(heaters: &[Heater], sink: &[bool]) -> Result<Self, NoHeatSink> {
-        let mut row = vec![usize::MAX; sink.len()];
+        let mut row = vec![None; sink.len()];
         let mut free = 0;
         for h in heaters {
             for node in [h.a, h.b] {
-                if !sink[node] && row[node] == usize::MAX {
-                    row[node] = free;
+                if !sink[node] && row[node].is_none() {
+                    row[node] = Some(free);
                     free += 1;
                 }
             }
@@ -196,53 +201,38 @@ impl Conduction {
         if let Some(heater) = without_sink(heaters, sink) {
             return Err(NoHeatSink { heater });
         }
-        crate::budget::lay_out_matrix(2 * free, free + heaters.len());
-        let mut conduction = DMatrix::<f64>::zeros(free, free);
-        let mut share = DMatrix::<f64>::zeros(free, heaters.len());
-        for (k, h) in heaters.iter().enumerate() {
-            for (i, j) in [(row[h.a], row[h.b]), (row[h.b], row[h.a])] {
-                if i != usize::MAX {
-                    conduction[(i, i)] += h.conductance;
-                    share[(i, k)] += 0.5;
-                    if j != usize::MAX {
-                        conduction[(i, j)] -= h.conductance;
-                    }
-                }
-            }
-        }
-        let rise = if free == 0 {
-            share
-        } else {
-            conduction.lu().solve(&share).unwrap_or_else(|| DMatrix::zeros(free, heaters.len()))
-        };
-        Ok(Self { row, rise })
+        let conductors = heaters.iter().map(|h| (row[h.a], row[h.b], h.conductance));
+        let laplacian = Laplacian::new(free, conductors).ok_or(NoHeatSink { heater: 0 })?;
+        Ok(Self { row, free, laplacian })
     }
 
-    /// Mean rise of heater `k` for each watt in heater `source` [K/W].
-    fn per_watt(&self, heaters: &[Heater], k: usize, source: usize) -> f64 {
-        let at = |node: usize| if self.row[node] == usize::MAX { 0.0 } else { self.rise[(self.row[node], source)] };
-        let h = &heaters[k];
-        let own = if source == k { 1.0 / (12.0 * h.conductance) } else { 0.0 };
-        0.5 * (at(h.a) + at(h.b)) + own
+    /// Mean rise of each heater for the heat into each [K, W].
+    fn rises(&self, heaters: &[Heater], watts: &[f64]) -> Vec<f64> {
+        let mut rise = vec![0.0; self.free];
+        for (h, watts) in heaters.iter().zip(watts) {
+            for row in [self.row[h.a], self.row[h.b]].into_iter().flatten() {
+                rise[row] += 0.5 * watts;
+            }
+        }
+        self.laplacian.solve(&mut rise);
+        let at = |node: usize| self.row[node].map_or(0.0, |row| rise[row]);
+        let one = |(h, watts): (&Heater, &f64)| 0.5 * (at(h.a) + at(h.b)) + watts / (12.0 * h.conductance);
+        heaters.iter().zip(watts).map(one).collect()
     }
 }
 
 /// A heater of a part that holds no sink.
 fn without_sink(heaters: &[Heater], sink: &[bool]) -> Option<usize> {
-    let mut cooled = sink.to_vec();
-    loop {
-        crate::budget::check();
-        let mut changed = false;
-        for h in heaters {
-            if cooled[h.a] != cooled[h.b] {
-                (cooled[h.a], cooled[h.b]) = (true, true);
-                changed = true;
-            }
-        }
-        if !changed {
-            return heaters.iter().position(|h| !cooled[h.a]);
-        }
+    let ambient = sink.len();
+    let mut parts = Sets::new(ambient + 1);
+    for (node, _) in sink.iter().enumerate().filter(|(_, sink)| **sink) {
+        parts.join(node, ambient);
     }
+    for h in heaters {
+        crate::budget::check();
+        parts.join(h.a, h.b);
+    }
+    heaters.iter().position(|h| !parts.together(h.a, ambient))
 }
 
 #[cfg(test)]

@@ -82,7 +82,7 @@ pub static AC_POINTS: Described = Described {
     range: Range::Count(2, MOST_FREQUENCIES),
     default: Value::Count(201),
     unset: "",
-    help: "Frequencies of the even grid, both ends included; more are added about resonances",
+    help: "Frequencies of the even grid, both ends included; more are added about resonances and zeros",
 };
 
 /// `ac`: modes of a sum over modes.

@@ -122,17 +122,23 @@ impl Equilibrium {
         let mut done = Path::default();
         let mut s = 0.0;
         let mut ds = 1.0;
+        let mut free_at_first = None;
         while s < 1.0 {
             let step = f64::min(ds, 1.0 - s);
             let to = if 1.0 - s - step < 1e-12 { 1.0 } else { s + step };
             self.predict(system, path, s, to - s, q)?;
             // held where the step begins; what a wild trial holds says nothing
             let free = self.held.first().copied();
+            let from_the_first = *free_at_first.get_or_insert(free.is_some());
             match self.correct(system, path, to, &mut done) {
                 Corrected::Stable => {
                     q.copy_from_slice(&self.trial);
                     s = to;
                     ds = 2.0 * step;
+                }
+                Corrected::No if free.is_some() && !from_the_first => {
+                    // what was held at first is so no more: bent or stretched so far that rounding hides what resists
+                    return Err(self.too_far(system, s, &done, free));
                 }
                 Corrected::No if free.is_some() => {
                     // a free motion that a load excites never settles: there is no equilibrium to look for
@@ -214,6 +220,16 @@ impl Equilibrium {
             }
         }
         Corrected::No
+    }
+
+    /// A load that is far more than the part bears.
+    fn too_far(&self, system: &System, share: f64, done: &Path, at: Option<ZeroPivot>) -> SolveError {
+        let body = at.map_or(String::new(), |pivot| system.model.bodies[pivot.body].name.to_string());
+        let residual = self.residual.iter().map(|r| r.amax()).fold(0.0, f64::max);
+        let unheld = format!(
+            "; \"{body}\" is deformed so far there that rounding hides what resists it: the load is too large for this part"
+        );
+        SolveError::Lost { share, iterations: done.iterations, residual, body, unheld }
     }
 
     fn lost(&mut self, system: &System, share: f64, iterations: usize, q: &[Pose]) -> SolveError {

@@ -166,3 +166,58 @@ fn a_sweep_goes_on_past_a_bad_point() {
     assert!(ran.stderr.contains("1 without a result"), "{}", ran.stderr);
     assert!(ran.stdout.lines().last().is_some_and(|line| line.starts_with("1,1e-4,")), "{}", ran.stdout);
 }
+
+/// `ac` of a force on a mass on a spring: 1/(k − mω²) in the document, with its unit and its value at rest, the undamped pole, no zero; exact and by
+/// modes alike; the report names the resonance, and the current into the port of a plate is its capacitance's.
+#[test]
+fn frequency_response() {
+    let bench = Bench::new(&[("p.net", PLATE)]);
+    let words = "ac p.net --drive m.fx --signals m.x --from 1k --to 100k --points 51";
+    let found = bench.json(words);
+    let grid: Vec<f64> = found["frequencies_hz"].as_array().unwrap().iter().map(number).collect();
+    assert_eq!(grid.len() as u64, 51 + found["points_added"].as_u64().unwrap());
+    let own = number(&bench.json("modes p.net --count 1")["frequencies_hz"][0]);
+    let rest = number(&found["at_rest"]["m.x"]);
+    for (f, re) in grid.iter().zip(found["signals"]["m.x"]["re"].as_array().unwrap()) {
+        let exact = rest / (1.0 - (f / own).powi(2));
+        assert!((number(re) / exact - 1.0).abs() < 1e-6, "{f}");
+    }
+    assert_eq!((&found["units"]["m.x"], &found["drive_unit"]), (&"m/N".into(), &"N".into()));
+    assert_relative_eq!(number(&found["poles"][0]["frequency_hz"]), own, max_relative = 1e-9);
+    assert!(found["poles"][0]["quality"].is_null() && found["zeros"]["m.x"] == serde_json::json!([]));
+    assert!(found["modal_error"].is_null() && found["modes"].is_null());
+    let modal = bench.json(&format!("{words} --by-modes"));
+    assert!(modal["modes"] == 1 && number(&modal["modal_error"]) < 1e-9);
+    assert_eq!(bench.json(&format!("{words} --even"))["frequencies_hz"].as_array().unwrap().len(), 51);
+    let even = bench.json(&format!("{words} --even --linear-scale"));
+    assert_relative_eq!(number(&even["frequencies_hz"][1]), 1e3 + 99e3 / 50.0, max_relative = 1e-12);
+    let report = bench.run(words).stdout;
+    assert!(report.contains("undamped") && report.contains("no bound") && report.contains("added about"), "{report}");
+    // far below its resonance the current leads by a quarter turn
+    let port = bench.json("ac p.net --drive drive --port drive=1 --from 1 --to 10 --points 2");
+    let (re, im) = (&port["signals"]["drive.i"]["re"][1], &port["signals"]["drive.i"]["im"][1]);
+    assert!(number(re).abs() < 1e-9 * number(im) && number(im) > 0.0);
+}
+
+/// What `ac` cannot do is told in one line, and leaves nothing behind.
+#[test]
+fn frequency_responses_that_are_refused() {
+    let bench = Bench::new(&[("p.net", PLATE)]);
+    for (words, expected) in [
+        ("--drive m.fx --from 0 --to 1k", "--from: expected a number above 0"),
+        ("--drive m.fx --from=-1 --to 1k", "--from: expected"),
+        ("--drive m.fx --from 1 --to 1e300", "--to: expected"),
+        ("--drive m.fx --from 2k --to 1k", "above from"),
+        ("--drive m.fx --from 1 --to 1k --points 1", "--points: expected a whole number from 2"),
+        ("--drive m.fx --from 1 --to 1k --points 2000000", "--points: expected"),
+        ("--drive m.fx --from 1 --to 1k --points 1000000 --per-decade", "points: expected at most 1000000 in all"),
+        ("--drive m --from 1 --to 1k", "NODE.fx"),
+        ("--drive m.fx --signals drive.j --from 1 --to 1k", "drive"),
+        ("--drive m.fx --from 1 --to 1k --by-modes --modes 0", "--modes: expected"),
+    ] {
+        let run = bench.run(&format!("ac p.net {words} --out r.csv"));
+        assert!(run.status == 1 && run.stdout.is_empty(), "{words}");
+        assert!(run.stderr.contains(expected) && run.stderr.lines().count() <= 2, "{words}: {}", run.stderr);
+        assert!(!bench.path("r.csv").exists());
+    }
+}

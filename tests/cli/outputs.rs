@@ -10,7 +10,7 @@ const TRAN: &str = "tran c.net --set F=1u --release F --stop 8u --points 41 --si
 #[test]
 fn every_format() {
     let bench = Bench::new(&[("c.net", CANTILEVER)]);
-    for verb in ["static c.net", "modes c.net --count 2", TRAN] {
+    for verb in ["static c.net", "modes c.net --count 2", "ac c.net --drive b.fy --from 1k --to 1M --points 21", TRAN] {
         for (extension, start) in
             [("raw", "Title: c.net"), ("csv", ""), ("svg", "<svg"), ("png", "\u{fffd}PNG"), ("html", "<!doctype html>")]
         {

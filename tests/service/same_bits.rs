@@ -1,6 +1,7 @@
 //! A model on a server and the same model in process give the same bits: trials, small signals, analyses and sweeps.
 
 use super::running::{DEADLINE, PLATE, Running, bundle, start_with};
+use bimorph::analysis::harmonic::{HarmonicOptions, harmonic_fitted};
 use bimorph::analysis::integrator::Integrator;
 use bimorph::analysis::mesh::fitted_in_time;
 use bimorph::analysis::step_error::with_step_error;
@@ -139,6 +140,20 @@ fn analyses_have_the_same_bits() {
     assert_eq!(client.modes(&model, 1, &volts).expect("an answer"), ringing);
     let (_, closed) = pull_in_fitted(&here, None, 10.0).expect("one");
     assert_eq!(client.pull_in(&model, None, 10.0).expect("an answer"), closed);
+
+    let request = HarmonicOptions {
+        drive: "m.fx".into(),
+        signals: vec!["m.x".into(), "drive.i".into()],
+        from: 1e3,
+        to: 1e5,
+        points: 31,
+        voltages: volts.to_vec(),
+        ..HarmonicOptions::default()
+    };
+    for request in [HarmonicOptions { by_modes: true, ..request.clone() }, request] {
+        let (_, swung) = harmonic_fitted(&here, &request, &mut |_| true).expect("one");
+        assert_eq!(client.frequency_response(&model, &request).expect("an answer"), swung);
+    }
 
     let options = TransientOptions {
         stop: 2e-5,

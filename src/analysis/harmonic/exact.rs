@@ -21,7 +21,7 @@ pub(crate) struct Exact<'a> {
     pub(super) point: OperatingPoint,
     still: Vec<Pose>,
     pub(super) drive: Drive,
-    pub(super) tangent: BlockMatrix<f64, 3>,
+    pub(crate) tangent: BlockMatrix<f64, 3>,
     pub(super) harmonic: Harmonic,
     response: Vec<ComplexPose>,
     pub(crate) rows: Vec<Row>,
@@ -83,6 +83,11 @@ impl<'a> Exact<'a> {
         })
     }
 
+    /// Displacements and drive at the operating point.
+    pub(crate) fn about(&self) -> (&[Pose], &Drive) {
+        (&self.point.q, &self.drive)
+    }
+
     /// The operating point alone.
     pub(crate) fn into_point(mut self) -> OperatingPoint {
         self.point.sources.truncate(self.compiled.parts.system.electrics.sources());
@@ -90,7 +95,7 @@ impl<'a> Exact<'a> {
     }
 
     /// The model with the drive among its sources.
-    pub(super) fn system(&self) -> &System {
+    pub(crate) fn system(&self) -> &System {
         self.ports.system.as_deref().unwrap_or(&self.compiled.parts.system)
     }
 

@@ -18,8 +18,10 @@ pub enum Spacing {
 const ABOUT: [f64; 13] = [-8.0, -4.0, -2.0, -1.0, -0.5, -0.2, 0.0, 0.2, 0.5, 1.0, 2.0, 4.0, 8.0];
 /// The same where nothing damps it, as shares of its frequency: its height has no bound, so that it is drawn by its flanks.
 const BESIDE: [f64; 8] = [-1e-3, -1e-4, -1e-5, -1e-6, 1e-6, 1e-5, 1e-4, 1e-3];
-/// Points about one resonance at most.
-pub(super) const MOST_ABOUT: usize = ABOUT.len();
+/// Points that are added at most.
+pub(super) const MOST_ADDED: usize = 4000;
+/// Doublings of the distance from a resonance at most, on its flanks.
+const MOST_DOUBLED: i32 = 40;
 /// Nearer than this share of its frequency to an undamped resonance a value says nothing: rounding moves the resonance by as much.
 pub(super) const UNBOUNDED: f64 = 1e-9;
 /// Two frequencies nearer than this share are one.
@@ -55,19 +57,31 @@ pub(super) fn even(spacing: Spacing, points: usize, band: [f64; 2]) -> Vec<f64> 
     grid
 }
 
-/// The grid with points about each resonance within it, ascending, and how many were added.
-pub(super) fn with_resonances(mut grid: Vec<f64>, poles: &[Root], band: [f64; 2]) -> (Vec<f64>, usize) {
+/// The grid with points about each resonance and each zero within it, ascending, and how many were added: about every root those in
+/// which its shape shows, then more on its flanks until the grid is as fine.
+pub(super) fn with_roots(mut grid: Vec<f64>, roots: &[Root], band: [f64; 2]) -> (Vec<f64>, usize) {
     let before = grid.len();
-    let inside = |f: f64| f > band[0] * (1.0 + SAME) && f < band[1] * (1.0 - SAME);
-    for pole in poles.iter().filter(|pole| pole.im > 0.0) {
-        let own = pole.im / std::f64::consts::TAU;
-        let half = 0.5 * pole.width_hz();
-        let about: Vec<f64> = match pole.quality() {
-            None => BESIDE.iter().map(|share| own * (1.0 + share)).collect(),
-            Some(_) => ABOUT.iter().map(|k| own + k * half).collect(),
-        };
-        grid.extend(about.into_iter().filter(|f| *f > 0.0 && inside(*f)));
+    let ringing: Vec<(f64, &Root)> =
+        roots.iter().filter(|root| root.im > 0.0).map(|root| (root.im / std::f64::consts::TAU, root)).collect();
+    let mut more = Vec::new();
+    for (own, root) in &ringing {
+        let half = 0.5 * root.width_hz();
+        match root.quality() {
+            None => more.extend(BESIDE.iter().map(|share| own * (1.0 + share))),
+            Some(_) => more.extend(ABOUT.iter().map(|k| own + k * half)),
+        }
     }
+    for (own, root) in &ringing {
+        let after = grid.partition_point(|f| f < own).clamp(1, before - 1);
+        let spacing = grid[after] - grid[after - 1];
+        let first =
+            root.quality().map_or(BESIDE[BESIDE.len() - 1] * own, |_| 0.5 * root.width_hz() * ABOUT[ABOUT.len() - 1]);
+        let distances = (1..=MOST_DOUBLED).map(|k| first * 2f64.powi(k)).take_while(|d| *d < spacing);
+        more.extend(distances.flat_map(|d| [own - d, own + d]));
+    }
+    more.retain(|f| *f > band[0] * (1.0 + SAME) && *f < band[1] * (1.0 - SAME));
+    more.truncate(MOST_ADDED);
+    grid.append(&mut more);
     grid.sort_by(f64::total_cmp);
     grid.dedup_by(|b, a| *b - *a <= SAME * *a);
     let added = grid.len().saturating_sub(before);
@@ -101,9 +115,9 @@ mod tests {
     fn resonances_get_points() {
         let sharp = Root { re: -TAU * 50.0, im: TAU * 1e5 };
         let bare = Root { re: 0.0, im: TAU * 2e5 };
-        let (grid, added) = with_resonances(even(Spacing::Logarithmic, 11, [1e3, 1e6]), &[sharp, bare], [1e3, 1e6]);
-        // one of the 13 about the sharp one is on the grid already
-        assert_eq!((grid.len(), added), (11 + 12 + 8, 20));
+        let (grid, added) = with_roots(even(Spacing::Logarithmic, 11, [1e3, 1e6]), &[sharp, bare], [1e3, 1e6]);
+        // 13 about the sharp one and 8 beside the other; flanks of 8·2^k times 50 Hz and 2^k times 200 Hz up to the step of the grid
+        assert_eq!((grid.len(), added), (11 + added, 13 + 8 + 2 * (7 + 9) - 1));
         assert!(grid.windows(2).all(|w| w[0] < w[1]));
         assert!(grid.iter().any(|f| (f / 100_050.0 - 1.0).abs() < 1e-12), "a half-power point");
         assert!(!grid.iter().any(|f| unbounded(*f, &[sharp, bare])) && unbounded(2e5, &[sharp, bare]));

@@ -33,9 +33,9 @@ pub const MOST_VALUES: usize = 50_000_000;
 /// Modes within the band beyond which poles, zeros and points about resonances are left out.
 const MOST_MODES: usize = 100;
 /// Modes are known to this multiple of the band, where they are not too many.
-const BEYOND: f64 = 2.0;
+pub(crate) const BEYOND: f64 = 2.0;
 /// Modes beyond those, so that the last is apart from what follows.
-const GUARDS: usize = 2;
+pub(crate) const GUARDS: usize = 2;
 /// Signals whose zeros are looked for at most.
 const MOST_ZEROS: usize = 8;
 /// Frequencies at which a sum over modes is compared with the exact response.
@@ -58,7 +58,7 @@ pub struct HarmonicOptions {
     pub points: usize,
     /// How the even grid lies.
     pub spacing: Spacing,
-    /// No points about resonances: the even grid alone.
+    /// No points about resonances and zeros: the even grid alone.
     pub even: bool,
     /// As a sum over modes with static correction instead of exactly.
     pub by_modes: bool,
@@ -96,7 +96,7 @@ pub struct HarmonicResult {
     pub signals: Vec<SignalResponse>,
     /// Poles within the band; none where they were not looked for.
     pub poles: Option<Vec<Root>>,
-    /// Points that were added about resonances.
+    /// Points that were added about resonances and zeros.
     pub added: usize,
     /// Modes of the sum; none: exact.
     pub modes: Option<usize>,
@@ -154,7 +154,7 @@ impl HarmonicOptions {
     /// Bytes that the numbers of the answer take at most, as doubles.
     pub fn bytes(&self) -> usize {
         let even = grid::count(self.spacing, self.points, [self.from, self.to]).unwrap_or(usize::MAX);
-        let more = if self.even { 0 } else { grid::MOST_ABOUT * MOST_MODES };
+        let more = if self.even { 0 } else { grid::MOST_ADDED };
         even.saturating_add(more).saturating_mul(1 + 2 * self.signals.len().max(1)).saturating_mul(8)
     }
 }
@@ -225,8 +225,19 @@ pub fn harmonic(
         poles
     });
     let known = poles.clone().unwrap_or_default();
+    let rows = exact.rows.len();
+    if rows > MOST_ZEROS && poles.is_some() {
+        warnings.push(format!("zeros are those of the first {MOST_ZEROS} signals"));
+    }
+    let zeros: Vec<Option<Vec<Root>>> = (0..rows)
+        .map(|row| {
+            let sum = sum.as_ref().filter(|_| poles.is_some() && row < MOST_ZEROS)?;
+            Some(roots::zeros(&mut exact, sum, row, band))
+        })
+        .collect();
     let even = grid::even(options.spacing, options.points, band);
-    let (frequencies_hz, added) = if options.even { (even, 0) } else { grid::with_resonances(even, &known, band) };
+    let shaped = roots::shaping(&known, &zeros);
+    let (frequencies_hz, added) = if options.even { (even, 0) } else { grid::with_roots(even, &shaped, band) };
     crate::budget::lay_out_matrix(frequencies_hz.len(), 2 * exact.rows.len());
     let modal_error = match (&sum, options.by_modes) {
         (Some(sum), true) => Some(deviation(&mut exact, sum, &frequencies_hz, &known)),
@@ -239,16 +250,6 @@ pub fn harmonic(
         ));
     }
     let at_rest = if exact.floats { None } else { exact.at(Complex::from(0.0)) };
-    let rows = exact.rows.len();
-    if rows > MOST_ZEROS && poles.is_some() {
-        warnings.push(format!("zeros are those of the first {MOST_ZEROS} signals"));
-    }
-    let zeros: Vec<Option<Vec<roots::Root>>> = (0..rows)
-        .map(|row| {
-            let sum = sum.as_ref().filter(|_| poles.is_some() && row < MOST_ZEROS)?;
-            Some(roots::zeros(&mut exact, sum, row, band))
-        })
-        .collect();
     let columns = exact.shown.iter().cloned().zip(values).zip(zeros).enumerate();
     let signals = columns.map(|(row, (((name, unit), values), zeros))| SignalResponse {
         name,

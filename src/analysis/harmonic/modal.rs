@@ -95,7 +95,7 @@ pub(crate) fn below(exact: &Exact<'_>, omega: f64) -> usize {
 
 /// The sum, with what each row sees of each mode.
 #[derive(Debug, Clone)]
-pub(super) struct Sum {
+pub(crate) struct Sum {
     /// λ of each mode, ascending [rad²/s²].
     pub(super) lambda: Vec<f64>,
     /// D, modes × modes [1/s].
@@ -118,7 +118,7 @@ pub(super) struct Sum {
 
 impl Sum {
     /// Over these modes.
-    pub(super) fn new(exact: &Exact<'_>, found: &Modes) -> Result<Self, AnalysisError> {
+    pub(crate) fn new(exact: &Exact<'_>, found: &Modes) -> Result<Self, AnalysisError> {
         let (system, about) = (exact.system(), exact.perturbed());
         let model = &system.model;
         let constituents = about.constituents(exact.source());
@@ -196,7 +196,7 @@ impl Sum {
     }
 
     /// Each row for a unit e^(st) of the drive; none at a pole.
-    pub(super) fn at(&self, s: Complex<f64>) -> Option<Vec<Complex<f64>>> {
+    pub(crate) fn at(&self, s: Complex<f64>) -> Option<Vec<Complex<f64>>> {
         crate::budget::check();
         let n = self.lambda.len();
         let factors: Vec<Complex<f64>> = self.laws.iter().map(|law| law.factor(s)).collect();

@@ -24,6 +24,10 @@ const SETTLED: f64 = 1e-13;
 const ROUNDED: f64 = 1e-7;
 /// A zero further from its guess than this share is another one.
 const NEAR: f64 = 0.1;
+/// A zero within this share of the damping of a pole takes it out of the curve.
+const UNSEEN: f64 = 0.05;
+/// Shifts about which the pencil is inverted, in units of the end of the band.
+const SHIFTS: [f64; 3] = [0.37, 0.73, -0.53];
 /// Two of them that are nearer to each other than this share are one.
 const SAME: f64 = 1e-6;
 
@@ -131,6 +135,21 @@ pub(super) fn zeros(exact: &mut Exact<'_>, sum: &Sum, row: usize, band: [f64; 2]
     sorted(roots)
 }
 
+/// The poles and damped zeros that give a curve its shape: those of a signal without a zero or pole that takes it away. `zeros` by signal;
+/// a signal whose zeros are not known may see every pole.
+pub(super) fn shaping(poles: &[Root], zeros: &[Option<Vec<Root>>]) -> Vec<Root> {
+    let takes = |a: &Root, b: &Root| {
+        let size = UNSEEN * a.re.abs() + SAME * a.frequency_hz() * TAU;
+        (a.re - b.re).hypot(a.im - b.im) <= size
+    };
+    let seen =
+        |pole: &&Root| zeros.iter().any(|own| own.as_ref().is_none_or(|own| !own.iter().any(|zero| takes(pole, zero))));
+    let mut shaping: Vec<Root> = poles.iter().filter(seen).copied().collect();
+    let own = zeros.iter().flatten().flatten();
+    shaping.extend(own.filter(|zero| zero.quality().is_some() && !poles.iter().any(|pole| takes(pole, zero))));
+    shaping
+}
+
 /// Eigenvalues of the pencil A − s·E over modes, their rates, lags and the drive, with the row as its last equation.
 fn guesses(sum: &Sum, row: usize, to: f64) -> Vec<Complex<f64>> {
     let n = sum.lambda.len();
@@ -205,11 +224,20 @@ fn guesses(sum: &Sum, row: usize, to: f64) -> Vec<Complex<f64>> {
             }
         }
     }
-    let matrix = |m: &DMatrix<f64>| Mat::from_fn(size, size, |i, j| m[(i, j)]);
-    let Ok(found) = matrix(&a).generalized_eigen(&matrix(&e)) else { return Vec::new() };
-    let (above, below) = (found.S_a().column_vector(), found.S_b().column_vector());
-    let quotient = |k: usize| Complex::new(above[k].re, above[k].im) / Complex::new(below[k].re, below[k].im) * all;
-    (0..size).map(quotient).filter(|s| s.re.is_finite() && s.im.is_finite()).collect()
+    eigenvalues(&a, &e).into_iter().map(|s| s * all).collect()
+}
+
+/// Finite eigenvalues of A − s·E, E perhaps singular: s = σ + 1/μ with μ those of (A − σE)⁻¹·E, for a σ that is none of them.
+fn eigenvalues(a: &DMatrix<f64>, e: &DMatrix<f64>) -> Vec<Complex<f64>> {
+    let size = a.nrows();
+    for sigma in SHIFTS {
+        let lu = (a - e * sigma).lu();
+        let Some(t) = lu.solve(e).filter(|t| t.iter().all(|x| x.is_finite())) else { continue };
+        let Ok(found) = Mat::from_fn(size, size, |i, j| t[(i, j)]).eigenvalues() else { continue };
+        let finite = |mu: Complex<f64>| (mu.norm() > 1e-12).then(|| mu.inv() + sigma);
+        return found.into_iter().filter_map(|mu| finite(Complex::new(mu.re, mu.im))).collect();
+    }
+    Vec::new()
 }
 
 /// The zero of a row of the exact response next to `guess`; on the imaginary or the real axis where nothing damps and the guess is there.

@@ -6,6 +6,7 @@ mod around;
 mod charge;
 mod check;
 mod export;
+mod harmonic;
 mod look;
 mod measure;
 mod models;

@@ -21,9 +21,11 @@ from .errors import (
 from .netlist import Netlist
 from .options import Options
 from .results import (
+    FrequencyResponse,
     ModesResult,
     NodeMotion,
     PullInResult,
+    Root,
     StaticResult,
     TransientResult,
     TrialReply,
@@ -36,6 +38,7 @@ __all__ = [
     "BimorphError",
     "Client",
     "Diagnostic",
+    "FrequencyResponse",
     "InvalidRequest",
     "LimitExceeded",
     "Model",
@@ -49,6 +52,7 @@ __all__ = [
     "Options",
     "PullIn",
     "PullInResult",
+    "Root",
     "Row",
     "Server",
     "Session",

@@ -6,14 +6,16 @@ import math
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
 
 from . import sweep as sweeps
 from .channel import Channel
 from .errors import Diagnostic, InvalidRequest, NetlistError, NotFound, Unavailable
 from .netlist import Netlist
 from .options import WIRE, Options
-from .results import ModesResult, NodeMotion, PullInResult, StaticResult, TransientResult
+from .results import FrequencyResponse, ModesResult, NodeMotion, PullInResult, Root, StaticResult, TransientResult
 from .session import Session, Snapshot
 from .v1 import analysis_pb2, device_pb2, model_pb2, sweep_pb2
 
@@ -184,6 +186,66 @@ class Model:
             [None if math.isnan(e) else e for e in answer.errors],
             answer.deflection_m,
             tuple(answer.warnings),
+        )
+
+    def ac(
+        self,
+        drive: str,
+        signals: Sequence[str] = (),
+        *,
+        start: float,
+        stop: float,
+        points: int = 201,
+        spacing: Literal["log", "decade", "linear"] = "log",
+        even: bool = False,
+        by_modes: bool = False,
+        modes: int = 0,
+        voltages: Voltages | None = None,
+    ) -> FrequencyResponse:
+        """What a small sinusoid at one place does from ``start`` to ``stop`` [Hz], about the equilibrium at these port voltages [V].
+
+        ``drive`` is ``NODE.fx``, ``NODE.fy`` [N], ``NODE.m`` [N·m], a port [V], ``BEAM.T`` (heat) [W], ``frame.ax``, ``frame.ay`` [m/s²]
+        or ``frame.wz`` [rad/s]. ``signals`` are those of ``transient``, and ``PORT.i``, the current into a port [A]; none: what the driven
+        place itself answers. ``points`` frequencies have equal quotients (``"log"``), equal differences (``"linear"``), or are so many in a
+        ``"decade"``; more are added about resonances and zeros unless ``even``. ``by_modes`` sums over modes with static correction, the
+        ``modes`` lowest or, with 0, those to twice ``stop``; else each frequency is exact.
+        """
+        kinds = {"log": 0, "decade": 1, "linear": 2}
+        if spacing not in kinds:
+            raise InvalidRequest(f'spacing: expected "log", "decade" or "linear", got {spacing!r}')
+        request = analysis_pb2.FrequencyResponseRequest(
+            model=self.id,
+            drive=drive,
+            signals=signals,
+            from_hz=start,
+            to_hz=stop,
+            points=points,
+            spacing=kinds[spacing],
+            even=even,
+            by_modes=by_modes,
+            modes=modes,
+            voltages=_named(voltages),
+        )
+        answer = self._call("FrequencyResponse", request)
+
+        def roots(wire: Iterable[Any]) -> list[Root]:
+            return [Root(complex(root.re, root.im)) for root in wire]
+
+        return FrequencyResponse(
+            drive=drive,
+            drive_unit=answer.drive_unit,
+            frequencies_hz=np.array(answer.frequencies_hz, dtype=np.float64),
+            signals={s.name: np.array(s.re, dtype=np.float64) + 1j * np.array(s.im, dtype=np.float64) for s in answer.signals},
+            units={s.name: s.unit for s in answer.signals},
+            at_rest={s.name: s.at_rest if s.HasField("at_rest") else None for s in answer.signals},
+            poles=roots(answer.poles) if answer.poles_known else None,
+            zeros={s.name: roots(s.zeros) if s.zeros_known else None for s in answer.signals},
+            points_added=answer.points_added,
+            modes=answer.modes or None,
+            modal_error=answer.modal_error if answer.HasField("modal_error") else None,
+            unknowns=answer.unknowns,
+            estimated_error=_estimate(answer),
+            warnings=tuple(answer.warnings),
         )
 
     def pull_in(self, max_v: float, port: str = "") -> PullInResult:

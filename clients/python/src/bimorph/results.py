@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
 
 
 @dataclass(frozen=True)
@@ -61,6 +65,73 @@ class ModesResult:
     """Largest displacement of the equilibrium that the modes are about [m]."""
     warnings: tuple[str, ...] = ()
     """What may surprise about these modes."""
+
+
+@dataclass(frozen=True)
+class Root:
+    """A pole or a zero, of each conjugate pair that in the upper half plane."""
+
+    s: complex
+    """[rad/s]"""
+
+    @property
+    def frequency_hz(self) -> float:
+        """``|s|/2π`` [Hz]."""
+        return abs(self.s) / math.tau
+
+    @property
+    def quality(self) -> float | None:
+        """``|s|/(2·|Re s|)`` [1]; None where nothing damps it."""
+        return abs(self.s) / (2.0 * abs(self.s.real)) if self.s.real else None
+
+    @property
+    def width_hz(self) -> float:
+        """Distance of the half-power points of a lightly damped resonance [Hz]."""
+        return abs(self.s.real) / math.pi
+
+
+@dataclass(frozen=True, eq=False)
+class FrequencyResponse:
+    """What a small sinusoid at one place does at every frequency."""
+
+    drive: str
+    """What was driven."""
+    drive_unit: str
+    """Its unit."""
+    frequencies_hz: NDArray[np.float64]
+    """Ascending [Hz]."""
+    signals: dict[str, NDArray[np.complex128]]
+    """Each signal for a unit of the drive; NaN where an undamped resonance has no bound."""
+    units: dict[str, str]
+    """Unit of each signal over that of the drive."""
+    at_rest: dict[str, float | None]
+    """Value of each signal at rest; None where nothing holds the mechanism."""
+    poles: list[Root] | None
+    """Poles within the band; None where there are too many."""
+    zeros: dict[str, list[Root] | None]
+    """Zeros of each signal within the band; None where they were not looked for."""
+    points_added: int
+    """Frequencies that were added about resonances and zeros."""
+    modes: int | None
+    """Modes of a sum over modes; None: exact."""
+    modal_error: float | None
+    """Largest relative deviation of that sum from the exact response; None: it is exact."""
+    unknowns: int
+    """Mechanical unknowns."""
+    estimated_error: float | None = None
+    """Largest estimated relative error by the mesh, of a value or of the frequency at which it stands [1]; None without one."""
+    warnings: tuple[str, ...] = field(default=())
+    """What the numbers do not say by themselves."""
+
+    @property
+    def magnitude(self) -> dict[str, NDArray[np.float64]]:
+        """Magnitude of each signal, in its unit."""
+        return {name: np.abs(values) for name, values in self.signals.items()}
+
+    @property
+    def phase(self) -> dict[str, NDArray[np.float64]]:
+        """Phase of each signal, between -π and π [rad]."""
+        return {name: np.angle(values) for name, values in self.signals.items()}
 
 
 @dataclass(frozen=True)
