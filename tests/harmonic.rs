@@ -128,7 +128,8 @@ fn modes_add_up() {
     for undamped in [false, true] {
         let compiled = model(ELBOW, CompileOptions { segments: Some(4), undamped, ..CompileOptions::default() });
         for drive in ["b.fx", "a.m", "frame.ay"] {
-            let options = asked(drive, &["b.x", "b.y", "a.rz", "b.vy"], 10.0, 3e6);
+            let asked = asked(drive, &["b.x", "b.y", "a.rz", "b.vy"], 10.0, 3e6);
+            let options = HarmonicOptions { points: 801, even: true, ..asked };
             let exact = run(&compiled, &options);
             let all = HarmonicOptions { by_modes: true, modes: Some(1000), ..options.clone() };
             let sum = run(&compiled, &all);
@@ -261,16 +262,21 @@ fn the_told_error_is_the_mesh() {
     }
 }
 
-/// A part that nothing holds has no response at rest, and above it moves as its mass says.
+/// Two masses on a spring that nothing holds: no response at rest, at others (k − mω²)/(m²ω⁴ − 2kmω²), and one resonance at 2k/m.
 #[test]
 fn a_part_that_floats() {
-    let compiled = plain("mass2d * [m] [m=1e-10 J=1e-20]\n");
-    let result = run(&compiled, &HarmonicOptions { even: true, ..asked("m.fx", &["m.x"], 1.0, 1e3) });
+    let text = "mass2d * [a] [m=1e-10 J=1e-20]\nmass2d * [b] [m=1e-10 J=1e-20]\nspring2d * [a b] [kx=1 ky=1 kr=1e-9]\n";
+    let result = run(&plain(text), &asked("a.fx", &["a.x"], 1e3, 1e5));
     assert_eq!(result.signals[0].at_rest, None);
+    assert!(result.warnings.iter().any(|w| w.contains("nothing holds")), "{:?}", result.warnings);
     for (j, f) in result.frequencies_hz.iter().enumerate() {
-        let line = -1.0 / (1e-10 * (TAU * f).powi(2));
-        assert!((value(&result, 0, j) / line - 1.0).norm() < 1e-9);
+        let (k, inertia) = (1.0, 1e-10 * (TAU * f).powi(2));
+        let exact = (k - inertia) / (inertia * inertia - 2.0 * k * inertia);
+        let size = exact.abs() + 1e-3 / (1.0 - inertia / (2.0 * k)).abs();
+        assert!((value(&result, 0, j) - exact).norm() < 1e-9 * size, "{f}: {} {exact}", value(&result, 0, j));
     }
+    let poles = result.poles.unwrap();
+    assert!(poles.iter().any(|p| (p.frequency_hz() * TAU / 2e10f64.sqrt() - 1.0).abs() < 1e-9), "{poles:?}");
 }
 
 /// What cannot be computed is refused before anything is laid out, with what would be understood.

@@ -10,6 +10,7 @@ use crate::device::small_signal::{Moved, Perturbed};
 use crate::gaps::{Drive, System};
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
+use crate::solve::frequency::refined::Refined;
 use crate::solve::harmonic::{ComplexPose, Harmonic};
 use nalgebra::Complex;
 
@@ -23,6 +24,8 @@ pub(crate) struct Exact<'a> {
     pub(super) drive: Drive,
     pub(crate) tangent: BlockMatrix<f64, 3>,
     pub(super) harmonic: Harmonic,
+    /// The tangent unsummed; none for a linear model, whose tangent is another one.
+    refined: Option<Refined<'a>>,
     response: Vec<ComplexPose>,
     pub(crate) rows: Vec<Row>,
     /// Name and unit of each row.
@@ -67,7 +70,13 @@ impl<'a> Exact<'a> {
         let mut residual = point.q.clone();
         system.tangent(&point.q, &drive, &mut tangent, &mut residual);
         let bodies = system.bodies();
+        // what drives has no value at the operating point: the same tangent without it
+        let base = &compiled.parts.system;
+        let mut undriven = base.electrics.drive();
+        base.electrics.apply(&point.sources[..base.electrics.sources()], &point.rise, &mut undriven);
+        let refined = (!base.model.linear).then(|| Refined::new(base, &point.q, &undriven));
         Ok(Self {
+            refined,
             harmonic: Harmonic::new(system),
             compiled,
             point,
@@ -133,6 +142,9 @@ impl<'a> Exact<'a> {
         self.harmonic.factor_at(system, &self.tangent, s).ok()?;
         self.response.copy_from_slice(&push.force);
         self.harmonic.solve(system, &mut self.response);
+        if let Some(refined) = &mut self.refined {
+            self.harmonic.refine(system, refined, s, &push.force, &mut self.response);
+        }
         let moved = Moved::new(&push, &self.response, s);
         let about = self.perturbed();
         let values: Vec<Complex<f64>> = (self.rows.iter())

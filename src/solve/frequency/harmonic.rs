@@ -3,10 +3,15 @@
 //! The same block factorization over complex numbers; the matrix is symmetric. An undamped structure close to a local
 //! resonance of one of its branches can have a small pivot, so each solution is refined once against its own residual.
 
+use super::refined::Refined;
 use crate::gaps::System;
 use crate::multibody::BlockMatrix;
+use crate::multibody::planar::Pose;
 use crate::solve::SolveError;
 use nalgebra::{Complex, Vector3};
+
+/// Corrections of a solution with K as it is.
+const CORRECTIONS: usize = 2;
 
 /// Complex displacement of one body.
 pub type ComplexPose = Vector3<Complex<f64>>;
@@ -89,4 +94,51 @@ impl Harmonic {
             *x += r;
         }
     }
+
+    /// Corrects a solution `x` at `s` for `force` by its residual with K as it is, unsummed: right to rounding also where the assembled K has
+    /// lost what is soft beside what is stiff.
+    pub fn refine(
+        &mut self,
+        system: &System,
+        refined: &mut Refined<'_>,
+        s: Complex<f64>,
+        force: &[ComplexPose],
+        x: &mut [ComplexPose],
+    ) {
+        let model = &system.model;
+        for _ in 0..CORRECTIONS {
+            let [stiff_re, stiff_im] = [false, true].map(|imaginary| refined.product(&part(x, imaginary)));
+            let dragged = self.dragged(system, x);
+            let square = s * s;
+            for (j, rest) in self.rest.iter_mut().enumerate() {
+                let m = model.mass(j);
+                for i in 0..3 {
+                    let stiff = Complex::new(stiff_re[j][i], stiff_im[j][i]);
+                    rest[i] = force[j][i] - stiff - s * dragged[j][i] - square * m[i] * x[j][i];
+                }
+                if let Some(free) = &model.bodies[j].free {
+                    *rest = free.map(Complex::from) * *rest;
+                }
+            }
+            self.factor.solve(&model.pattern, &mut self.rest);
+            for (x, r) in x.iter_mut().zip(&self.rest) {
+                *x += r;
+            }
+        }
+    }
+
+    /// C·x.
+    pub(super) fn dragged(&self, system: &System, x: &[ComplexPose]) -> Vec<ComplexPose> {
+        let [re, im] = [false, true].map(|imaginary| {
+            let mut y = vec![Pose::zeros(); x.len()];
+            self.damping.multiply_add(&system.model.pattern, &part(x, imaginary), &mut y);
+            y
+        });
+        re.iter().zip(&im).map(|(re, im)| re.zip_map(im, Complex::new)).collect()
+    }
+}
+
+/// The real or the imaginary parts.
+fn part(x: &[ComplexPose], imaginary: bool) -> Vec<Pose> {
+    x.iter().map(|x| x.map(|c| if imaginary { c.im } else { c.re })).collect()
 }

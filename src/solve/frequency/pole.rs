@@ -54,7 +54,7 @@ pub fn pole(
         // xᵀMx, xᵀCx and, from xᵀZx, xᵀKx
         let weighed: Vec<ComplexPose> =
             x.iter().enumerate().map(|(j, x)| x.zip_map(&model.mass(j), |x, m| x * m)).collect();
-        let dragged = dragged(harmonic, system, &x);
+        let dragged = harmonic.dragged(system, &x);
         let mut forced = vec![ComplexPose::zeros(); x.len()];
         harmonic.matrix.multiply_add(&model.pattern, &x, &mut forced);
         let (a, b) = (dot(&x, &weighed), dot(&x, &dragged));
@@ -81,19 +81,6 @@ pub fn pole(
         last = share;
     }
     None
-}
-
-/// C·x.
-fn dragged(harmonic: &Harmonic, system: &System, x: &[ComplexPose]) -> Vec<ComplexPose> {
-    let pattern = &system.model.pattern;
-    let of = |imaginary: bool| {
-        let x: Vec<Pose> = x.iter().map(|x| x.map(|c| if imaginary { c.im } else { c.re })).collect();
-        let mut y = vec![Pose::zeros(); x.len()];
-        harmonic.damping.multiply_add(pattern, &x, &mut y);
-        y
-    };
-    let (re, im) = (of(false), of(true));
-    re.iter().zip(&im).map(|(re, im)| re.zip_map(im, Complex::new)).collect()
 }
 
 fn dot(x: &[ComplexPose], y: &[ComplexPose]) -> Complex<f64> {

@@ -84,6 +84,15 @@ impl<'a> Refined<'a> {
         }
     }
 
+    /// K·x, rounded last; held directions are not removed.
+    pub fn product(&mut self, x: &[Pose]) -> Vec<Pose> {
+        for (to, x) in self.x.iter_mut().zip(x) {
+            *to = [x.x.into(), x.y.into(), x.z.into()];
+        }
+        self.multiply();
+        self.product.iter().map(|k| Pose::new(k[0].high, k[1].high, k[2].high)).collect()
+    }
+
     /// xᵀKx, and K·x − λM·x with λ = xᵀKx (xᵀMx = 1) in `rest`, held directions removed. Both are rounded last.
     pub fn quotient(&mut self, x: &[Pose], rest: &mut [Pose]) -> f64 {
         for (to, x) in self.x.iter_mut().zip(x) {
