@@ -193,7 +193,8 @@ fn unwrapped(values: &[[f64; 2]]) -> Vec<f64> {
         let raw = if *im == 0.0 && *re < 0.0 { -180.0 } else { im.atan2(*re).to_degrees() };
         let phase = match last {
             None => raw,
-            Some(last) => raw + 360.0 * ((last - raw) / 360.0).round(),
+            // half a turn either way: a lag
+            Some(last) => raw + 360.0 * ((last - raw) / 360.0 - 1e-9).round(),
         };
         last = Some(phase);
         phase

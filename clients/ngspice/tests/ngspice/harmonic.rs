@@ -87,7 +87,8 @@ fn ac_of_a_circuit_and_without_one() {
         let result = direct(&pushed, "shuttle.fx", &["shuttle.x"], &[]);
         let force = off(&pushed, "v(f)", 1e6, &result, 0);
         println!("ngspice {version}: current {current:.1e}, motion {motion:.1e}, under a force {force:.1e}");
-        // rounding, and the smallest conductance that ngspice puts beside a port
-        assert!(current < 1e-9 && motion < 1e-9 && force < 1e-5, "{version}: {current:e} {motion:e} {force:e}");
+        // the stiffness that the device sums up is rounded, which moves resonances by some 1e-11: 2Q times that. Beside a port under a force
+        // ngspice puts its smallest conductance, 1e-12 S, which is 1e-12 N for a micrometre
+        assert!(current < 1e-8 && motion < 1e-8 && force < 1e-6, "{version}: {current:e} {motion:e} {force:e}");
     }
 }
