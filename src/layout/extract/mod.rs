@@ -10,7 +10,9 @@
 
 mod anchors;
 mod boxes;
+mod combs;
 mod joints;
+mod layer;
 mod limbs;
 pub mod medial;
 mod model;
@@ -25,13 +27,6 @@ pub use netlist::netlist;
 use super::drawing::{Drawing, Polygon};
 use super::process::{self, Process};
 use super::regions;
-use crate::budget;
-use anchors::Rule;
-use joints::Parts;
-use medial::Medial;
-use skeleton::Skeleton;
-use std::collections::HashMap;
-use std::sync::Arc;
 use thiserror::Error;
 
 /// Most points of one layer after its polygons are merged.
@@ -92,6 +87,8 @@ pub struct Extraction {
     pub links: Vec<[usize; 2]>,
     /// Nodes that are held.
     pub anchors: Vec<usize>,
+    /// Comb drives.
+    pub combs: Vec<Comb>,
     /// What is not in the model.
     pub unrecognised: Vec<Unrecognised>,
     /// What a reader should know, in words with places and sizes.
@@ -131,6 +128,8 @@ pub struct Node {
     pub at: [f64; 2],
     /// How far from it a label may stand that names it [m].
     pub reach: f64,
+    /// Number of the part that it is on: what hangs together is one conductor.
+    pub part: usize,
 }
 
 /// A straight beam.
@@ -155,6 +154,23 @@ pub struct Body {
     pub area: f64,
     /// Polar second moment of the area about the centroid [m⁴].
     pub polar: f64,
+}
+
+/// A comb drive.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Comb {
+    /// Index of its layer.
+    pub layer: usize,
+    /// Nodes where it pulls: the side that moves, and the other.
+    pub nodes: [usize; 2],
+    /// Number of gaps.
+    pub gaps: usize,
+    /// Number of fingers of both sides.
+    pub fingers: [usize; 2],
+    /// Gap [m].
+    pub gap: f64,
+    /// Overlap as drawn [m].
+    pub overlap: f64,
 }
 
 /// Something that is not in the model.
@@ -194,7 +210,7 @@ pub fn extract(drawing: &Drawing, process: &Process, options: &ExtractOptions) -
             .flat_map(|(_, polygons)| polygons.iter().cloned())
             .collect();
         if !drawn.is_empty() {
-            one_layer(drawing, layer, &drawn, &mut result)?;
+            layer::extract(drawing, layer, &drawn, &mut result)?;
         }
     }
     if result.layers.is_empty() {
@@ -229,115 +245,3 @@ fn unknown_layers(drawing: &Drawing, process: &Process, result: &mut Extraction)
     }
 }
 
-/// A part's axis and what was found along it, for all parts of its shape.
-type Found = Result<Arc<(Medial, Parts)>, String>;
-
-fn one_layer(
-    drawing: &Drawing,
-    layer: &process::Layer,
-    drawn: &[Polygon],
-    result: &mut Extraction,
-) -> Result<(), ExtractError> {
-    let unit = drawing.unit_m;
-    let drawn_area = regions::area(&regions::union(drawn));
-    let snapped = snap::snap(drawn);
-    let solid = regions::union(snapped.as_deref().unwrap_or(drawn));
-    let points: usize = solid.iter().flat_map(|p| &p.contours).map(Vec::len).sum();
-    if points > MOST_POINTS {
-        return Err(ExtractError::TooLarge { layer: layer.name.clone(), points });
-    }
-    budget::lay_out(points.saturating_mul(1200));
-    let rule = Rule::of(drawing, layer, &solid);
-    let index = result.layers.len();
-    let mut done = LayerResult {
-        name: layer.name.clone(),
-        thickness: layer.thickness,
-        material: layer.material.iter().map(|(name, value)| (name.clone(), *value)).collect(),
-        drawn: drawn_area * unit * unit,
-        closed: (regions::area(&solid) - drawn_area) * unit * unit,
-        parts: solid.len(),
-        ..LayerResult::default()
-    };
-    if let Some(fluid) = layer.fluid {
-        done.material.push(("fluid".to_owned(), fluid));
-    }
-    let mut known: HashMap<Polygon, Found> = HashMap::new();
-    for polygon in &solid {
-        budget::check();
-        let found = known.entry(at_origin(polygon)).or_insert_with(|| {
-            let axis = Medial::of(polygon).map_err(|e| e.to_string())?;
-            let parts = {
-                let skeleton = Skeleton::of(&axis);
-                joints::joints(&skeleton, limbs::limbs(&skeleton))
-            };
-            Ok(Arc::new((axis, parts)))
-        });
-        let area = regions::area(std::slice::from_ref(polygon));
-        match found {
-            Ok(found) => {
-                let (axis, parts) = &**found;
-                let origin = polygon.extent().unwrap_or_default()[0];
-                let model = model::Model::of(axis, origin, parts, &rule);
-                done.anchored += model.held * unit * unit;
-                done.extracted += (model.area - model.held) * unit * unit;
-                if (model.area - area).abs() > 1e-9 * area {
-                    let missing = (area - model.area) * unit * unit;
-                    done.unrecognised += missing;
-                    result.unrecognised.push(lost(layer, polygon, unit, missing, "no limb or joint has it"));
-                }
-                result.add(&model, index, unit);
-            }
-            Err(why) => {
-                let area = area * unit * unit;
-                done.unrecognised += area;
-                result.unrecognised.push(lost(layer, polygon, unit, area, why));
-            }
-        }
-    }
-    result.layers.push(done);
-    Ok(())
-}
-
-fn lost(layer: &process::Layer, polygon: &Polygon, unit: f64, area: f64, why: &str) -> Unrecognised {
-    let [low, high] = polygon.extent().unwrap_or_default();
-    let at = [0, 1].map(|i| 0.5 * (f64::from(low[i]) + f64::from(high[i])) * unit);
-    Unrecognised { layer: layer.name.clone(), area, at, polygons: vec![polygon.clone()], why: why.to_owned() }
-}
-
-/// The polygon moved to the origin: its shape.
-fn at_origin(polygon: &Polygon) -> Polygon {
-    let [[x, y], _] = polygon.extent().unwrap_or_default();
-    let moved = |contour: &Vec<[i32; 2]>| contour.iter().map(|p| [p[0] - x, p[1] - y]).collect();
-    Polygon { contours: polygon.contours.iter().map(moved).collect() }
-}
-
-impl Extraction {
-    /// Takes the model of a part in.
-    fn add(&mut self, model: &model::Model, layer: usize, unit: f64) {
-        let mut used = vec![false; model.nodes.len()];
-        let ends = model.beams.iter().flat_map(|b| [b.a, b.b]).chain(model.links.iter().flatten().copied());
-        ends.chain(model.bodies.iter().map(|b| b.node)).for_each(|n| used[n] = true);
-        // a part that is nothing but held is an electrode: it keeps one node
-        if !used.iter().any(|u| *u) {
-            model.anchors.first().iter().for_each(|n| used[**n] = true);
-        }
-        let mut number = vec![usize::MAX; model.nodes.len()];
-        for (n, at) in model.nodes.iter().enumerate().filter(|(n, _)| used[*n]) {
-            number[n] = self.nodes.len();
-            self.nodes.push(Node { name: String::new(), at: at.map(|x| x * unit), reach: model.reach[n] * unit });
-        }
-        self.beams.extend(model.beams.iter().map(|b| Beam {
-            layer,
-            nodes: [number[b.a], number[b.b]],
-            width: b.width.map(|w| w * unit),
-        }));
-        self.bodies.extend(model.bodies.iter().map(|b| Body {
-            layer,
-            node: number[b.node],
-            area: b.moments.area * unit * unit,
-            polar: b.moments.polar() * unit.powi(4),
-        }));
-        self.links.extend(model.links.iter().map(|l| l.map(|n| number[n])));
-        self.anchors.extend(model.anchors.iter().filter(|n| used[**n]).map(|n| number[*n]));
-    }
-}

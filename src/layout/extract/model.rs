@@ -7,6 +7,8 @@ use super::moments::Moments;
 
 /// A free end beyond an anchor shorter than this many widths is part of the anchor [1].
 const STUMP: f64 = 1.5;
+/// Nodes nearer to each other than this many widths are one [1].
+const ON_AXIS: f64 = 0.01;
 /// A pad is at least this much wider than its limb [1].
 const PAD: f64 = 1.5;
 
@@ -22,6 +24,8 @@ pub(super) struct Model {
     pub(super) links: Vec<[usize; 2]>,
     /// Nodes that are held.
     pub(super) anchors: Vec<usize>,
+    /// For each tap its node, and whether it is held.
+    pub(super) taps: Vec<usize>,
     /// Area that is held, of the whole part.
     pub(super) held: f64,
     /// Area of beams, bodies and what is held.
@@ -45,10 +49,13 @@ pub(super) struct Body {
 }
 
 impl Model {
-    /// Builds it from the axis of a part whose box has its lower left corner at `origin`.
-    pub(super) fn of(axis: &Medial, origin: [i32; 2], parts: &Parts, rule: &Rule) -> Self {
+    /// Builds it from the axis of a part whose box has its lower left corner at `origin`; `taps` are places where
+    /// something pulls at it, in coordinates of the drawing.
+    pub(super) fn of(axis: &Medial, origin: [i32; 2], parts: &Parts, rule: &Rule, taps: &[[f64; 2]]) -> Self {
         let origin = origin.map(f64::from);
-        let mut build = Builder { model: Self::default(), axis, origin, parts, rule, anchored: Vec::new() };
+        let mut build = Builder { model: Self::default(), axis, origin, parts, rule, anchored: Vec::new(), bodies: vec![None; parts.joints.len()], taps: Vec::new() };
+        build.model.taps = vec![usize::MAX; taps.len()];
+        build.taps = taps.iter().map(|p| build.tap(*p)).collect();
         let ports: Vec<Vec<usize>> = (0..parts.joints.len()).map(|j| build.joint(j)).collect();
         for (k, at) in parts.at.iter().enumerate() {
             let node = |end: usize| {
@@ -59,10 +66,29 @@ impl Model {
                 build.limb(k, a, b);
             }
         }
+        for k in 0..build.taps.len() {
+            if let Owner::Joint(j) = build.taps[k].owner {
+                build.tap_joint(k, j);
+            }
+        }
         let Builder { mut model, anchored, .. } = build;
         model.anchors = (0..anchored.len()).filter(|n| anchored[*n]).collect();
         model
     }
+}
+
+/// Where something pulls.
+#[derive(Debug, Clone, Copy)]
+struct Tap {
+    /// In coordinates of the part.
+    at: [f64; 2],
+    owner: Owner,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Owner {
+    Limb(usize),
+    Joint(usize),
 }
 
 struct Builder<'a> {
@@ -74,6 +100,9 @@ struct Builder<'a> {
     rule: &'a Rule,
     /// For each node, whether it is held.
     anchored: Vec<bool>,
+    /// For each joint, the node that stands for it.
+    bodies: Vec<Option<usize>>,
+    taps: Vec<Tap>,
 }
 
 impl Builder<'_> {
@@ -90,10 +119,39 @@ impl Builder<'_> {
         matches!(self.rule, Rule::Drawn(held) if held.holds([local[0] + origin[0], local[1] + origin[1]]))
     }
 
+    /// What is nearest to a place.
+    fn tap(&self, place: [f64; 2]) -> Tap {
+        let at = [place[0] - self.origin[0], place[1] - self.origin[1]];
+        let mut best = (f64::INFINITY, Owner::Joint(0));
+        let mut look = |edges: &[u32], owner: Owner| {
+            for e in edges {
+                let edge = &self.axis.edges[*e as usize];
+                let away = distance(&self.axis.outline(edge.ends, edge.sites), at);
+                if away < best.0 {
+                    best = (away, owner);
+                }
+            }
+        };
+        self.parts.joints.iter().enumerate().for_each(|(j, joint)| look(&joint.edges, Owner::Joint(j)));
+        self.parts.limbs.iter().enumerate().for_each(|(k, limb)| look(&limb.edges, Owner::Limb(k)));
+        Tap { at, owner: best.1 }
+    }
+
+    fn tap_joint(&mut self, k: usize, j: usize) {
+        let Some(body) = self.bodies[j] else { return };
+        let held = self.anchored[body];
+        let node = self.node(self.taps[k].at, 0.0, held);
+        if !held {
+            self.model.links.push([body, node]);
+        }
+        self.model.taps[k] = node;
+    }
+
     /// Makes the nodes of a joint and returns those of its ports.
     fn joint(&mut self, j: usize) -> Vec<usize> {
         let joint = &self.parts.joints[j];
-        match &joint.kind {
+        let first = self.model.nodes.len();
+        let ends = match &joint.kind {
             Kind::Node(at) => {
                 let held = joint.ports.len() > 1 && self.holds(*at);
                 self.count(joint.cell.area, held);
@@ -130,7 +188,12 @@ impl Builder<'_> {
                 ends
             }
             Kind::Unset => unreachable!("every joint becomes something"),
-        }
+        };
+        // of a free body its own node, made last; else the first made
+        let made = self.model.nodes.len();
+        let own = self.model.bodies.last().filter(|b| b.node >= first).map(|b| b.node);
+        self.bodies[j] = own.or((made > first).then_some(first));
+        ends
     }
 
     fn count(&mut self, area: f64, held: bool) {
@@ -182,14 +245,28 @@ impl Builder<'_> {
         }
     }
 
+    /// A rigid arm from a node to where something pulls.
+    fn tap_node(&mut self, k: usize, node: usize) {
+        let tap = self.node(self.taps[k].at, 0.0, self.anchored[node]);
+        if !self.anchored[node] {
+            self.model.links.push([node, tap]);
+        }
+        self.model.taps[k] = tap;
+    }
+
     /// A limb between two nodes, less what lies over anchors.
     fn limb(&mut self, k: usize, a: usize, b: usize) {
         let limb = &self.parts.limbs[k];
         let [p, q] = [a, b].map(|n| self.model.nodes[n]);
         let long = (q[0] - p[0]).hypot(q[1] - p[1]);
+        let loose = |end: usize| {
+            let joint = &self.parts.joints[self.parts.at[k][end]];
+            joint.ports.len() == 1 && matches!(joint.kind, Kind::Node(_))
+        };
         let covered = match self.rule {
             Rule::Drawn(held) => held.over(p, q),
             Rule::Wide(reach) if limb.width[0].min(limb.width[1]) >= 2.0 * reach => vec![[0.0, 1.0]],
+            Rule::Pads if self.parts.limbs.len() == 1 && loose(0) && loose(1) => vec![[0.0, 1.0]],
             _ => Vec::new(),
         };
         let mut free = Vec::new();
@@ -203,13 +280,18 @@ impl Builder<'_> {
         let at = |t: f64| [p[0] + t * (q[0] - p[0]), p[1] + t * (q[1] - p[1])];
         let width = |t: f64| limb.width[0] + t * (limb.width[1] - limb.width[0]);
         let widest = limb.width[0].max(limb.width[1]);
-        let loose = |end: usize| {
-            let joint = &self.parts.joints[self.parts.at[k][end]];
-            joint.ports.len() == 1 && matches!(joint.kind, Kind::Node(_))
-        };
         let mut kept = 0.0;
         let (loose_start, loose_end) = (loose(0), loose(1));
         let cut = !(free.len() == 1 && free[0] == [0.0, 1.0]);
+        let origin = self.origin;
+        let local = |t: f64| [at(t)[0] - origin[0], at(t)[1] - origin[1]];
+        let mut taps: Vec<(f64, usize)> = Vec::new();
+        for (tap, Tap { at, .. }) in self.taps.iter().enumerate().filter(|(_, tap)| tap.owner == Owner::Limb(k)) {
+            let d = [(q[0] - p[0]) / long, (q[1] - p[1]) / long];
+            let along = (at[0] + origin[0] - p[0]) * d[0] + (at[1] + origin[1] - p[1]) * d[1];
+            taps.push(((along / long).clamp(0.0, 1.0), tap));
+        }
+        taps.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         for [t0, t1] in free {
             let stump =
                 cut && (t0 == 0.0 && loose_start || t1 == 1.0 && loose_end) && (t1 - t0) * long < STUMP * widest;
@@ -217,16 +299,52 @@ impl Builder<'_> {
                 continue;
             }
             kept += t1 - t0;
-            let origin = self.origin;
-            let local = |t: f64| {
-                let x = at(t);
-                [x[0] - origin[0], x[1] - origin[1]]
-            };
             let start = if t0 == 0.0 { a } else { self.node(local(t0), widest, true) };
             let end = if t1 == 1.0 { b } else { self.node(local(t1), widest, true) };
-            self.model.beams.push(Beam { a: start, b: end, width: [width(t0), width(t1)] });
+            // nodes along it: (share, node)
+            let mut along = vec![(t0, start)];
+            for (t, tap) in taps.iter().filter(|(t, _)| *t >= t0 && *t <= t1) {
+                let last = along[along.len() - 1];
+                let node = if (t - last.0) * long < ON_AXIS * widest {
+                    last.1
+                } else if (t1 - t) * long < ON_AXIS * widest {
+                    end
+                } else {
+                    let node = self.node(local(*t), widest, false);
+                    along.push((*t, node));
+                    node
+                };
+                self.tap_node(*tap, node);
+            }
+            along.push((t1, end));
+            for pair in along.windows(2) {
+                let width = [width(pair[0].0), width(pair[1].0)];
+                self.model.beams.push(Beam { a: pair[0].1, b: pair[1].1, width });
+            }
+        }
+        for (t, tap) in taps {
+            if self.model.taps[tap] == usize::MAX {
+                let _ = t;
+                self.model.taps[tap] = self.node(self.taps[tap].at, 0.0, true);
+            }
         }
         self.model.area += limb.cell.area;
         self.model.held += (1.0 - kept) * limb.cell.area;
     }
+}
+
+/// How far a point lies outside a convex or nearly convex outline; 0 inside.
+fn distance(outline: &[[f64; 2]], p: [f64; 2]) -> f64 {
+    if super::anchors::inside(&[outline.to_vec()], p) {
+        return 0.0;
+    }
+    let edges = outline.iter().zip(outline.iter().cycle().skip(1));
+    edges
+        .map(|(a, b)| {
+            let d = [b[0] - a[0], b[1] - a[1]];
+            let l2 = (d[0] * d[0] + d[1] * d[1]).max(f64::MIN_POSITIVE);
+            let t = (((p[0] - a[0]) * d[0] + (p[1] - a[1]) * d[1]) / l2).clamp(0.0, 1.0);
+            (p[0] - a[0] - t * d[0]).hypot(p[1] - a[1] - t * d[1])
+        })
+        .fold(f64::INFINITY, f64::min)
 }

@@ -50,6 +50,20 @@ pub fn netlist(extraction: &Extraction) -> String {
         let (l, w) = (lengths.word(micro(piece.length)), widths.word(micro(piece.width)));
         let _ = writeln!(out, "beam2d {layer} [{a} {b}] [l={l} w={w}{}]", angle(piece.along));
     }
+    for comb in &extraction.combs {
+        let layer = &extraction.layers[comb.layer].name;
+        let d = difference(extraction, comb.nodes[0], comb.nodes[1]);
+        // the other side lies at 2·L − l
+        let long = 0.5 * (d[0].hypot(d[1]) + comb.overlap);
+        let [a, b] = comb.nodes.map(|n| names[n]);
+        let sizes = [comb.gap, comb.overlap, long].map(micro);
+        let _ = writeln!(
+            out,
+            "comb2de {layer} [{a} {b}] [N={} gap={} l={} L={}{}]  % {} and {} fingers",
+            comb.gaps, sizes[0], sizes[1], sizes[2], angle(d), comb.fingers[0], comb.fingers[1]
+        );
+    }
+    conductors(extraction, &mut out);
     out
 }
 
@@ -76,6 +90,35 @@ fn head(extraction: &Extraction, out: &mut String) {
         let entries: Vec<String> =
             layer.material.iter().map(|(name, value)| format!("{name}={}", number(*value))).collect();
         let _ = writeln!(out, "process {} = [ {} h={} ]", layer.name, entries.join(" "), micro(layer.thickness));
+    }
+}
+
+/// Parts that move are at ground; of those that hold still each is a port.
+fn conductors(extraction: &Extraction, out: &mut String) {
+    let mut moves = std::collections::BTreeMap::new();
+    for node in extraction.beams.iter().flat_map(|b| b.nodes).chain(extraction.bodies.iter().map(|b| b.node)) {
+        moves.insert(extraction.nodes[node].part, true);
+    }
+    // nodes with a potential, by part
+    let mut charged: std::collections::BTreeMap<usize, Vec<usize>> = std::collections::BTreeMap::new();
+    for n in extraction.combs.iter().flat_map(|c| c.nodes) {
+        charged.entry(extraction.nodes[n].part).or_default().push(n);
+    }
+    for (part, mut nodes) in charged {
+        nodes.sort_unstable();
+        nodes.dedup();
+        let name = |n: usize| &extraction.nodes[n].name;
+        if moves.contains_key(&part) {
+            nodes.iter().for_each(|n| {
+                let _ = writeln!(out, "eground * [{}] []", name(*n));
+            });
+            continue;
+        }
+        let first = nodes[0];
+        nodes[1..].iter().for_each(|n| {
+            let _ = writeln!(out, "R * [{} {}] [R=1]", name(first), name(*n));
+        });
+        let _ = writeln!(out, "{}_v port * [{}] []", name(first), name(first));
     }
 }
 

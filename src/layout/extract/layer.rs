@@ -1,0 +1,295 @@
+//! One layer: merged, taken apart into parts that hang together, and put into the result.
+
+use super::anchors::Rule;
+use super::combs::{self, Finger};
+use super::joints::{self, Parts};
+use super::limbs;
+use super::medial::Medial;
+use super::model::Model;
+use super::moments::Moments;
+use super::skeleton::Skeleton;
+use super::snap;
+use super::{Beam, Body, Comb, ExtractError, Extraction, LayerResult, MOST_POINTS, Node, Unrecognised};
+use crate::budget;
+use crate::layout::drawing::{Drawing, Polygon};
+use crate::layout::process;
+use crate::layout::regions;
+use std::collections::HashMap;
+use std::sync::Arc;
+
+/// Bytes for each point of a layer while its axis is made.
+const BYTES_PER_POINT: usize = 1200;
+
+/// What was found along the axis of a shape.
+type Found = Arc<(Medial, Parts)>;
+
+/// A part that hangs together.
+#[derive(Debug, Clone)]
+pub(super) struct Part {
+    /// Its outline.
+    pub(super) polygon: Polygon,
+    /// Its axis, limbs and joints.
+    pub(super) found: Found,
+}
+
+impl Part {
+    /// Lower left corner of its box.
+    pub(super) fn origin(&self) -> [f64; 2] {
+        self.polygon.extent().unwrap_or_default()[0].map(f64::from)
+    }
+}
+
+/// What is known of shapes: a drawing repeats them.
+#[derive(Default)]
+struct Shapes(HashMap<Polygon, Result<Found, String>>);
+
+impl Shapes {
+    fn analyse(&mut self, polygon: Polygon) -> Result<Part, (Polygon, String)> {
+        let found = self.0.entry(at_origin(&polygon)).or_insert_with(|| {
+            let axis = Medial::of(&polygon).map_err(|e| e.to_string())?;
+            let parts = {
+                let skeleton = Skeleton::of(&axis);
+                joints::joints(&skeleton, limbs::limbs(&skeleton))
+            };
+            Ok(Arc::new((axis, parts)))
+        });
+        match found {
+            Ok(found) => Ok(Part { found: found.clone(), polygon }),
+            Err(why) => Err((polygon, why.clone())),
+        }
+    }
+}
+
+/// The polygon moved to the origin: its shape.
+fn at_origin(polygon: &Polygon) -> Polygon {
+    let [[x, y], _] = polygon.extent().unwrap_or_default();
+    let moved = |contour: &Vec<[i32; 2]>| contour.iter().map(|p| [p[0] - x, p[1] - y]).collect();
+    Polygon { contours: polygon.contours.iter().map(moved).collect() }
+}
+
+/// Adds the model of a layer to the result.
+pub(super) fn extract(
+    drawing: &Drawing,
+    layer: &process::Layer,
+    drawn: &[Polygon],
+    result: &mut Extraction,
+) -> Result<(), ExtractError> {
+    let unit = drawing.unit_m;
+    let drawn_area = regions::area(&regions::union(drawn));
+    let snapped = snap::snap(drawn);
+    let solid = regions::union(snapped.as_deref().unwrap_or(drawn));
+    let points: usize = solid.iter().flat_map(|p| &p.contours).map(Vec::len).sum();
+    if points > MOST_POINTS {
+        return Err(ExtractError::TooLarge { layer: layer.name.clone(), points });
+    }
+    budget::lay_out(points.saturating_mul(BYTES_PER_POINT));
+    let rule = Rule::of(drawing, layer, &solid);
+    let mut done = LayerResult {
+        name: layer.name.clone(),
+        thickness: layer.thickness,
+        material: layer.material.iter().map(|(name, value)| (name.clone(), *value)).collect(),
+        drawn: drawn_area * unit * unit,
+        closed: (regions::area(&solid) - drawn_area) * unit * unit,
+        parts: solid.len(),
+        ..LayerResult::default()
+    };
+    if let Some(fluid) = layer.fluid {
+        done.material.push(("fluid".to_owned(), fluid));
+    }
+    let mut shapes = Shapes::default();
+    let mut parts = Vec::new();
+    for polygon in solid {
+        budget::check();
+        match shapes.analyse(polygon) {
+            Ok(part) => parts.push(part),
+            Err((polygon, why)) => {
+                let area = regions::area(std::slice::from_ref(&polygon)) * unit * unit;
+                done.unrecognised += area;
+                result.unrecognised.push(lost(layer, &polygon, unit, area, &why));
+            }
+        }
+    }
+    let (combs, fingers) = combs::combs(&parts);
+    let carriers = strip(&mut shapes, &parts, &fingers);
+    let mut taps: Vec<Vec<[f64; 2]>> = vec![Vec::new(); parts.len()];
+    for comb in &combs {
+        (0..2).for_each(|i| taps[comb.parts[i]].push(comb.roots[i]));
+    }
+    let first = result.layers.iter().map(|layer| layer.parts).sum();
+    let mut sink = Sink { layer: result.layers.len(), result, first, unit };
+    // for each part, the nodes where combs pull
+    let mut pulled: Vec<std::vec::IntoIter<usize>> = Vec::new();
+    let models: Vec<Model> = carriers
+        .iter()
+        .zip(&taps)
+        .map(|(carrier, taps)| {
+            budget::check();
+            let (axis, found) = &*carrier.found;
+            let origin = carrier.polygon.extent().unwrap_or_default()[0];
+            Model::of(axis, origin, found, &rule, taps)
+        })
+        .collect();
+    let mut loose = vec![false; parts.len()];
+    combs.iter().flat_map(|comb| &comb.loose).for_each(|k| loose[*k] = true);
+    let held = models.iter().filter(|model| !model.anchors.is_empty()).count();
+    sink.notes(drawing, layer, &rule, &parts, &models, &loose);
+    for (k, (part, model)) in parts.iter().zip(&models).enumerate() {
+        let whole = regions::area(std::slice::from_ref(&part.polygon));
+        if loose[k] || model.anchors.is_empty() && held > 0 && taps[k].is_empty() {
+            let area = whole * unit * unit;
+            done.unrecognised += area;
+            let why = if loose[k] {
+                "it lies like a finger of a comb, and hangs on nothing"
+            } else {
+                "nothing holds it, and it faces nothing that is held: it would float away"
+            };
+            sink.result.unrecognised.push(lost(layer, &part.polygon, unit, area, why));
+            pulled.push(Vec::new().into_iter());
+            continue;
+        }
+        done.anchored += model.held * unit * unit;
+        done.extracted += (model.area - model.held) * unit * unit;
+        let area = regions::area(std::slice::from_ref(&carriers[k].polygon));
+        if (model.area - area).abs() > 1e-9 * area {
+            let missing = (area - model.area) * unit * unit;
+            done.unrecognised += missing;
+            let lost = lost(layer, &part.polygon, unit, missing, "no limb or joint has it");
+            sink.result.unrecognised.push(lost);
+        }
+        pulled.push(sink.add(model, k));
+        let fingers = whole - area;
+        let moves = !(model.beams.is_empty() && model.bodies.is_empty());
+        *(if moves { &mut done.extracted } else { &mut done.anchored }) += fingers * unit * unit;
+    }
+    for comb in &combs {
+        let nodes = comb.parts.map(|k| pulled[k].next().unwrap_or_default());
+        sink.comb(comb, nodes);
+    }
+    result.layers.push(done);
+    Ok(())
+}
+
+/// The parts without the fingers of combs.
+fn strip(shapes: &mut Shapes, parts: &[Part], fingers: &[Finger]) -> Vec<Part> {
+    let mut of_part: Vec<Vec<&Finger>> = vec![Vec::new(); parts.len()];
+    fingers.iter().for_each(|finger| of_part[finger.part].push(finger));
+    let stripped = parts.iter().zip(&of_part).map(|(part, fingers)| {
+        if fingers.is_empty() {
+            return part.clone();
+        }
+        let mut left = regions::union(&[combs::without(part, fingers)]);
+        match (left.pop(), left.is_empty()) {
+            (Some(one), true) => shapes.analyse(one).unwrap_or_else(|_| part.clone()),
+            _ => part.clone(),
+        }
+    });
+    stripped.collect()
+}
+
+fn lost(layer: &process::Layer, polygon: &Polygon, unit: f64, area: f64, why: &str) -> Unrecognised {
+    let [low, high] = polygon.extent().unwrap_or_default();
+    let at = [0, 1].map(|i| 0.5 * (f64::from(low[i]) + f64::from(high[i])) * unit);
+    Unrecognised { layer: layer.name.clone(), area, at, polygons: vec![polygon.clone()], why: why.to_owned() }
+}
+
+/// Puts models into the result, in SI units.
+struct Sink<'a> {
+    result: &'a mut Extraction,
+    layer: usize,
+    /// Number of the layer's first part.
+    first: usize,
+    unit: f64,
+}
+
+impl Sink<'_> {
+    /// Takes the model of a part in; answers the nodes of its taps.
+    fn add(&mut self, model: &Model, part: usize) -> std::vec::IntoIter<usize> {
+        let (unit, layer) = (self.unit, self.layer);
+        let mut used = vec![false; model.nodes.len()];
+        let ends = model.beams.iter().flat_map(|b| [b.a, b.b]).chain(model.links.iter().flatten().copied());
+        ends.chain(model.bodies.iter().map(|b| b.node)).chain(model.taps.iter().copied()).for_each(|n| used[n] = true);
+        // a part that is nothing but held is an electrode: it keeps one node
+        if !used.iter().any(|u| *u) {
+            model.anchors.first().iter().for_each(|n| used[**n] = true);
+        }
+        let mut number = vec![usize::MAX; model.nodes.len()];
+        for (n, at) in model.nodes.iter().enumerate().filter(|(n, _)| used[*n]) {
+            number[n] = self.node(at.map(|x| x * unit), model.reach[n] * unit, self.first + part);
+        }
+        let result = &mut *self.result;
+        result.beams.extend(model.beams.iter().map(|b| Beam {
+            layer,
+            nodes: [number[b.a], number[b.b]],
+            width: b.width.map(|w| w * unit),
+        }));
+        result.bodies.extend(model.bodies.iter().map(|b| body(layer, number[b.node], &b.moments, unit)));
+        result.links.extend(model.links.iter().map(|l| l.map(|n| number[n])));
+        result.anchors.extend(model.anchors.iter().filter(|n| used[**n]).map(|n| number[*n]));
+        model.taps.iter().map(|n| number[*n]).collect::<Vec<_>>().into_iter()
+    }
+
+    fn node(&mut self, at: [f64; 2], reach: f64, part: usize) -> usize {
+        self.result.nodes.push(Node { name: String::new(), at, reach, part });
+        self.result.nodes.len() - 1
+    }
+
+    /// Tells by what rule parts are held where no anchor is drawn, and what nothing holds.
+    fn notes(&mut self, drawing: &Drawing, layer: &process::Layer, rule: &Rule, parts: &[Part], models: &[Model], loose: &[bool]) {
+        let place = |k: usize| {
+            let [low, high] = parts[k].polygon.extent().unwrap_or_default();
+            drawing.place([0, 1].map(|i| 0.5 * (f64::from(low[i]) + f64::from(high[i]))))
+        };
+        let list = |some: Vec<usize>| {
+            let shown: Vec<String> = some.iter().take(3).map(|k| place(*k)).collect();
+            let more = if some.len() > 3 { format!(" and {} more", some.len() - 3) } else { String::new() };
+            format!("{} at {}{more}", some.len(), shown.join(", "))
+        };
+        let name = &layer.name;
+        if matches!(rule, Rule::Pads) {
+            let whole: Vec<usize> =
+                (0..parts.len()).filter(|k| !loose[*k] && models[*k].beams.is_empty() && models[*k].bodies.is_empty()).collect();
+            let pads: usize = models.iter().filter(|m| !m.beams.is_empty()).map(|m| m.anchors.len()).sum();
+            let mut told = format!("layer {name}: no anchors are drawn; by rule, {pads} ends of limbs in pads are held");
+            if !whole.is_empty() {
+                told += &format!(", and parts without limbs or pads of their own: {}", list(whole));
+            }
+            self.result.notes.push(told);
+        }
+        if models.iter().all(|m| m.anchors.is_empty()) {
+            self.result.notes.push(format!("layer {name}: nothing holds it"));
+            return;
+        }
+        let free: Vec<usize> =
+            (0..parts.len()).filter(|k| models[*k].anchors.is_empty() && !models[*k].taps.is_empty()).collect();
+        if !free.is_empty() {
+            let told = format!("layer {name}: nothing holds the parts with combs, which stay in the model: {}", list(free));
+            self.result.notes.push(told);
+        }
+    }
+
+    /// A comb between two nodes, with its fingers as bodies on the sides that move.
+    fn comb(&mut self, comb: &combs::Comb, nodes: [usize; 2]) {
+        let held = nodes.map(|n| self.result.anchors.contains(&n));
+        for (i, node) in nodes.into_iter().enumerate() {
+            if !held[i] && comb.masses[i].area > 0.0 {
+                let center = self.node(comb.masses[i].centroid().map(|x| x * self.unit), 0.0, self.first + comb.parts[i]);
+                self.result.links.push([node, center]);
+                self.result.bodies.push(body(self.layer, center, &comb.masses[i], self.unit));
+            }
+        }
+        // the side that moves comes first
+        let order = if held[0] && !held[1] { [1, 0] } else { [0, 1] };
+        self.result.combs.push(Comb {
+            layer: self.layer,
+            nodes: order.map(|i| nodes[i]),
+            gaps: comb.gaps,
+            fingers: order.map(|i| comb.fingers[i]),
+            gap: comb.gap * self.unit,
+            overlap: comb.overlap * self.unit,
+        });
+    }
+}
+
+fn body(layer: usize, node: usize, moments: &Moments, unit: f64) -> Body {
+    Body { layer, node, area: moments.area * unit * unit, polar: moments.polar() * unit.powi(4) }
+}
