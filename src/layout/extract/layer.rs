@@ -2,6 +2,7 @@
 
 use super::anchors::Rule;
 use super::combs::{self, Finger};
+use super::holes;
 use super::joints::{self, Parts};
 use super::limbs;
 use super::medial::Medial;
@@ -30,6 +31,8 @@ pub(super) struct Part {
     pub(super) polygon: Polygon,
     /// Its axis, limbs and joints.
     pub(super) found: Found,
+    /// Etch holes in it, in coordinates of the drawing.
+    pub(super) holes: Vec<Moments>,
 }
 
 impl Part {
@@ -54,7 +57,7 @@ impl Shapes {
             Ok(Arc::new((axis, parts)))
         });
         match found {
-            Ok(found) => Ok(Part { found: found.clone(), polygon }),
+            Ok(found) => Ok(Part { found: found.clone(), polygon, holes: Vec::new() }),
             Err(why) => Err((polygon, why.clone())),
         }
     }
@@ -75,9 +78,18 @@ pub(super) fn extract(
     result: &mut Extraction,
 ) -> Result<(), ExtractError> {
     let unit = drawing.unit_m;
-    let drawn_area = regions::area(&regions::union(drawn));
+    let holes: Vec<Polygon> = drawing
+        .layers
+        .iter()
+        .filter(|(name, _)| process::names(&layer.holes, name))
+        .flat_map(|(_, polygons)| polygons.iter().cloned())
+        .collect();
     let snapped = snap::snap(drawn);
-    let solid = regions::union(snapped.as_deref().unwrap_or(drawn));
+    let solid = regions::difference(snapped.as_deref().unwrap_or(drawn), &holes);
+    let drawn_area = match snapped {
+        Some(_) => regions::area(&regions::difference(drawn, &holes)),
+        None => regions::area(&solid),
+    };
     let points: usize = solid.iter().flat_map(|p| &p.contours).map(Vec::len).sum();
     if points > MOST_POINTS {
         return Err(ExtractError::TooLarge { layer: layer.name.clone(), points });
@@ -100,10 +112,14 @@ pub(super) fn extract(
     let mut parts = Vec::new();
     for polygon in solid {
         budget::check();
+        let (polygon, holes) = holes::fill(polygon, layer.largest_hole / unit);
+        done.holes.0 += holes.len();
+        done.holes.1 += holes.iter().map(|h| h.area).sum::<f64>() * unit * unit;
         match shapes.analyse(polygon) {
-            Ok(part) => parts.push(part),
+            Ok(part) => parts.push(Part { holes, ..part }),
             Err((polygon, why)) => {
-                let area = regions::area(std::slice::from_ref(&polygon)) * unit * unit;
+                let area = regions::area(std::slice::from_ref(&polygon)) - holes.iter().map(|h| h.area).sum::<f64>();
+                let area = area * unit * unit;
                 done.unrecognised += area;
                 result.unrecognised.push(lost(layer, &polygon, unit, area, &why));
             }
@@ -126,7 +142,7 @@ pub(super) fn extract(
             budget::check();
             let (axis, found) = &*carrier.found;
             let origin = carrier.polygon.extent().unwrap_or_default()[0];
-            Model::of(axis, origin, found, &rule, taps)
+            Model::of(axis, origin, found, &rule, taps, &carrier.holes)
         })
         .collect();
     let mut loose = vec![false; parts.len()];
@@ -136,7 +152,7 @@ pub(super) fn extract(
     for (k, (part, model)) in parts.iter().zip(&models).enumerate() {
         let whole = regions::area(std::slice::from_ref(&part.polygon));
         if loose[k] || model.anchors.is_empty() && held > 0 && taps[k].is_empty() {
-            let area = whole * unit * unit;
+            let area = (whole - part.holes.iter().map(|h| h.area).sum::<f64>()) * unit * unit;
             done.unrecognised += area;
             let why = if loose[k] {
                 "it lies like a finger of a comb, and hangs on nothing"
@@ -149,15 +165,17 @@ pub(super) fn extract(
         }
         done.anchored += model.held * unit * unit;
         done.extracted += (model.area - model.held) * unit * unit;
-        let area = regions::area(std::slice::from_ref(&carriers[k].polygon));
-        if (model.area - area).abs() > 1e-9 * area {
+        let missing: f64 = part.holes.iter().map(|h| h.area).sum();
+        let solid = regions::area(std::slice::from_ref(&carriers[k].polygon));
+        let area = solid - missing;
+        if (model.area - area).abs() > 1e-9 * solid {
             let missing = (area - model.area) * unit * unit;
             done.unrecognised += missing;
             let lost = lost(layer, &part.polygon, unit, missing, "no limb or joint has it");
             sink.result.unrecognised.push(lost);
         }
         pulled.push(sink.add(model, k));
-        let fingers = whole - area;
+        let fingers = whole - solid;
         let moves = !(model.beams.is_empty() && model.bodies.is_empty());
         *(if moves { &mut done.extracted } else { &mut done.anchored }) += fingers * unit * unit;
     }
@@ -179,7 +197,10 @@ fn strip(shapes: &mut Shapes, parts: &[Part], fingers: &[Finger]) -> Vec<Part> {
         }
         let mut left = regions::union(&[combs::without(part, fingers)]);
         match (left.pop(), left.is_empty()) {
-            (Some(one), true) => shapes.analyse(one).unwrap_or_else(|_| part.clone()),
+            (Some(one), true) => {
+                let stripped = shapes.analyse(one).map(|one| Part { holes: part.holes.clone(), ..one });
+                stripped.unwrap_or_else(|_| part.clone())
+            }
             _ => part.clone(),
         }
     });
@@ -221,6 +242,7 @@ impl Sink<'_> {
             layer,
             nodes: [number[b.a], number[b.b]],
             width: b.width.map(|w| w * unit),
+            porosity: b.porosity,
         }));
         result.bodies.extend(model.bodies.iter().map(|b| body(layer, number[b.node], &b.moments, unit)));
         result.links.extend(model.links.iter().map(|l| l.map(|n| number[n])));

@@ -11,6 +11,7 @@
 mod anchors;
 mod boxes;
 mod combs;
+mod holes;
 mod joints;
 mod layer;
 mod limbs;
@@ -115,6 +116,8 @@ pub struct LayerResult {
     pub anchored: f64,
     /// Area that is in neither [m²].
     pub unrecognised: f64,
+    /// Number of etch holes that were filled, and their area [m²]; it is no part of `drawn`.
+    pub holes: (usize, f64),
     /// Number of parts that hang together.
     pub parts: usize,
 }
@@ -141,6 +144,8 @@ pub struct Beam {
     pub nodes: [usize; 2],
     /// Width at both [m].
     pub width: [f64; 2],
+    /// Share of its area that etch holes take [1].
+    pub porosity: f64,
 }
 
 /// A rigid body.

@@ -1,6 +1,7 @@
 //! From limbs and joints to nodes, beams, rigid bodies and anchors.
 
 use super::anchors::Rule;
+use super::boxes::Boxes;
 use super::joints::{self, Joint, Kind, Parts};
 use super::medial::Medial;
 use super::moments::Moments;
@@ -9,6 +10,8 @@ use super::moments::Moments;
 const STUMP: f64 = 1.5;
 /// Nodes nearer to each other than this many widths are one [1].
 const ON_AXIS: f64 = 0.01;
+/// A place on the edge of a part may lie this far outside [database units].
+const BESIDE: f64 = 4.0;
 /// A pad is at least this much wider than its limb [1].
 const PAD: f64 = 1.5;
 
@@ -38,6 +41,8 @@ pub(super) struct Beam {
     pub(super) a: usize,
     pub(super) b: usize,
     pub(super) width: [f64; 2],
+    /// Share of its area that holes take [1].
+    pub(super) porosity: f64,
 }
 
 /// A rigid body.
@@ -51,9 +56,23 @@ pub(super) struct Body {
 impl Model {
     /// Builds it from the axis of a part whose box has its lower left corner at `origin`; `taps` are places where
     /// something pulls at it, in coordinates of the drawing.
-    pub(super) fn of(axis: &Medial, origin: [i32; 2], parts: &Parts, rule: &Rule, taps: &[[f64; 2]]) -> Self {
+    pub(super) fn of(axis: &Medial, origin: [i32; 2], parts: &Parts, rule: &Rule, taps: &[[f64; 2]], holes: &[Moments]) -> Self {
         let origin = origin.map(f64::from);
-        let mut build = Builder { model: Self::default(), axis, origin, parts, rule, anchored: Vec::new(), bodies: vec![None; parts.joints.len()], taps: Vec::new() };
+        let mut build = Builder { model: Self::default(), axis, origin, parts, rule, anchored: Vec::new(), bodies: vec![None; parts.joints.len()], taps: Vec::new(),
+            cells: Cells::default(),
+            limb_holes: vec![0.0; parts.limbs.len()],
+            joint_holes: vec![Moments::default(); parts.joints.len()],
+        };
+        if !holes.is_empty() || !taps.is_empty() {
+            build.cells = Cells::of(axis, parts);
+        }
+        for hole in holes {
+            let local = hole.moved(origin.map(|x| -x));
+            match build.cells.nearest(axis, local.centroid()) {
+                Owner::Limb(k) => build.limb_holes[k] += local.area,
+                Owner::Joint(j) => build.joint_holes[j] += local,
+            }
+        }
         build.model.taps = vec![usize::MAX; taps.len()];
         build.taps = taps.iter().map(|p| build.tap(*p)).collect();
         let ports: Vec<Vec<usize>> = (0..parts.joints.len()).map(|j| build.joint(j)).collect();
@@ -91,6 +110,37 @@ enum Owner {
     Joint(usize),
 }
 
+/// The areas of limbs and joints, found by place.
+#[derive(Debug, Default)]
+struct Cells {
+    boxes: Boxes,
+    edges: Vec<(u32, Owner)>,
+}
+
+impl Cells {
+    fn of(axis: &Medial, parts: &Parts) -> Self {
+        let joints = parts.joints.iter().enumerate().flat_map(|(j, joint)| joint.edges.iter().map(move |e| (*e, Owner::Joint(j))));
+        let limbs = parts.limbs.iter().enumerate().flat_map(|(k, limb)| limb.edges.iter().map(move |e| (*e, Owner::Limb(k))));
+        let edges: Vec<_> = joints.chain(limbs).collect();
+        let outline = |e: u32| axis.outline(axis.edges[e as usize].ends, axis.edges[e as usize].sites);
+        let extents: Vec<_> = edges.iter().map(|(e, _)| super::boxes::around(outline(*e))).collect();
+        Self { boxes: Boxes::of(&extents), edges }
+    }
+
+    /// Whose area is nearest to a place on the part or at its edge.
+    fn nearest(&self, axis: &Medial, at: [f64; 2]) -> Owner {
+        let near = self.boxes.overlapping(&[at.map(|x| x - BESIDE), at.map(|x| x + BESIDE)]);
+        let all = 0..self.edges.len() as u32;
+        let near: Vec<u32> = if near.is_empty() { all.collect() } else { near };
+        let away = |k: &u32| {
+            let edge = &axis.edges[self.edges[*k as usize].0 as usize];
+            distance(&axis.outline(edge.ends, edge.sites), at)
+        };
+        let found = near.iter().min_by(|a, b| away(a).total_cmp(&away(b)).then(a.cmp(b)));
+        found.map_or(Owner::Joint(0), |k| self.edges[*k as usize].1)
+    }
+}
+
 struct Builder<'a> {
     model: Model,
     axis: &'a Medial,
@@ -103,6 +153,10 @@ struct Builder<'a> {
     /// For each joint, the node that stands for it.
     bodies: Vec<Option<usize>>,
     taps: Vec<Tap>,
+    cells: Cells,
+    /// Area of the holes in each limb, and holes in each joint.
+    limb_holes: Vec<f64>,
+    joint_holes: Vec<Moments>,
 }
 
 impl Builder<'_> {
@@ -122,19 +176,7 @@ impl Builder<'_> {
     /// What is nearest to a place.
     fn tap(&self, place: [f64; 2]) -> Tap {
         let at = [place[0] - self.origin[0], place[1] - self.origin[1]];
-        let mut best = (f64::INFINITY, Owner::Joint(0));
-        let mut look = |edges: &[u32], owner: Owner| {
-            for e in edges {
-                let edge = &self.axis.edges[*e as usize];
-                let away = distance(&self.axis.outline(edge.ends, edge.sites), at);
-                if away < best.0 {
-                    best = (away, owner);
-                }
-            }
-        };
-        self.parts.joints.iter().enumerate().for_each(|(j, joint)| look(&joint.edges, Owner::Joint(j)));
-        self.parts.limbs.iter().enumerate().for_each(|(k, limb)| look(&limb.edges, Owner::Limb(k)));
-        Tap { at, owner: best.1 }
+        Tap { at, owner: self.cells.nearest(self.axis, at) }
     }
 
     fn tap_joint(&mut self, k: usize, j: usize) {
@@ -154,31 +196,32 @@ impl Builder<'_> {
         let ends = match &joint.kind {
             Kind::Node(at) => {
                 let held = joint.ports.len() > 1 && self.holds(*at);
-                self.count(joint.cell.area, held);
+                self.count(joint.cell.area - self.joint_holes[j].area, held);
                 let width = joint.ports.iter().map(|p| self.parts.limbs[p.limb].width[p.end]).fold(0.0, f64::max);
                 vec![self.node(*at, width, held); joint.ports.len()]
             }
             Kind::Bar { nodes, width, ends } => {
-                self.count(joint.cell.area, false);
+                self.count(joint.cell.area - self.joint_holes[j].area, false);
                 let made: Vec<usize> = nodes.iter().map(|at| self.node(*at, *width, self.holds(*at))).collect();
                 for (pair, at) in made.windows(2).zip(nodes.windows(2)) {
                     let length = (at[1][0] - at[0][0]).hypot(at[1][1] - at[0][1]);
                     if joints::stout(length, *width) {
                         self.model.links.push([pair[0], pair[1]]);
                     } else {
-                        self.model.beams.push(Beam { a: pair[0], b: pair[1], width: [*width; 2] });
+                        self.model.beams.push(Beam { a: pair[0], b: pair[1], width: [*width; 2], porosity: 0.0 });
                     }
                 }
                 ends.iter().map(|k| made[*k]).collect()
             }
             Kind::Body(places) => {
                 let held = self.held_body(joint);
-                self.count(joint.cell.area, held);
+                self.count(joint.cell.area - self.joint_holes[j].area, held);
                 let size = joint.cell.area.max(0.0).sqrt();
                 let ends: Vec<usize> =
                     places.iter().map(|at| self.node(*at, if held { size } else { 0.0 }, held)).collect();
                 if !held {
-                    let moments = self.without_mouths(joint, places);
+                    let mut moments = self.without_mouths(joint, places);
+                    moments -= self.joint_holes[j];
                     let node = self.node(moments.centroid(), size, false);
                     self.model.links.extend(ends.iter().map(|end| [node, *end]));
                     self.model.bodies.push(Body { node, moments });
@@ -219,9 +262,11 @@ impl Builder<'_> {
             let strip = Moments::of(&[corner(e, 1.0), corner(e, -1.0), corner(*place, -1.0), corner(*place, 1.0)]);
             let out = if port.end == 1 { limb.direction() } else { limb.direction().map(|x| -x) };
             let sign = if d[0] * out[0] + d[1] * out[1] > 0.0 { -1.0 } else { 1.0 };
-            moments.area += sign * strip.area;
-            moments.second += sign * strip.second;
-            (0..2).for_each(|i| moments.first[i] += sign * strip.first[i]);
+            if sign > 0.0 {
+                moments += strip;
+            } else {
+                moments -= strip;
+            }
         }
         moments
     }
@@ -281,6 +326,7 @@ impl Builder<'_> {
         let width = |t: f64| limb.width[0] + t * (limb.width[1] - limb.width[0]);
         let widest = limb.width[0].max(limb.width[1]);
         let mut kept = 0.0;
+        let porosity = self.limb_holes[k] / limb.cell.area;
         let (loose_start, loose_end) = (loose(0), loose(1));
         let cut = !(free.len() == 1 && free[0] == [0.0, 1.0]);
         let origin = self.origin;
@@ -319,7 +365,7 @@ impl Builder<'_> {
             along.push((t1, end));
             for pair in along.windows(2) {
                 let width = [width(pair[0].0), width(pair[1].0)];
-                self.model.beams.push(Beam { a: pair[0].1, b: pair[1].1, width });
+                self.model.beams.push(Beam { a: pair[0].1, b: pair[1].1, width, porosity });
             }
         }
         for (t, tap) in taps {
@@ -328,8 +374,9 @@ impl Builder<'_> {
                 self.model.taps[tap] = self.node(self.taps[tap].at, 0.0, true);
             }
         }
-        self.model.area += limb.cell.area;
-        self.model.held += (1.0 - kept) * limb.cell.area;
+        let area = limb.cell.area - self.limb_holes[k];
+        self.model.area += area;
+        self.model.held += (1.0 - kept) * area;
     }
 }
 

@@ -1,6 +1,6 @@
 //! Area, first and second moment of polygons by Green's theorem.
 
-use std::ops::AddAssign;
+use std::ops::{AddAssign, SubAssign};
 
 /// Integrals over an area about the origin of its frame, in the units of its coordinates.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -65,6 +65,12 @@ impl AddAssign for Moments {
         for i in 0..2 {
             self.first[i] += other.first[i];
         }
+    }
+}
+
+impl SubAssign for Moments {
+    fn sub_assign(&mut self, other: Self) {
+        *self += Self { area: -other.area, first: other.first.map(|x| -x), second: -other.second };
     }
 }
 

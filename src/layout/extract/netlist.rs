@@ -2,7 +2,7 @@
 //!
 //! Widths and lengths that several beams share are parameters, so that the model can be swept. The same drawing gives the same bytes.
 
-use super::{Beam, Extraction};
+use super::{Beam, Extraction, LayerResult, holes};
 use crate::sets::Sets;
 use std::collections::HashMap;
 use std::fmt::Write as _;
@@ -48,7 +48,8 @@ pub fn netlist(extraction: &Extraction) -> String {
         let layer = &extraction.layers[piece.layer].name;
         let [a, b] = piece.nodes.map(|n| names[n]);
         let (l, w) = (lengths.word(micro(piece.length)), widths.word(micro(piece.width)));
-        let _ = writeln!(out, "beam2d {layer} [{a} {b}] [l={l} w={w}{}]", angle(piece.along));
+        let holes = perforated(&extraction.layers[piece.layer], piece.porosity);
+        let _ = writeln!(out, "beam2d {layer} [{a} {b}] [l={l} w={w}{}{holes}]", angle(piece.along));
     }
     for comb in &extraction.combs {
         let layer = &extraction.layers[comb.layer].name;
@@ -129,6 +130,7 @@ struct Piece {
     length: f64,
     along: [f64; 2],
     width: f64,
+    porosity: f64,
 }
 
 /// Beams as pieces of one width each, and the names of the nodes between pieces.
@@ -154,6 +156,7 @@ fn pieces(extraction: &Extraction) -> (Vec<Piece>, Vec<String>) {
                 length: d[0].hypot(d[1]) / count as f64,
                 along: d,
                 width,
+                porosity: beam.porosity,
             });
             from = to;
         }
@@ -234,6 +237,20 @@ impl Shared {
 fn micro(metres: f64) -> String {
     let rounded = (metres * 1e13).round() / 1e7;
     if rounded == 0.0 { "0".to_owned() } else { format!("{rounded}u") }
+}
+
+/// What etch holes leave of a beam's stiffness, mass and film.
+fn perforated(layer: &LayerResult, porosity: f64) -> String {
+    if porosity <= 0.0 {
+        return String::new();
+    }
+    let share = |name: &str, factor: f64| {
+        let value = layer.material.iter().find(|(known, _)| known == name).map(|(_, value)| value * factor);
+        value.map(|value| format!(" {name}={}", number(value))).unwrap_or_default()
+    };
+    share("Youngsmodulus", holes::stiffness(porosity))
+        + &share("density", 1.0 - porosity)
+        + &share("viscosity", 1.0 - porosity)
 }
 
 /// A number of the language.
