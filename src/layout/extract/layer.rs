@@ -256,7 +256,15 @@ impl Sink<'_> {
     }
 
     /// Tells by what rule parts are held where no anchor is drawn, and what nothing holds.
-    fn notes(&mut self, drawing: &Drawing, layer: &process::Layer, rule: &Rule, parts: &[Part], models: &[Model], loose: &[bool]) {
+    fn notes(
+        &mut self,
+        drawing: &Drawing,
+        layer: &process::Layer,
+        rule: &Rule,
+        parts: &[Part],
+        models: &[Model],
+        loose: &[bool],
+    ) {
         let place = |k: usize| {
             let [low, high] = parts[k].polygon.extent().unwrap_or_default();
             drawing.place([0, 1].map(|i| 0.5 * (f64::from(low[i]) + f64::from(high[i]))))
@@ -268,10 +276,12 @@ impl Sink<'_> {
         };
         let name = &layer.name;
         if matches!(rule, Rule::Pads) {
-            let whole: Vec<usize> =
-                (0..parts.len()).filter(|k| !loose[*k] && models[*k].beams.is_empty() && models[*k].bodies.is_empty()).collect();
+            let whole: Vec<usize> = (0..parts.len())
+                .filter(|k| !loose[*k] && models[*k].beams.is_empty() && models[*k].bodies.is_empty())
+                .collect();
             let pads: usize = models.iter().filter(|m| !m.beams.is_empty()).map(|m| m.anchors.len()).sum();
-            let mut told = format!("layer {name}: no anchors are drawn; by rule, {pads} ends of limbs in pads are held");
+            let mut told =
+                format!("layer {name}: no anchors are drawn; by rule, {pads} ends of limbs in pads are held");
             if !whole.is_empty() {
                 told += &format!(", and parts without limbs or pads of their own: {}", list(whole));
             }
@@ -284,7 +294,8 @@ impl Sink<'_> {
         let free: Vec<usize> =
             (0..parts.len()).filter(|k| models[*k].anchors.is_empty() && !models[*k].taps.is_empty()).collect();
         if !free.is_empty() {
-            let told = format!("layer {name}: nothing holds the parts with combs, which stay in the model: {}", list(free));
+            let told =
+                format!("layer {name}: nothing holds the parts with combs, which stay in the model: {}", list(free));
             self.result.notes.push(told);
         }
     }
@@ -294,7 +305,8 @@ impl Sink<'_> {
         let held = nodes.map(|n| self.result.anchors.contains(&n));
         for (i, node) in nodes.into_iter().enumerate() {
             if !held[i] && comb.masses[i].area > 0.0 {
-                let center = self.node(comb.masses[i].centroid().map(|x| x * self.unit), 0.0, self.first + comb.parts[i]);
+                let center =
+                    self.node(comb.masses[i].centroid().map(|x| x * self.unit), 0.0, self.first + comb.parts[i]);
                 self.result.links.push([node, center]);
                 self.result.bodies.push(body(self.layer, center, &comb.masses[i], self.unit));
             }

@@ -9,6 +9,7 @@
 //! of rectangles, so that drawings at any angle are taken apart alike.
 
 mod anchors;
+mod arcs;
 mod boxes;
 mod combs;
 mod holes;
@@ -82,6 +83,8 @@ pub struct Extraction {
     pub nodes: Vec<Node>,
     /// Flexible beams.
     pub beams: Vec<Beam>,
+    /// Beams along a circle.
+    pub arcs: Vec<Arc>,
     /// Rigid bodies.
     pub bodies: Vec<Body>,
     /// Rigid, massless connections of two nodes.
@@ -144,6 +147,21 @@ pub struct Beam {
     pub nodes: [usize; 2],
     /// Width at both [m].
     pub width: [f64; 2],
+    /// Share of its area that etch holes take [1].
+    pub porosity: f64,
+}
+
+/// A beam along a circle.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Arc {
+    /// Index of its layer.
+    pub layer: usize,
+    /// Nodes at its start and end.
+    pub nodes: [usize; 2],
+    /// By how much it turns on the way [rad], positive to its left.
+    pub angle: f64,
+    /// Width [m].
+    pub width: f64,
     /// Share of its area that etch holes take [1].
     pub porosity: f64,
 }
@@ -228,6 +246,9 @@ pub fn extract(drawing: &Drawing, process: &Process, options: &ExtractOptions) -
             found: if found.is_empty() { "none".to_owned() } else { found.join(", ") },
         });
     }
+    arcs::same_widths(&mut result, drawing.unit_m);
+    arcs::arcs(&mut result, drawing.unit_m);
+    result.drop_unused_nodes();
     names::name(&mut result, drawing);
     Ok(result)
 }
@@ -250,3 +271,29 @@ fn unknown_layers(drawing: &Drawing, process: &Process, result: &mut Extraction)
     }
 }
 
+impl Extraction {
+    /// All places where elements name nodes.
+    fn named(&mut self) -> impl Iterator<Item = &mut usize> {
+        let beams = self.beams.iter_mut().flat_map(|b| &mut b.nodes);
+        let arcs = self.arcs.iter_mut().flat_map(|a| &mut a.nodes);
+        let bodies = self.bodies.iter_mut().map(|b| &mut b.node);
+        let links = self.links.iter_mut().flatten();
+        let combs = self.combs.iter_mut().flat_map(|c| &mut c.nodes);
+        beams.chain(arcs).chain(bodies).chain(links).chain(&mut self.anchors).chain(combs)
+    }
+
+    /// Drops nodes that arcs took the place of.
+    fn drop_unused_nodes(&mut self) {
+        let mut used = vec![false; self.nodes.len()];
+        self.named().for_each(|n| used[*n] = true);
+        let mut number = vec![0; used.len()];
+        let mut count = 0;
+        for (number, used) in number.iter_mut().zip(&used) {
+            *number = count;
+            count += usize::from(*used);
+        }
+        let mut kept = used.into_iter();
+        self.nodes.retain(|_| kept.next().unwrap_or(false));
+        self.named().for_each(|n| *n = number[*n]);
+    }
+}

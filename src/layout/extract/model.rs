@@ -56,9 +56,24 @@ pub(super) struct Body {
 impl Model {
     /// Builds it from the axis of a part whose box has its lower left corner at `origin`; `taps` are places where
     /// something pulls at it, in coordinates of the drawing.
-    pub(super) fn of(axis: &Medial, origin: [i32; 2], parts: &Parts, rule: &Rule, taps: &[[f64; 2]], holes: &[Moments]) -> Self {
+    pub(super) fn of(
+        axis: &Medial,
+        origin: [i32; 2],
+        parts: &Parts,
+        rule: &Rule,
+        taps: &[[f64; 2]],
+        holes: &[Moments],
+    ) -> Self {
         let origin = origin.map(f64::from);
-        let mut build = Builder { model: Self::default(), axis, origin, parts, rule, anchored: Vec::new(), bodies: vec![None; parts.joints.len()], taps: Vec::new(),
+        let mut build = Builder {
+            model: Self::default(),
+            axis,
+            origin,
+            parts,
+            rule,
+            anchored: Vec::new(),
+            bodies: vec![None; parts.joints.len()],
+            taps: Vec::new(),
             cells: Cells::default(),
             limb_holes: vec![0.0; parts.limbs.len()],
             joint_holes: vec![Moments::default(); parts.joints.len()],
@@ -119,8 +134,13 @@ struct Cells {
 
 impl Cells {
     fn of(axis: &Medial, parts: &Parts) -> Self {
-        let joints = parts.joints.iter().enumerate().flat_map(|(j, joint)| joint.edges.iter().map(move |e| (*e, Owner::Joint(j))));
-        let limbs = parts.limbs.iter().enumerate().flat_map(|(k, limb)| limb.edges.iter().map(move |e| (*e, Owner::Limb(k))));
+        let joints = parts
+            .joints
+            .iter()
+            .enumerate()
+            .flat_map(|(j, joint)| joint.edges.iter().map(move |e| (*e, Owner::Joint(j))));
+        let limbs =
+            parts.limbs.iter().enumerate().flat_map(|(k, limb)| limb.edges.iter().map(move |e| (*e, Owner::Limb(k))));
         let edges: Vec<_> = joints.chain(limbs).collect();
         let outline = |e: u32| axis.outline(axis.edges[e as usize].ends, axis.edges[e as usize].sites);
         let extents: Vec<_> = edges.iter().map(|(e, _)| super::boxes::around(outline(*e))).collect();

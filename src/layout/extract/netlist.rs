@@ -9,8 +9,6 @@ use std::fmt::Write as _;
 
 /// So many beams must share a width, or a length, for it to become a parameter.
 const SHARED: [usize; 2] = [2, 3];
-/// Pieces of a beam whose width changes along it.
-const TAPER_PIECES: usize = 8;
 /// Relative change of the width below which a beam has one width [1]: what rounding to the grid does.
 const UNIFORM: f64 = 5e-3;
 
@@ -18,11 +16,12 @@ const UNIFORM: f64 = 5e-3;
 pub fn netlist(extraction: &Extraction) -> String {
     let mut out = String::new();
     head(extraction, &mut out);
-    let (pieces, inner) = pieces(extraction);
-    let names: Vec<&str> =
-        extraction.nodes.iter().map(|n| n.name.as_str()).chain(inner.iter().map(String::as_str)).collect();
-    let widths = Shared::new("w", SHARED[0], pieces.iter().map(|p| micro(p.width)));
-    let lengths = Shared::new("l", SHARED[1], pieces.iter().map(|p| micro(p.length)));
+    let members = members(extraction);
+    let names: Vec<&str> = extraction.nodes.iter().map(|n| n.name.as_str()).collect();
+    let arc_widths = extraction.arcs.iter().map(|a| a.width);
+    let widths = members.iter().flat_map(|m| if m.taper { m.beam.width.to_vec() } else { vec![m.beam.width[0]] });
+    let widths = Shared::new("w", SHARED[0], widths.chain(arc_widths).map(micro));
+    let lengths = Shared::new("l", SHARED[1], members.iter().map(|m| micro(m.length)));
     for (shared, what) in [(&widths, "width"), (&lengths, "length")] {
         for (name, value, count) in &shared.parameters {
             let _ = writeln!(out, "param {name} = {value}  % {what} of {count} beams");
@@ -44,12 +43,33 @@ pub fn netlist(extraction: &Extraction) -> String {
         let (l, oz) = (micro(d[0].hypot(d[1])), angle(d));
         let _ = writeln!(out, "link2d * [{} {}] [l={l}{oz}]", names[*a], names[*b]);
     }
-    for piece in &pieces {
-        let layer = &extraction.layers[piece.layer].name;
-        let [a, b] = piece.nodes.map(|n| names[n]);
-        let (l, w) = (lengths.word(micro(piece.length)), widths.word(micro(piece.width)));
-        let holes = perforated(&extraction.layers[piece.layer], piece.porosity);
-        let _ = writeln!(out, "beam2d {layer} [{a} {b}] [l={l} w={w}{}{holes}]", angle(piece.along));
+    for Member { beam, along, length, taper } in &members {
+        let layer = &extraction.layers[beam.layer];
+        let [a, b] = beam.nodes.map(|n| names[n]);
+        let (l, oz, holes) = (lengths.word(micro(*length)), angle(*along), perforated(layer, beam.porosity));
+        let [w0, w1] = beam.width.map(|w| widths.word(micro(w)));
+        let name = &layer.name;
+        let _ = if *taper {
+            writeln!(out, "taper2d {name} [{a} {b}] [l={l} w1={w0} w2={w1}{oz}{holes}]")
+        } else {
+            writeln!(out, "beam2d {name} [{a} {b}] [l={l} w={w0}{oz}{holes}]")
+        };
+    }
+    for arc in &extraction.arcs {
+        let layer = &extraction.layers[arc.layer];
+        // an arc of the language turns to its left
+        let [a, b] = if arc.angle > 0.0 { arc.nodes } else { [arc.nodes[1], arc.nodes[0]] };
+        let (d, alpha) = (difference(extraction, a, b), arc.angle.abs());
+        let radius = micro(0.5 * d[0].hypot(d[1]) / (0.5 * alpha).sin());
+        let start = d[1].atan2(d[0]) - 0.5 * alpha;
+        let (w, oz, holes) =
+            (widths.word(micro(arc.width)), angle([start.cos(), start.sin()]), perforated(layer, arc.porosity));
+        let (name, degrees) = (&layer.name, (alpha.to_degrees() * 1e9).round() / 1e9);
+        let _ = writeln!(
+            out,
+            "circbeam {name} [{} {}] [radius={radius} alpha=deg({degrees}) w={w}{oz}{holes}]",
+            names[a], names[b]
+        );
     }
     for comb in &extraction.combs {
         let layer = &extraction.layers[comb.layer].name;
@@ -61,7 +81,13 @@ pub fn netlist(extraction: &Extraction) -> String {
         let _ = writeln!(
             out,
             "comb2de {layer} [{a} {b}] [N={} gap={} l={} L={}{}]  % {} and {} fingers",
-            comb.gaps, sizes[0], sizes[1], sizes[2], angle(d), comb.fingers[0], comb.fingers[1]
+            comb.gaps,
+            sizes[0],
+            sizes[1],
+            sizes[2],
+            angle(d),
+            comb.fingers[0],
+            comb.fingers[1]
         );
     }
     conductors(extraction, &mut out);
@@ -97,7 +123,13 @@ fn head(extraction: &Extraction, out: &mut String) {
 /// Parts that move are at ground; of those that hold still each is a port.
 fn conductors(extraction: &Extraction, out: &mut String) {
     let mut moves = std::collections::BTreeMap::new();
-    for node in extraction.beams.iter().flat_map(|b| b.nodes).chain(extraction.bodies.iter().map(|b| b.node)) {
+    for node in extraction
+        .beams
+        .iter()
+        .flat_map(|b| b.nodes)
+        .chain(extraction.arcs.iter().flat_map(|a| a.nodes))
+        .chain(extraction.bodies.iter().map(|b| b.node))
+    {
         moves.insert(extraction.nodes[node].part, true);
     }
     // nodes with a potential, by part
@@ -123,45 +155,26 @@ fn conductors(extraction: &Extraction, out: &mut String) {
     }
 }
 
-/// A straight piece with one width.
-struct Piece {
-    layer: usize,
-    nodes: [usize; 2],
-    length: f64,
+/// A beam with the words for its width.
+struct Member {
+    beam: Beam,
     along: [f64; 2],
-    width: f64,
-    porosity: f64,
+    length: f64,
+    taper: bool,
 }
 
-/// Beams as pieces of one width each, and the names of the nodes between pieces.
-fn pieces(extraction: &Extraction) -> (Vec<Piece>, Vec<String>) {
-    let (mut pieces, mut inner) = (Vec::new(), Vec::new());
-    for (k, beam) in extraction.beams.iter().enumerate() {
-        let beam = forwards(extraction, beam);
-        let d = difference(extraction, beam.nodes[0], beam.nodes[1]);
+fn members(extraction: &Extraction) -> Vec<Member> {
+    let members = extraction.beams.iter().map(|beam| {
+        let mut beam = forwards(extraction, beam);
+        let along = difference(extraction, beam.nodes[0], beam.nodes[1]);
         let [w0, w1] = beam.width;
-        let count = if (w1 - w0).abs() <= UNIFORM * w0.max(w1) { 1 } else { TAPER_PIECES };
-        let mut from = beam.nodes[0];
-        for piece in 0..count {
-            let to = if piece + 1 == count {
-                beam.nodes[1]
-            } else {
-                inner.push(format!("t{}_{}", k + 1, piece + 1));
-                extraction.nodes.len() + inner.len() - 1
-            };
-            let width = w0 + (w1 - w0) * (piece as f64 + 0.5) / count as f64;
-            pieces.push(Piece {
-                layer: beam.layer,
-                nodes: [from, to],
-                length: d[0].hypot(d[1]) / count as f64,
-                along: d,
-                width,
-                porosity: beam.porosity,
-            });
-            from = to;
+        let taper = (w1 - w0).abs() > UNIFORM * w0.max(w1);
+        if !taper {
+            beam.width = [0.5 * (w0 + w1); 2];
         }
-    }
-    (pieces, inner)
+        Member { length: along[0].hypot(along[1]), along, taper, beam }
+    });
+    members.collect()
 }
 
 /// The beam from left to right, or upwards.
@@ -184,7 +197,13 @@ fn difference(extraction: &Extraction, a: usize, b: usize) -> [f64; 2] {
 /// Places parts that do not hang together with the first.
 fn places(extraction: &Extraction, out: &mut String) {
     let mut sets = Sets::new(extraction.nodes.len());
-    for [a, b] in extraction.beams.iter().map(|b| b.nodes).chain(extraction.links.iter().copied()) {
+    for [a, b] in extraction
+        .beams
+        .iter()
+        .map(|b| b.nodes)
+        .chain(extraction.arcs.iter().map(|a| a.nodes))
+        .chain(extraction.links.iter().copied())
+    {
         sets.join(a, b);
     }
     for n in 1..extraction.nodes.len() {
@@ -199,8 +218,9 @@ fn places(extraction: &Extraction, out: &mut String) {
 /// The layer of each node.
 fn layers(extraction: &Extraction) -> Vec<&str> {
     let mut layers = vec!["*"; extraction.nodes.len()];
-    for beam in &extraction.beams {
-        beam.nodes.iter().for_each(|n| layers[*n] = &extraction.layers[beam.layer].name);
+    let arcs = extraction.arcs.iter().map(|a| (a.nodes, a.layer));
+    for (nodes, layer) in extraction.beams.iter().map(|b| (b.nodes, b.layer)).chain(arcs) {
+        nodes.iter().for_each(|n| layers[*n] = &extraction.layers[layer].name);
     }
     layers
 }
