@@ -284,5 +284,8 @@ pub(super) fn without(part: &Part, fingers: &[&Finger]) -> Polygon {
         kept.dedup();
         kept
     };
-    Polygon { contours: part.polygon.contours.iter().map(keep).collect() }
+    // the axis counts points as it led edges through them
+    let split = super::snap::split(&part.polygon);
+    let polygon = split.as_ref().unwrap_or(&part.polygon);
+    Polygon { contours: polygon.contours.iter().map(keep).collect() }
 }

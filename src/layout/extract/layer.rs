@@ -21,6 +21,9 @@ use std::sync::Arc;
 /// Bytes for each point of a layer while its axis is made.
 const BYTES_PER_POINT: usize = 1200;
 
+/// By what share of a part its pieces may miss its area [1].
+const BALANCE: f64 = 1e-9;
+
 /// What was found along the axis of a shape.
 type Found = Arc<(Medial, Parts)>;
 
@@ -134,7 +137,7 @@ pub(super) fn extract(
     let first = result.layers.iter().map(|layer| layer.parts).sum();
     let mut sink = Sink { layer: result.layers.len(), result, first, unit };
     // for each part, the nodes where combs pull
-    let mut pulled: Vec<std::vec::IntoIter<usize>> = Vec::new();
+    let mut pulled: Vec<Option<std::vec::IntoIter<usize>>> = Vec::new();
     let models: Vec<Model> = carriers
         .iter()
         .zip(&taps)
@@ -151,37 +154,33 @@ pub(super) fn extract(
     sink.notes(drawing, layer, &rule, &parts, &models, &loose);
     for (k, (part, model)) in parts.iter().zip(&models).enumerate() {
         let whole = regions::area(std::slice::from_ref(&part.polygon));
-        if loose[k] || model.anchors.is_empty() && held > 0 && taps[k].is_empty() {
-            let area = (whole - part.holes.iter().map(|h| h.area).sum::<f64>()) * unit * unit;
-            done.unrecognised += area;
-            let why = if loose[k] {
-                "it lies like a finger of a comb, and hangs on nothing"
-            } else {
-                "nothing holds it, and it faces nothing that is held: it would float away"
-            };
-            sink.result.unrecognised.push(lost(layer, &part.polygon, unit, area, why));
-            pulled.push(Vec::new().into_iter());
-            continue;
-        }
-        done.anchored += model.held * unit * unit;
-        done.extracted += (model.area - model.held) * unit * unit;
         let missing: f64 = part.holes.iter().map(|h| h.area).sum();
         let solid = regions::area(std::slice::from_ref(&carriers[k].polygon));
-        let area = solid - missing;
-        if (model.area - area).abs() > 1e-9 * solid {
-            let missing = (area - model.area) * unit * unit;
-            done.unrecognised += missing;
-            let lost = lost(layer, &part.polygon, unit, missing, "no limb or joint has it");
-            sink.result.unrecognised.push(lost);
-        }
-        pulled.push(sink.add(model, k));
-        let fingers = whole - solid;
-        let moves = !(model.beams.is_empty() && model.bodies.is_empty());
-        *(if moves { &mut done.extracted } else { &mut done.anchored }) += fingers * unit * unit;
+        let why = if (model.area - (solid - missing)).abs() > BALANCE * solid {
+            "the parts of its axis do not cover it: it is drawn too finely for its grid"
+        } else if loose[k] {
+            "it lies like a finger of a comb, and hangs on nothing"
+        } else if model.anchors.is_empty() && held > 0 && taps[k].is_empty() {
+            "nothing holds it, and it faces nothing that is held: it would float away"
+        } else {
+            done.anchored += model.held * unit * unit;
+            done.extracted += (model.area - model.held) * unit * unit;
+            let fingers = whole - solid;
+            let moves = !(model.beams.is_empty() && model.bodies.is_empty());
+            *(if moves { &mut done.extracted } else { &mut done.anchored }) += fingers * unit * unit;
+            pulled.push(Some(sink.add(model, k)));
+            continue;
+        };
+        let area = (whole - missing) * unit * unit;
+        done.unrecognised += area;
+        sink.result.unrecognised.push(lost(layer, &part.polygon, unit, area, why));
+        pulled.push(None);
     }
     for comb in &combs {
-        let nodes = comb.parts.map(|k| pulled[k].next().unwrap_or_default());
-        sink.comb(comb, nodes);
+        let nodes = comb.parts.map(|k| pulled[k].as_mut().and_then(Iterator::next));
+        if let [Some(a), Some(b)] = nodes {
+            sink.comb(comb, [a, b]);
+        }
     }
     result.layers.push(done);
     Ok(())

@@ -8,7 +8,8 @@
 
 use super::moments::Moments;
 use crate::layout::drawing::{Point, Polygon};
-use boostvoronoi::prelude::{Builder, BvError, SourceCategory};
+use boostvoronoi::prelude::{Builder, BvError, Diagram, SourceCategory};
+use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// What an edge of the axis keeps its distance from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -54,6 +55,23 @@ pub struct Medial {
     pub edges: Vec<Edge>,
 }
 
+/// The diagram of a polygon's edges could not be made.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("its medial axis could not be computed ({0})")]
+pub struct NoAxis(String);
+
+impl From<BvError> for NoAxis {
+    fn from(why: BvError) -> Self {
+        Self(why.to_string())
+    }
+}
+
+/// The Voronoi diagram of segments. Its predicates give up on some outlines that are a few database units wide by a panic.
+fn diagram(segments: &[[i32; 4]]) -> Result<Diagram, NoAxis> {
+    let build = || Ok(Builder::<i32>::default().with_segments(segments.iter())?.build()?);
+    catch_unwind(AssertUnwindSafe(build)).unwrap_or_else(|_| Err(NoAxis("its edges are too close together".to_owned())))
+}
+
 const NOWHERE: u32 = u32::MAX;
 
 impl Medial {
@@ -61,7 +79,9 @@ impl Medial {
     ///
     /// # Errors
     /// The diagram could not be made.
-    pub fn of(polygon: &Polygon) -> Result<Self, BvError> {
+    pub fn of(polygon: &Polygon) -> Result<Self, NoAxis> {
+        let split = super::snap::split(polygon);
+        let polygon = split.as_ref().unwrap_or(polygon);
         let [origin, _] = polygon.extent().unwrap_or_default();
         let mut axis = Self::default();
         let mut segments: Vec<[i32; 4]> = Vec::new();
@@ -75,7 +95,7 @@ impl Medial {
                 segments.push([p[0], p[1], q[0], q[1]]);
             }
         }
-        let diagram = Builder::<i32>::default().with_segments(segments.iter())?.build()?;
+        let diagram = diagram(&segments)?;
         let cells = diagram.cells();
         let site = |cell: usize| {
             let (source, category) = cells[cell].source_index_2();
@@ -191,20 +211,26 @@ fn spread(
             }
         }
     }
-    let mut open: Vec<usize> = (0..found.len()).filter(|k| inside[*k].is_none()).collect();
-    loop {
-        let before = open.len();
-        open.retain(|&k| {
-            let ends = found[k].0;
-            let Some(known) = ends.iter().find_map(|v| verdict[*v as usize]) else { return true };
-            inside[k] = Some(known);
-            for v in ends {
-                verdict[v as usize].get_or_insert(known);
+    // edges at each vertex that wait for a verdict
+    let mut waiting: std::collections::HashMap<u32, Vec<usize>> = std::collections::HashMap::new();
+    for k in (0..found.len()).filter(|k| inside[*k].is_none()) {
+        found[k].0.iter().for_each(|v| waiting.entry(*v).or_default().push(k));
+    }
+    let mut open: Vec<u32> = (0..places.len() as u32).filter(|v| verdict[*v as usize].is_some()).collect();
+    while let Some(v) = open.pop() {
+        let known = verdict[v as usize];
+        for k in waiting.remove(&v).unwrap_or_default() {
+            if inside[k].is_some() {
+                continue;
             }
-            false
-        });
-        if open.is_empty() || open.len() == before {
-            return inside.into_iter().map(|known| known == Some(true)).collect();
+            inside[k] = known;
+            for u in found[k].0 {
+                if verdict[u as usize].is_none() {
+                    verdict[u as usize] = known;
+                    open.push(u);
+                }
+            }
         }
     }
+    inside.into_iter().map(|known| known == Some(true)).collect()
 }

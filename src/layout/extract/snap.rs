@@ -12,6 +12,16 @@ const NEAR: f64 = 1.5;
 
 /// The polygons with corners near their edges put on them; none when nothing is near.
 pub(super) fn snap(polygons: &[Polygon]) -> Option<Vec<Polygon>> {
+    lead_through(polygons, |off| off != 0.0 && off.abs() <= NEAR)
+}
+
+/// A polygon whose edges have a corner wherever another of its corners touches them; none where none does.
+pub(super) fn split(polygon: &Polygon) -> Option<Polygon> {
+    lead_through(std::slice::from_ref(polygon), |off| off == 0.0)?.pop()
+}
+
+/// Edges are led through corners at a distance that `wanted` says yes to.
+fn lead_through(polygons: &[Polygon], wanted: impl Fn(f64) -> bool) -> Option<Vec<Polygon>> {
     let float = |p: Point| p.map(f64::from);
     let edges = || {
         let contours = polygons.iter().flat_map(|polygon| &polygon.contours);
@@ -52,7 +62,7 @@ pub(super) fn snap(polygons: &[Polygon]) -> Option<Vec<Polygon>> {
             let (d, f) = ([q[0] - p[0], q[1] - p[1]], [c[0] - p[0], c[1] - p[1]]);
             let l = d[0].hypot(d[1]);
             let (along, off) = ((f[0] * d[0] + f[1] * d[1]) / l, (f[0] * d[1] - f[1] * d[0]) / l);
-            if off != 0.0 && off.abs() <= NEAR && along > 0.0 && along < l {
+            if wanted(off) && along > 0.0 && along < l {
                 on.push((k, along, corner));
                 last = k;
             }
