@@ -95,7 +95,8 @@ fn chains(result: &Extraction) -> Vec<Vec<Link>> {
     let mut through: Vec<bool> = at.iter().map(|beams| beams.len() == 2).collect();
     let others = result.links.iter().flatten().chain(&result.anchors).copied();
     let others = others.chain(result.bodies.iter().map(|b| b.node)).chain(result.combs.iter().flat_map(|c| c.nodes));
-    others.for_each(|n| through[n] = false);
+    let plates = result.plates.iter().flat_map(|p| p.nodes).chain(result.facing.iter().flat_map(|f| f.nodes));
+    others.chain(plates).for_each(|n| through[n] = false);
     let mut done = vec![false; result.beams.len()];
     let mut chains = Vec::new();
     for rings in [false, true] {

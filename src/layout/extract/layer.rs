@@ -2,6 +2,7 @@
 
 use super::anchors::Rule;
 use super::combs::{self, Finger};
+use super::gaps::{self, Pull};
 use super::holes;
 use super::joints::{self, Parts};
 use super::limbs;
@@ -10,7 +11,7 @@ use super::model::Model;
 use super::moments::Moments;
 use super::skeleton::Skeleton;
 use super::snap;
-use super::{Beam, Body, Comb, ExtractError, Extraction, LayerResult, MOST_POINTS, Node, Unrecognised};
+use super::{Beam, Body, Comb, ExtractError, Extraction, Facing, LayerResult, MOST_POINTS, Node, Plates, Unrecognised};
 use crate::budget;
 use crate::layout::drawing::{Drawing, Polygon};
 use crate::layout::process;
@@ -130,24 +131,26 @@ pub(super) fn extract(
     }
     let (combs, fingers) = combs::combs(&parts);
     let carriers = strip(&mut shapes, &parts, &fingers);
-    let mut taps: Vec<Vec<[f64; 2]>> = vec![Vec::new(); parts.len()];
+    let mut taps: Vec<Vec<([f64; 2], bool)>> = vec![Vec::new(); parts.len()];
     for comb in &combs {
-        (0..2).for_each(|i| taps[comb.parts[i]].push(comb.roots[i]));
+        (0..2).for_each(|i| taps[comb.parts[i]].push((comb.roots[i], false)));
     }
+    let model = |(carrier, taps): (&Part, &Vec<([f64; 2], bool)>)| {
+        budget::check();
+        let (axis, found) = &*carrier.found;
+        let origin = carrier.polygon.extent().unwrap_or_default()[0];
+        Model::of(axis, origin, found, &rule, taps, &carrier.holes)
+    };
+    let bare: Vec<Vec<([f64; 2], bool)>> = vec![Vec::new(); parts.len()];
+    let moves: Vec<bool> =
+        carriers.iter().zip(&bare).map(model).map(|m| !(m.beams.is_empty() && m.bodies.is_empty())).collect();
+    let gaps = gaps::gaps(&carriers, &moves, &combs, gaps::WIDEST / unit);
+    gaps.iter().flat_map(gaps::Gap::pulls).for_each(|pull| taps[pull.part].push((pull.at, pull.on_axis)));
     let first = result.layers.iter().map(|layer| layer.parts).sum();
     let mut sink = Sink { layer: result.layers.len(), result, first, unit };
     // for each part, the nodes where combs pull
     let mut pulled: Vec<Option<std::vec::IntoIter<usize>>> = Vec::new();
-    let models: Vec<Model> = carriers
-        .iter()
-        .zip(&taps)
-        .map(|(carrier, taps)| {
-            budget::check();
-            let (axis, found) = &*carrier.found;
-            let origin = carrier.polygon.extent().unwrap_or_default()[0];
-            Model::of(axis, origin, found, &rule, taps, &carrier.holes)
-        })
-        .collect();
+    let models: Vec<Model> = carriers.iter().zip(&taps).map(model).collect();
     let mut loose = vec![false; parts.len()];
     combs.iter().flat_map(|comb| &comb.loose).for_each(|k| loose[*k] = true);
     let held = models.iter().filter(|model| !model.anchors.is_empty()).count();
@@ -180,6 +183,29 @@ pub(super) fn extract(
         let nodes = comb.parts.map(|k| pulled[k].as_mut().and_then(Iterator::next));
         if let [Some(a), Some(b)] = nodes {
             sink.comb(comb, [a, b]);
+        }
+    }
+    for gap in &gaps {
+        let mut node = |pull: &Pull| pulled[pull.part].as_mut().and_then(Iterator::next);
+        match gap {
+            gaps::Gap::Plates { pulls, length, gap } => {
+                if let [Some(a), Some(b)] = [node(&pulls[0]), node(&pulls[1])] {
+                    let area = length * unit * layer.thickness;
+                    sink.result.plates.push(Plates { layer: sink.layer, nodes: [a, b], area, gap: gap * unit });
+                }
+            }
+            gaps::Gap::Beams { upper, lower, width, gap } => {
+                let mut row = |pulls: &Vec<Pull>| pulls.iter().map(&mut node).collect::<Option<Vec<usize>>>();
+                if let (Some(upper), Some(lower)) = (row(upper), row(lower)) {
+                    let widths = width.map(|w| w * unit);
+                    sink.result.facing.extend(upper.windows(2).zip(lower.windows(2)).map(|(u, l)| Facing {
+                        layer: sink.layer,
+                        nodes: [u[0], u[1], l[0], l[1]],
+                        width: widths,
+                        gap: gap * unit,
+                    }));
+                }
+            }
         }
     }
     result.layers.push(done);

@@ -12,6 +12,7 @@ mod anchors;
 mod arcs;
 mod boxes;
 mod combs;
+mod gaps;
 mod holes;
 mod joints;
 mod layer;
@@ -93,6 +94,10 @@ pub struct Extraction {
     pub anchors: Vec<usize>,
     /// Comb drives.
     pub combs: Vec<Comb>,
+    /// Lumped plates that face each other.
+    pub plates: Vec<Plates>,
+    /// Beams that face another part.
+    pub facing: Vec<Facing>,
     /// What is not in the model.
     pub unrecognised: Vec<Unrecognised>,
     /// What a reader should know, in words with places and sizes.
@@ -196,6 +201,32 @@ pub struct Comb {
     pub overlap: f64,
 }
 
+/// Two plates that face each other.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plates {
+    /// Index of its layer.
+    pub layer: usize,
+    /// Nodes on both sides, across the gap.
+    pub nodes: [usize; 2],
+    /// Area [m²].
+    pub area: f64,
+    /// Gap [m].
+    pub gap: f64,
+}
+
+/// A piece of a beam that faces another part.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Facing {
+    /// Index of its layer.
+    pub layer: usize,
+    /// Nodes along the beam, and those across the gap, to the right of the way from the first to the second.
+    pub nodes: [usize; 4],
+    /// Widths of the two [m].
+    pub width: [f64; 2],
+    /// Gap [m].
+    pub gap: f64,
+}
+
 /// Something that is not in the model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Unrecognised {
@@ -279,7 +310,10 @@ impl Extraction {
         let bodies = self.bodies.iter_mut().map(|b| &mut b.node);
         let links = self.links.iter_mut().flatten();
         let combs = self.combs.iter_mut().flat_map(|c| &mut c.nodes);
-        beams.chain(arcs).chain(bodies).chain(links).chain(&mut self.anchors).chain(combs)
+        let plates = self.plates.iter_mut().flat_map(|p| &mut p.nodes);
+        let facing = self.facing.iter_mut().flat_map(|f| &mut f.nodes);
+        let gaps = combs.chain(plates).chain(facing);
+        beams.chain(arcs).chain(bodies).chain(links).chain(&mut self.anchors).chain(gaps)
     }
 
     /// Drops nodes that arcs took the place of.

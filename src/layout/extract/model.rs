@@ -55,13 +55,13 @@ pub(super) struct Body {
 
 impl Model {
     /// Builds it from the axis of a part whose box has its lower left corner at `origin`; `taps` are places where
-    /// something pulls at it, in coordinates of the drawing.
+    /// something pulls at it, in coordinates of the drawing: on a centreline, or at the end of an arm.
     pub(super) fn of(
         axis: &Medial,
         origin: [i32; 2],
         parts: &Parts,
         rule: &Rule,
-        taps: &[[f64; 2]],
+        taps: &[([f64; 2], bool)],
         holes: &[Moments],
     ) -> Self {
         let origin = origin.map(f64::from);
@@ -89,7 +89,7 @@ impl Model {
             }
         }
         build.model.taps = vec![usize::MAX; taps.len()];
-        build.taps = taps.iter().map(|p| build.tap(*p)).collect();
+        build.taps = taps.iter().map(|(p, on_axis)| build.tap(*p, *on_axis)).collect();
         let ports: Vec<Vec<usize>> = (0..parts.joints.len()).map(|j| build.joint(j)).collect();
         for (k, at) in parts.at.iter().enumerate() {
             let node = |end: usize| {
@@ -117,6 +117,8 @@ struct Tap {
     /// In coordinates of the part.
     at: [f64; 2],
     owner: Owner,
+    /// On the centreline, not at the end of an arm.
+    on_axis: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -194,9 +196,16 @@ impl Builder<'_> {
     }
 
     /// What is nearest to a place.
-    fn tap(&self, place: [f64; 2]) -> Tap {
+    fn tap(&self, place: [f64; 2], on_axis: bool) -> Tap {
         let at = [place[0] - self.origin[0], place[1] - self.origin[1]];
-        Tap { at, owner: self.cells.nearest(self.axis, at) }
+        let mut owner = self.cells.nearest(self.axis, at);
+        // the end of a limb is part of it
+        if let Owner::Joint(j) = owner
+            && let ([port], Kind::Node(_)) = (self.parts.joints[j].ports.as_slice(), &self.parts.joints[j].kind)
+        {
+            owner = Owner::Limb(port.limb);
+        }
+        Tap { at, owner, on_axis }
     }
 
     fn tap_joint(&mut self, k: usize, j: usize) {
@@ -312,6 +321,10 @@ impl Builder<'_> {
 
     /// A rigid arm from a node to where something pulls.
     fn tap_node(&mut self, k: usize, node: usize) {
+        if self.taps[k].on_axis {
+            self.model.taps[k] = node;
+            return;
+        }
         let tap = self.node(self.taps[k].at, 0.0, self.anchored[node]);
         if !self.anchored[node] {
             self.model.links.push([node, tap]);

@@ -90,6 +90,21 @@ pub fn netlist(extraction: &Extraction) -> String {
             comb.fingers[1]
         );
     }
+    for plates in &extraction.plates {
+        let [a, b] = plates.nodes.map(|n| names[n]);
+        let d = difference(extraction, plates.nodes[0], plates.nodes[1]);
+        let (area, gap) = (number(plates.area), micro(plates.gap));
+        let layer = &extraction.layers[plates.layer].name;
+        let _ = writeln!(out, "plategap2d {layer} [{a} {b}] [A={area} gap={gap}{}]", angle(d));
+    }
+    for facing in &extraction.facing {
+        let [a, b, c, d] = facing.nodes.map(|n| names[n]);
+        let along = difference(extraction, facing.nodes[0], facing.nodes[1]);
+        let [l, w1, w2, gap] = [along[0].hypot(along[1]), facing.width[0], facing.width[1], facing.gap].map(micro);
+        let layer = &extraction.layers[facing.layer].name;
+        let oz = angle(along);
+        let _ = writeln!(out, "gap2dforce {layer} [{a} {b} {c} {d}] [l={l} w1={w1} w2={w2} gap={gap}{oz}]");
+    }
     conductors(extraction, &mut out);
     out
 }
@@ -134,7 +149,9 @@ fn conductors(extraction: &Extraction, out: &mut String) {
     }
     // nodes with a potential, by part
     let mut charged: std::collections::BTreeMap<usize, Vec<usize>> = std::collections::BTreeMap::new();
-    for n in extraction.combs.iter().flat_map(|c| c.nodes) {
+    let plates = extraction.plates.iter().flat_map(|p| p.nodes);
+    let facing = extraction.facing.iter().flat_map(|f| [f.nodes[0], f.nodes[2]]);
+    for n in extraction.combs.iter().flat_map(|c| c.nodes).chain(plates).chain(facing) {
         charged.entry(extraction.nodes[n].part).or_default().push(n);
     }
     for (part, mut nodes) in charged {
