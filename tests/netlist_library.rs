@@ -341,6 +341,9 @@ fn told_in_words() {
     let script = told("run.m", "% a sweep\nnet = cho_load('a.net');\n");
     assert_eq!((script.code.as_str(), script.line), ("E006", 2));
     assert_eq!(script.message, "`run.m` is a MATLAB file, not a netlist");
+    let library = told("cell.m", "% a cell\nsubnet cell [a b] [l=*] [ beam2d p7 [a b] [l=l w=width] ]\n");
+    assert_eq!((library.code.as_str(), library.line), ("E007", 2));
+    assert_eq!(library.message, "`cell.m` is a library: it has 1 subnet and draws nothing");
     let found = refused("slider1 p1 [a b] [l=1u]\n");
     assert_eq!((found[0].0.as_str(), found[0].2.contains("did you mean")), ("E055", false), "{found:?}");
     let found = refused("semicircularbaem p1 [a b] [l=1u]\n");

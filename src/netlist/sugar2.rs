@@ -24,11 +24,36 @@ impl Sugar2 {
     pub(crate) fn new(bundle: &Bundle) -> Self {
         let mut sink = Sink::new(&bundle.root);
         let mut program = parser::parse(bundle, &mut sink);
+        let parsed = (!sink.failed()).then(|| sink.clone());
         if !sink.failed() || program.incomplete {
             resolve::resolve(&mut program, &mut sink);
         }
+        // what a library lacks is in the netlist that uses it
+        if let Some(mut parsed) = parsed.filter(|_| sink.failed() && !program.subnets.is_empty())
+            && !draws(&program.statements)
+        {
+            let subnets = program.subnets.len();
+            let plural = if subnets == 1 { "" } else { "s" };
+            let message = format!("`{}` is a library: it has {subnets} subnet{plural} and draws nothing", bundle.root);
+            let help = "name it in `uses` of a netlist that has its layers and variables";
+            let span = program.subnets[0].name.span;
+            parsed.error("E007", span, message, help);
+            sink = parsed;
+        }
         Self { bundle: bundle.clone(), program, sink }
     }
+}
+
+/// True when statements outside subnets draw an element, or could.
+fn draws(statements: &[Statement]) -> bool {
+    statements.iter().any(|statement| match statement {
+        Statement::Element(_) => true,
+        Statement::Block(body) | Statement::For { body, .. } => draws(body),
+        Statement::If { then, otherwise, .. } => {
+            draws(std::slice::from_ref(then)) || otherwise.as_ref().is_some_and(|o| draws(std::slice::from_ref(o)))
+        }
+        _ => false,
+    })
 }
 
 impl FrontEnd for Sugar2 {
