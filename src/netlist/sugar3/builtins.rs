@@ -318,7 +318,7 @@ fn subnet(
     table: &Table,
 ) -> mlua::Result<()> {
     budget::check();
-    let span = {
+    {
         let mut state = shared.borrow_mut();
         let span = state.here(lua);
         if state.scopes.len() > DEEPEST_INSTANCE {
@@ -351,9 +351,7 @@ fn subnet(
         let rotation = state.scope().rotation.turned(angles[0], angles[1], angles[2]);
         state.sink.instances.push(full.clone());
         state.scopes.push(Scope { nodes: HashMap::new(), prefix: format!("{full}."), rotation });
-        span
-    };
-    let _ = span;
+    }
     let globals = lua.globals();
     let outer: LuaValue = globals.raw_get("_currnodes")?;
     globals.raw_set("_currnodes", lua.create_table()?)?;
@@ -371,9 +369,12 @@ fn subnet(
     Ok(())
 }
 
+/// A function of one number.
+type OfNumber = fn(f64) -> f64;
+
 /// Functions of numbers. Angles are in degrees until `std2cvt.net` is used, then in radians.
 fn mathematics(lua: &Lua, shared: &Shared, globals: &Table) -> mlua::Result<()> {
-    let plain: [(&str, fn(f64) -> f64); 8] = [
+    let plain: [(&str, OfNumber); 8] = [
         ("sqrt", f64::sqrt),
         ("exp", f64::exp),
         ("log", f64::ln),
@@ -386,13 +387,13 @@ fn mathematics(lua: &Lua, shared: &Shared, globals: &Table) -> mlua::Result<()> 
     for (name, f) in plain {
         globals.raw_set(name, lua.create_function(move |_, x: f64| Ok(whole(f(x))))?)?;
     }
-    let of_angles: [(&str, fn(f64) -> f64); 3] = [("sin", f64::sin), ("cos", f64::cos), ("tan", f64::tan)];
+    let of_angles: [(&str, OfNumber); 3] = [("sin", f64::sin), ("cos", f64::cos), ("tan", f64::tan)];
     for (name, f) in of_angles {
         let state = Rc::clone(shared);
         let degrees = move || if state.borrow().radians { 1.0 } else { PI / 180.0 };
         globals.raw_set(name, lua.create_function(move |_, x: f64| Ok(f(x * degrees())))?)?;
     }
-    let to_angles: [(&str, fn(f64) -> f64); 3] = [("asin", f64::asin), ("acos", f64::acos), ("atan", f64::atan)];
+    let to_angles: [(&str, OfNumber); 3] = [("asin", f64::asin), ("acos", f64::acos), ("atan", f64::atan)];
     for (name, f) in to_angles {
         let state = Rc::clone(shared);
         let degrees = move || if state.borrow().radians { 1.0 } else { 180.0 / PI };

@@ -74,11 +74,7 @@ pub(crate) fn translate(text: &str) -> Result<String, Untranslatable> {
                 blocks.push(Block::Plain);
             }
             (Kind::Name, "function" | "if") => blocks.push(Block::Plain),
-            (Kind::Name, "end") => {
-                if blocks.pop() == Some(Block::Subnet) {
-                    put(word.end, word.end, ")");
-                }
-            }
+            (Kind::Name, "end") if blocks.pop() == Some(Block::Subnet) => put(word.end, word.end, ")"),
             (Kind::Symbol, "%") if upvalue(&words, k) => {
                 let message = format!("`%{}` is an upvalue of Lua 4", spelled(k + 1));
                 let help = "write `local old = NAME` above the function, and `old` in it";
