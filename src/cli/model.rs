@@ -5,6 +5,7 @@ use super::options::Chosen;
 use super::{interrupt, progress, value};
 use bimorph::compile::{CompileOptions, Compiled, Drawn, Junctions, compile, draw};
 use bimorph::front::{self, Asked, Source};
+use bimorph::layout::Format;
 use bimorph::layout::drawing::Drawing;
 use bimorph::netlist::{Bundle, DroppedInclude, Setting};
 use bimorph::options::{MODEL, Value};
@@ -65,10 +66,14 @@ pub(crate) fn front_telling(path: &Path, asked: &Asked) -> Result<(Drawing, Sour
 impl ModelArgs {
     /// The netlist with everything it uses; a layout is converted, and what its report has to say goes to standard error.
     pub(crate) fn bundle(&self) -> Result<Bundle, Failure> {
+        self.bundle_asked(&self.asked())
+    }
+
+    fn bundle_asked(&self, asked: &Asked) -> Result<Bundle, Failure> {
         interrupt::listen();
         let warn = &mut |dropped: DroppedInclude| eprintln!("warning: {dropped}");
         let bar = progress::bar("reading");
-        let read = front::read(&self.file, &self.include, &self.asked(), warn, &mut progress::watch(&bar));
+        let read = front::read(&self.file, &self.include, asked, warn, &mut progress::watch(&bar));
         bar.finish_and_clear();
         let source = read?;
         if let Some(converted) = &source.converted {
@@ -90,9 +95,11 @@ impl ModelArgs {
         self.layout.asked()
     }
 
-    /// What was drawn, with warnings on standard error.
+    /// What was drawn, with warnings on standard error. A process is then that of what is to be drawn, for netlists too.
     pub(crate) fn draw(&self) -> Result<Drawn, Failure> {
-        let drawn = draw(&bimorph::netlist::Source::new(&self.bundle()?), &self.options()?)?;
+        let asked =
+            if Format::of(&self.file.display().to_string()).is_some() { self.asked() } else { Asked::default() };
+        let drawn = draw(&bimorph::netlist::Source::new(&self.bundle_asked(&asked)?), &self.options()?)?;
         if !drawn.warnings.items.is_empty() {
             eprint!("{}", drawn.warnings.render(io::stderr().is_terminal()));
         }

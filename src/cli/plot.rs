@@ -5,7 +5,8 @@ use super::output::{check_folder, write};
 use super::{interrupt, statics, value};
 use bimorph::analysis::statics::static_fitted;
 use bimorph::compile::{CompileOptions, compile};
-use bimorph::netlist::{Bundle, Setting};
+use bimorph::front::{self, Asked};
+use bimorph::netlist::Setting;
 use bimorph::results::format::Format;
 use bimorph::results::plot::chart::{self, Chart, Panel, Series};
 use bimorph::results::plot::plane::{self, Curve, Mark, Plane, Sign};
@@ -94,7 +95,7 @@ impl Plot {
     }
 
     fn mechanism(&self, netlist: &Path) -> Result<Picture, Failure> {
-        let bundle = Bundle::read(netlist, &[]).map_err(|source| Failure::Read { path: netlist.to_owned(), source })?;
+        let bundle = front::read(netlist, &[], &Asked::default(), &mut |_| (), &mut |_| true)?.bundle;
         let compiled = compile(&bundle, &CompileOptions { set: self.set.clone(), ..CompileOptions::default() })?;
         let (compiled, result, curves) = static_fitted(&compiled, &self.ports)?;
         let volts: Vec<String> = self.ports.iter().map(|(name, v)| format!("{name} = {v} V")).collect();

@@ -10,6 +10,7 @@ mod text;
 use super::cells::{Call, Cell, Library, Shape, Text, Transform};
 use super::flatten::MOST_POINTS;
 use super::outline::{self, Style};
+use crate::budget;
 use std::collections::HashMap;
 use text::Reader;
 use thiserror::Error;
@@ -157,6 +158,7 @@ type Read<T> = Result<T, CifError>;
 impl Reading<'_> {
     fn file(&mut self) -> Read<()> {
         loop {
+            budget::check();
             self.reader.blanks()?;
             let Some(byte) = self.reader.peek() else {
                 return Err(self.reader.error(CifFault::End("without `E`: is it whole?")));

@@ -7,6 +7,7 @@
 use super::cells::{Call, Library, Shape, Transform};
 use super::drawing::{Drawing, LARGEST_COORDINATE, Label, Placement, Point, Polygon};
 use super::simple;
+use crate::budget;
 use std::collections::{BTreeMap, HashMap};
 use thiserror::Error;
 
@@ -119,6 +120,9 @@ impl Library {
         let top = self.top(cell, &by_name)?;
         let (counts, order) = self.count(top, &by_name)?;
         let total = counts[top];
+        // A point, and what holds a polygon and a label.
+        let bytes = total.points * 8 + total.polygons * 80 + total.labels * 80;
+        budget::lay_out(usize::try_from(bytes).unwrap_or(usize::MAX));
         let grid = self.grid(&total, &order, &counts);
         let mut flat = Flat {
             drawing: Drawing {
@@ -243,6 +247,7 @@ impl Library {
         }
         for text in &cell.texts {
             sum.extent = Some(enclose(sum.extent, [text.at, text.at]));
+            sum.off_grid |= text.at.iter().any(|x| x.fract() != 0.0);
         }
         for call in &cell.calls {
             let below = &counts[by_name[&call.cell]];
@@ -310,7 +315,8 @@ impl Library {
                 let cell = &self.cells[*k];
                 let calls = cell.calls.iter().flat_map(|c| c.pitch.iter().flatten().chain(&c.transform.origin));
                 let shapes = cell.shapes.iter().flat_map(|s| s.points.iter().flatten());
-                shapes.chain(calls).all(|x| on(*x))
+                let texts = cell.texts.iter().flat_map(|t| &t.at);
+                shapes.chain(calls).chain(texts).all(|x| on(*x))
             })
         };
         debug_assert!(order.iter().all(|k| counts[*k].depth <= DEEPEST));
@@ -382,6 +388,7 @@ impl Flat<'_> {
     fn copy(&mut self, cell: usize, transform: &Transform, parent: Option<usize>) {
         let library = self.library;
         let Some(cell) = library.cells.get(cell) else { return };
+        budget::check();
         for shape in &cell.shapes {
             self.shape(shape, transform);
         }
@@ -456,8 +463,10 @@ impl Flat<'_> {
 
     fn finish(mut self, placements: u64) -> (Drawing, Vec<Vec<Polygon>>) {
         if self.crossing > 0 {
-            let text =
-                format!("{} cross or touch themselves: what they enclose was taken", count(self.crossing, "polygon"));
+            let text = format!(
+                "{} of a contour that crosses or touches itself: what it encloses was taken",
+                count(self.crossing, "polygon")
+            );
             self.drawing.notes.push(text);
         }
         if self.vanished > 0 {

@@ -9,6 +9,7 @@ pub(crate) mod record;
 use super::cells::{Call, Cell, Library, Shape, Text, Transform};
 use super::flatten::MOST_POINTS;
 use super::outline::{self, Style};
+use crate::budget;
 use record::{Record, Records, kind};
 use std::io::Read;
 use thiserror::Error;
@@ -144,6 +145,7 @@ pub(crate) fn read(from: impl Read, file: &str, watch: &mut dyn FnMut(u64) -> bo
                 return Err(records.error(GdsFault::Interrupted));
             }
         }
+        budget::check();
         let taken = reading.take(&records.next()?);
         match taken {
             Ok(false) => {}

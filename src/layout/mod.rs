@@ -13,6 +13,8 @@ pub mod drawing;
 pub mod extract;
 pub mod flatten;
 pub mod gds;
+#[cfg(test)]
+mod hierarchies;
 pub mod labelled;
 mod lines;
 pub mod mask;

@@ -120,6 +120,17 @@ impl proto::bimorph_server::Bimorph for Calls {
         Ok(Response::new(answer))
     }
 
+    async fn convert(&self, request: Request<proto::ConvertRequest>) -> Reply<proto::ConvertResponse> {
+        let request = request.into_inner();
+        let most = self.0.limits.netlist_bytes;
+        let bytes = request.layout.len() + request.process.len() + request.name.len();
+        if bytes > most {
+            return Err(status::limit("netlist_bytes", most, bytes));
+        }
+        let answer = self.0.desk.run(move || text::convert(&request).map_err(status::violation)).await?;
+        Ok(Response::new(answer))
+    }
+
     async fn compile(&self, request: Request<proto::CompileRequest>) -> Reply<proto::CompileResponse> {
         let request = request.into_inner();
         let (bundle, options) = self.netlist(request.bundle, request.options)?;

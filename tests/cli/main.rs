@@ -5,5 +5,6 @@ mod bench;
 mod chart;
 mod errors;
 mod export;
+mod layouts;
 mod outputs;
 mod service;

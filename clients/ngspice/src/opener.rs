@@ -5,6 +5,9 @@ use crate::names;
 use bimorph::compile::{CompileError, CompileOptions, Compiled, compile};
 use bimorph::device::local::LocalDevice;
 use bimorph::device::{Device, DeviceError};
+use bimorph::front::{self, Asked, FrontError};
+use bimorph::layout::LayoutError;
+use bimorph::layout::convert::ConvertError;
 use bimorph::netlist::{self, Bundle};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -22,6 +25,14 @@ pub enum OpenError {
         tried: String,
         /// What the system said.
         source: std::io::Error,
+    },
+    /// The layout makes no netlist.
+    #[error("layout \"{file}\": {source}")]
+    Layout {
+        /// As spelled on the line.
+        file: String,
+        /// Why not.
+        source: FrontError,
     },
     /// The netlist does not compile.
     #[error("netlist \"{file}\":\n{source}")]
@@ -104,11 +115,19 @@ fn read(file: &str, directory: Option<&Path>) -> Result<Bundle, OpenError> {
     let beside = directory.map(|d| d.join(file));
     let candidates: Vec<PathBuf> = beside.into_iter().chain([PathBuf::from(file)]).collect();
     let path = candidates.iter().find_map(|p| names::existing(p)).unwrap_or_else(|| candidates[0].clone());
-    Bundle::read(&path, &[]).map_err(|source| OpenError::File {
+    let unread = |source| OpenError::File {
         file: file.to_owned(),
         tried: candidates.iter().map(|p| format!("\"{}\"", p.display())).collect::<Vec<_>>().join(", "),
         source,
-    })
+    };
+    match front::read(&path, &[], &Asked::default(), &mut |_| (), &mut |_| true) {
+        Ok(source) => Ok(source.bundle),
+        Err(FrontError::Read { source, .. }) => Err(unread(source)),
+        Err(FrontError::Convert(ConvertError::Layout(LayoutError::Read { reason, .. }))) => {
+            Err(unread(std::io::Error::other(reason)))
+        }
+        Err(source) => Err(OpenError::Layout { file: file.to_owned(), source }),
+    }
 }
 
 /// Models kept for instances and analyses to share; the oldest makes room.

@@ -1,6 +1,10 @@
 //! Netlists, settings and diagnostics.
 
 use super::{Violation, number, required};
+use crate::front;
+use crate::layout::LayoutError;
+use crate::layout::convert::ConvertError;
+use crate::layout::flatten::FlattenError;
 use crate::netlist::{Bundle, Diagnostic, Diagnostics, Setting, Severity};
 use crate::service::proto;
 
@@ -20,6 +24,45 @@ pub fn bundle_from_wire(bundle: Option<proto::Bundle>) -> Result<Bundle, Violati
         return Err(Violation::new("bundle.root", format!("\"{root}\" is not among the files {names:?}")));
     }
     Ok(Bundle { root, files })
+}
+
+/// The netlist of a layout that was sent.
+///
+/// # Errors
+/// A layout or a process that is none, or that nothing comes of.
+pub(crate) fn convert(request: &proto::ConvertRequest) -> Result<proto::ConvertResponse, Violation> {
+    let given = |text: &str| (!text.is_empty()).then(|| text.to_owned());
+    let (process, cell) = (given(&request.process), given(&request.cell));
+    let source = front::from_bytes(&request.layout, &request.name, process.as_deref(), cell.as_deref());
+    let source = source.map_err(|error| Violation::new(field_of(&error), error.to_string()))?;
+    let Some(converted) = source.converted else { return Err(Violation::new("layout", "is a netlist")) };
+    let report = converted.report;
+    let unrecognised = report.unrecognised.into_iter().map(|piece| {
+        let [[left_m, bottom_m], [right_m, top_m]] = piece.box_m;
+        let (layer, area_m2, why) = (piece.layer, piece.area_m2, piece.why);
+        proto::Unrecognised { layer, area_m2, left_m, bottom_m, right_m, top_m, why }
+    });
+    Ok(proto::ConvertResponse {
+        bundle: Some(bundle_to_wire(&source.bundle)),
+        process: converted.process,
+        by: report.by,
+        drawn_m2: report.areas.drawn_m2,
+        extracted_m2: report.areas.extracted_m2,
+        anchored_m2: report.areas.anchored_m2,
+        unrecognised_m2: report.areas.unrecognised_m2,
+        unrecognised: unrecognised.collect(),
+        notes: report.notes,
+    })
+}
+
+/// The field that a conversion's failure is about.
+fn field_of(error: &ConvertError) -> &'static str {
+    match error {
+        ConvertError::Process(_) => "process",
+        ConvertError::Layout(LayoutError::Format { .. }) => "name",
+        ConvertError::Layout(LayoutError::Flatten(FlattenError::Top { .. })) => "cell",
+        _ => "layout",
+    }
 }
 
 /// Bytes of a bundle, as limits count them.

@@ -6,6 +6,7 @@ V, A, C, K, Hz.
 """
 
 from .client import Client, Model
+from .conversion import Conversion, Piece
 from .errors import (
     BimorphError,
     Diagnostic,
@@ -37,6 +38,7 @@ from .sweep import Modes, PullIn, Row, Static, Table, Transient
 __all__ = [
     "BimorphError",
     "Client",
+    "Conversion",
     "Diagnostic",
     "FrequencyResponse",
     "InvalidRequest",
@@ -50,6 +52,7 @@ __all__ = [
     "NodeMotion",
     "NotFound",
     "Options",
+    "Piece",
     "PullIn",
     "PullInResult",
     "Root",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -12,6 +13,7 @@ import numpy as np
 
 from . import sweep as sweeps
 from .channel import Channel
+from .conversion import LAYOUTS, Conversion, Piece
 from .errors import Diagnostic, InvalidRequest, NetlistError, NotFound, Unavailable
 from .netlist import Netlist
 from .options import WIRE, Options
@@ -45,6 +47,40 @@ class Client:
         """Version of the server."""
         return str(self._channel.call("Info", model_pb2.InfoRequest()).version)
 
+    def convert(
+        self,
+        layout: str | os.PathLike[str],
+        *,
+        process: str | os.PathLike[str] | None = None,
+        cell: str | None = None,
+    ) -> Conversion:
+        """Makes a netlist of a layout (.cif or .gds).
+
+        ``process`` is the name of one that the server has ("polymumps", "soi") or the path of a process file; without it the drawing
+        names its own. ``cell`` is the cell to read where several are called by no other.
+        """
+        path = Path(layout)
+        text = "" if process is None else os.fspath(process)
+        if text and Path(text).suffix:
+            text = Path(text).read_text(encoding="utf-8") + "\n"
+        request = model_pb2.ConvertRequest(
+            name=str(path), layout=path.read_bytes(), process=text, cell=cell or ""
+        )
+        answer = self._channel.call("Convert", request)
+        return Conversion(
+            netlist=Netlist(answer.bundle.root, dict(answer.bundle.files)),
+            process=answer.process,
+            by=answer.by,
+            drawn_m2=answer.drawn_m2,
+            extracted_m2=answer.extracted_m2,
+            anchored_m2=answer.anchored_m2,
+            unrecognised_m2=answer.unrecognised_m2,
+            unrecognised=tuple(
+                Piece(u.layer, u.area_m2, (u.left_m, u.bottom_m, u.right_m, u.top_m), u.why) for u in answer.unrecognised
+            ),
+            notes=tuple(answer.notes),
+        )
+
     def compile(
         self,
         netlist: str | os.PathLike[str] | Netlist,
@@ -53,14 +89,14 @@ class Client:
         include: Iterable[str | os.PathLike[str]] = (),
         **options: Unpack[Options],
     ) -> Model:
-        """Compiles a netlist (a path, or a :class:`Netlist`).
+        """Compiles a netlist (a path, or a :class:`Netlist`), or a layout (.cif or .gds), which :meth:`convert` makes a netlist of.
 
         ``set`` overrides netlist parameters [SI]. The other keywords are the :class:`Options` of a model, such as ``tol``
         and ``band``; the server refuses a value beyond its range.
 
         Raises :class:`NetlistError` with all diagnostics.
         """
-        bundle = _bundle(netlist, include)
+        bundle = self._bundle(netlist, include)
         wire = _options(set or {}, options)
         request = model_pb2.CompileRequest(bundle=bundle, options=wire)
         try:
@@ -91,11 +127,17 @@ class Client:
         ``shard`` (i, n) runs only points whose number modulo n is i. ``progress`` is told (points done, points).
         """
         request = sweep_pb2.SubmitSweepRequest(
-            bundle=_bundle(netlist, include),
+            bundle=self._bundle(netlist, include),
             options=_options(set or {}, options),
             spec=sweeps.to_wire(parameters, analysis, shard),
         )
         return sweeps.run(self._channel, request, progress)
+
+    def _bundle(self, netlist: str | os.PathLike[str] | Netlist, include: Iterable[str | os.PathLike[str]]) -> Any:
+        if not isinstance(netlist, Netlist) and Path(netlist).suffix.lower() in LAYOUTS:
+            netlist = self.convert(netlist).netlist
+        read = netlist if isinstance(netlist, Netlist) else Netlist.read(netlist, include)
+        return model_pb2.Bundle(root=read.root, files=dict(read.files))
 
     def close(self) -> None:
         """Closes the connection. The client may be used again."""
@@ -347,11 +389,6 @@ class Model:
 
 def _estimate(answer: Any) -> float | None:
     return answer.estimated_error if answer.HasField("estimated_error") else None
-
-
-def _bundle(netlist: str | os.PathLike[str] | Netlist, include: Iterable[str | os.PathLike[str]]) -> Any:
-    read = netlist if isinstance(netlist, Netlist) else Netlist.read(netlist, include)
-    return model_pb2.Bundle(root=read.root, files=dict(read.files))
 
 
 def _options(settings: Mapping[str, float | str], options: Mapping[str, Any]) -> Any:

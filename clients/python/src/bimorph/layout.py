@@ -1,0 +1,275 @@
+"""Layouts: parametric cells that are subnets, and gdsfactory components made of them.
+
+A cell of this library is drawn by ``bimorph layout`` and modelled by the netlist that it stands for, so that nothing has to be
+recognised. :class:`Cell` objects are put together in a :class:`Mechanism`, whose :meth:`Mechanism.netlist` is compiled like any other::
+
+    from bimorph import layout
+    m = layout.Mechanism()
+    m.add("spring", layout.folded_flexure(length=200e-6, width=2e-6), c="shuttle")
+    m.add("drive", layout.comb(fingers=40), a="shuttle", b="pad")
+    m.add("pad_anchor", layout.anchor(), a="pad")
+    model = client.compile(m.netlist())
+
+With gdsfactory installed, :func:`from_gdsfactory` makes the same of a component: instances of cells that this library has, by name,
+with their settings as parameters, joined where the component's netlist joins their ports. gdsfactory's lengths are in micrometres,
+those of this module in metres.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from .netlist import Netlist
+
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z")
+
+POLY = (
+    "process p1 = [ Youngsmodulus=165e9 Poisson=0.3 density=2300 h=2u viscosity=1.78e-5 fluid=2u permittivity=8.854e-12\n"
+    "               sheetresistance=20 thermcond=30 thermalexpansion=2.33e-6 ambienttemperature=293 ]"
+)
+"""Structural polysilicon of 2 µm, the layer ``p1`` of the shipped process ``polymumps``."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A parametric cell: a subnet."""
+
+    name: str
+    """Name of the subnet."""
+    nodes: tuple[str, ...]
+    """Its nodes, which are the ports of the cell."""
+    parameters: Mapping[str, tuple[float, str]]
+    """Default and unit of each parameter; lengths in metres."""
+    body: str = field(repr=False)
+    """Elements of the subnet; the layer is ``parent``."""
+
+    def subnet(self) -> str:
+        """The definition in SUGAR's language."""
+        given = " ".join(f"{name}={value!r}" for name, (value, _) in self.parameters.items())
+        return f"subnet {self.name} [{' '.join(self.nodes)}] [{given}]\n[\n{self.body.rstrip()}\n]\n"
+
+    def __call__(self, **settings: float) -> Cell:
+        """A cell with these settings [SI]."""
+        unknown = sorted(set(settings) - set(self.parameters))
+        if unknown:
+            known = ", ".join(self.parameters)
+            raise TypeError(f"{self.name} has no parameter {unknown[0]!r}; there are {known}")
+        for name, value in settings.items():
+            if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+                raise ValueError(f"{self.name}: {name} must be a finite number, got {value!r}")
+        return Cell(self, {name: float(value) for name, value in settings.items()})
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A cell with its settings."""
+
+    kind: Kind
+    """What it is."""
+    settings: Mapping[str, float]
+    """Parameters that differ from their defaults [SI]."""
+
+
+anchor = Kind(
+    "anchor_pad",
+    ("a",),
+    {"length": (10e-6, "m"), "width": (10e-6, "m")},
+    "  anchor parent [a] [l=length w=width]\n",
+)
+"""A pad that holds its node."""
+
+folded_flexure = Kind(
+    "folded_flexure",
+    ("c",),
+    {
+        "length": (200e-6, "m"),
+        "width": (2e-6, "m"),
+        "pitch": (20e-6, "m"),
+        "half": (40e-6, "m"),
+        "foot": (40e-6, "m"),
+        "truss": (10e-6, "m"),
+    },
+    """  plate2d parent [c] [l=2*half w=2*foot]
+  for s=0:1
+  [
+    up = cond(s, -1, 1)
+    for k=0:1
+    [
+      side = cond(k, -1, 1)
+      link2d * [c foot(s,k)] [l=sqrt(half^2+foot^2) oz=atan2(up*foot, side*half)]
+      inner(s,k) beam2d parent [foot(s,k) top(s,k)] [l=length w=width oz=up*pi/2]
+      end(s,k) beam2d parent [top(s,k) corner(s,k)] [l=pitch w=truss oz=cond(k, pi, 0)]
+      outer(s,k) beam2d parent [corner(s,k) pad(s,k)] [l=length w=width oz=-up*pi/2]
+      anchor parent [pad(s,k)] [l=10u w=10u oz=cond(k, pi, 0)]
+    ]
+    trusses(s) beam2d parent [top(s,1) top(s,0)] [l=2*half w=truss]
+  ]
+""",
+)
+"""A shuttle on a flexure folded over two trusses: it moves along x. ``c`` is its centre."""
+
+comb = Kind(
+    "comb_drive",
+    ("a", "b"),
+    {
+        "fingers": (20.0, "1"),
+        "gap": (2e-6, "m"),
+        "overlap": (20e-6, "m"),
+        "length": (40e-6, "m"),
+        "angle": (0.0, "rad"),
+    },
+    "  comb2de parent [a b] [N=2*fingers gap=gap l=overlap L=length oz=angle]\n",
+)
+"""A comb drive: ``fingers`` of the rotor ``a`` between those of the stator ``b``, two gaps each."""
+
+bimorph = Kind(
+    "thermal_bimorph",
+    ("a", "g", "o"),
+    {
+        "length": (206e-6, "m"),
+        "hot": (2e-6, "m"),
+        "cold": (8e-6, "m"),
+        "cold_length": (112e-6, "m"),
+        "flexure": (1.9e-6, "m"),
+        "spacing": (23e-6, "m"),
+        "bar": (13e-6, "m"),
+        "link": (24e-6, "m"),
+        "tau": (230e-6, "s"),
+    },
+    """  anchor parent [a] [l=10u w=10u oz=pi]
+  hot beam2det parent [a t] [l=length w=hot tau=tau]
+  bar beam2det parent [t c] [l=spacing w=bar oz=-pi/2 tau=tau]
+  cold beam2det parent [c f] [l=cold_length w=cold oz=pi tau=tau]
+  flex beam2det parent [f g] [l=length-cold_length w=flexure oz=pi tau=tau]
+  anchor parent [g] [l=10u w=10u oz=pi]
+  link beam2d parent [c o] [l=link w=3u]
+""",
+)
+"""A thermal bimorph: a hot and a cold arm between the pads ``a`` and ``g``; its tip is linked to ``o``."""
+
+serpentine = Kind(
+    "serpentine",
+    ("a", "b"),
+    {"turns": (4.0, "1"), "length": (100e-6, "m"), "pitch": (10e-6, "m"), "width": (2e-6, "m")},
+    """  first beam2d parent [a up(0)] [l=length/2 w=width oz=pi/2]
+  for k=1:turns
+  [
+    across(2*k-1) beam2d parent [up(k-1) down(k)] [l=pitch w=width]
+    down beam2d parent [down(k) low(k)] [l=length w=width oz=-pi/2]
+    across(2*k) beam2d parent [low(k) rise(k)] [l=pitch w=width]
+    rise beam2d parent [rise(k) up(k)] [l=length w=width oz=pi/2]
+  ]
+  last beam2d parent [up(turns) b] [l=length/2 w=width oz=-pi/2]
+""",
+)
+"""A meander along x with long beams along y, from ``a`` to ``b``."""
+
+KINDS: dict[str, Kind] = {kind.name: kind for kind in (anchor, folded_flexure, comb, bimorph, serpentine)}
+"""Cells of this library by the name of their subnet."""
+
+
+class Mechanism:
+    """Cells joined at nodes."""
+
+    def __init__(self, process: str = POLY) -> None:
+        """``process`` defines the layer ``p1`` of which everything is made."""
+        self.process = process
+        self._kinds: dict[str, Kind] = {}
+        self._lines: list[str] = []
+        self._names: set[str] = set()
+
+    def add(self, name: str, cell: Cell, *, angle: float = 0.0, **nodes: str) -> None:
+        """Adds an instance turned by ``angle`` [rad]; ``nodes`` says where each node of the cell is joined."""
+        _check_name(name)
+        if name in self._names:
+            raise ValueError(f"there is an instance {name!r} already")
+        kind = cell.kind
+        missing = [node for node in kind.nodes if node not in nodes]
+        unknown = sorted(set(nodes) - set(kind.nodes))
+        if missing or unknown:
+            raise ValueError(f"{kind.name} has the nodes {', '.join(kind.nodes)}; got {', '.join(nodes) or 'none'}")
+        for node in nodes.values():
+            _check_name(node)
+        if self._kinds.setdefault(kind.name, kind) != kind:
+            raise ValueError(f"there is another cell called {kind.name!r}")
+        self._names.add(name)
+        given = [f"{key}={value!r}" for key, value in cell.settings.items()]
+        if angle:
+            given.append(f"oz={float(angle)!r}")
+        joined = " ".join(nodes[node] for node in kind.nodes)
+        self._lines.append(f"{name} {kind.name} p1 [{joined}] [{' '.join(given)}]")
+
+    def line(self, text: str) -> None:
+        """Adds a line of netlist: a port, a load, a ground."""
+        self._lines.append(text)
+
+    def netlist(self, name: str = "mechanism.net") -> Netlist:
+        """The netlist of it."""
+        subnets = "\n".join(kind.subnet() for kind in self._kinds.values())
+        return Netlist.text(f"{self.process}\n\n{subnets}\n" + "\n".join(self._lines) + "\n", name)
+
+
+def from_gdsfactory(component: Any, *, kinds: Mapping[str, Kind] | None = None, process: str = POLY) -> Mechanism:
+    """A mechanism from a gdsfactory component made of cells whose names are those of :data:`KINDS` (or ``kinds``).
+
+    The component's ``get_netlist()`` gives instances with settings, and which ports are joined. Lengths among the settings are in
+    micrometres there. An instance of any other cell is an error that names it; so are settings that its cell has not.
+    """
+    known = dict(KINDS if kinds is None else kinds)
+    read = component if isinstance(component, Mapping) else component.get_netlist()
+    instances: Mapping[str, Any] = read["instances"]
+    joined = _joined(read)
+    placements: Mapping[str, Any] = read.get("placements", {})
+    mechanism = Mechanism(process)
+    for name, instance in instances.items():
+        cell = str(instance["component"])
+        if cell not in known:
+            raise ValueError(f"instance {name!r} is a {cell!r}, which is no cell of the library: {', '.join(sorted(known))}")
+        kind = known[cell]
+        settings = {key: value for key, value in dict(instance.get("settings") or {}).items() if value is not None}
+        unknown = sorted(set(settings) - set(kind.parameters))
+        if unknown:
+            raise ValueError(f"instance {name!r}: {cell} has no parameter {unknown[0]!r}; there are {', '.join(kind.parameters)}")
+        scaled = {key: value * 1e-6 if kind.parameters[key][1] == "m" else value for key, value in settings.items()}
+        placement = placements.get(name) or {}
+        if placement.get("mirror"):
+            raise ValueError(f"instance {name!r} is mirrored: subnets are only turned")
+        angle = math.radians(float(placement.get("rotation") or 0))
+        word = _word(name)
+        nodes = {node: joined.get(f"{name},{node}", f"{word}_{node}") for node in kind.nodes}
+        mechanism.add(word, kind(**scaled), angle=angle, **nodes)
+    return mechanism
+
+
+def _joined(read: Mapping[str, Any]) -> dict[str, str]:
+    """The node of each port "instance,port": those that are joined have one."""
+    parent: dict[str, str] = {}
+
+    def root(port: str) -> str:
+        while parent.setdefault(port, port) != port:
+            port = parent[port]
+        return port
+
+    pairs = [(net["p1"], net["p2"]) for net in read.get("nets", [])]
+    pairs += list(dict(read.get("connections", {})).items())
+    for first, second in pairs:
+        a, b = sorted((root(first), root(second)))
+        parent[b] = a
+    outer = {root(port): name for name, port in dict(read.get("ports", {})).items()}
+    return {port: _word(outer.get(root(port), root(port))) for port in list(parent)} | {
+        port: _word(name) for name, port in dict(read.get("ports", {})).items()
+    }
+
+
+def _word(name: str) -> str:
+    word = re.sub(r"[^A-Za-z0-9_]", "_", name)
+    return word if word[:1].isalpha() else f"n{word}"
+
+
+def _check_name(name: str) -> None:
+    if not _NAME.match(name):
+        raise ValueError(f"{name!r} is no name: expected letters, digits and _, a letter first")

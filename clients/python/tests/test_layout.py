@@ -1,0 +1,131 @@
+"""Cells are subnets, and layouts go through the server. Numbers are closed forms, or those of the same netlist by another way."""
+
+from __future__ import annotations
+
+import math
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+
+import bimorph
+from bimorph import layout
+
+E, RHO, H = 165e9, 2300.0, 2e-6
+
+
+def test_a_folded_flexure_is_as_stiff_as_its_beams(client: bimorph.Client) -> None:
+    """Four pairs of beams in series: 4·(12·E·I/l³)/2 along x, within the 3 % by which trusses and junctions give way."""
+    m = layout.Mechanism()
+    m.add("spring", layout.folded_flexure(length=200e-6, width=2e-6, truss=40e-6), c="shuttle")
+    m.line("f2d * [shuttle] [F=1u]")
+    inertia = H * (2e-6) ** 3 / 12
+    stiffness = 4 * (12 * E * inertia / 200e-6**3) / 2
+    x = client.compile(m.netlist(), junctions="centreline", linear=True).static().nodes["shuttle"].x
+    assert x == pytest.approx(1e-6 / stiffness, rel=0.03)
+
+
+@pytest.mark.parametrize("name", sorted(layout.KINDS))
+def test_every_cell_is_a_netlist(client: bimorph.Client, name: str) -> None:
+    """Each cell of the library compiles with its defaults, held where it does not hold itself."""
+    kind = layout.KINDS[name]
+    m = layout.Mechanism()
+    m.add("part", kind(), **{node: f"at_{node}" for node in kind.nodes})
+    if name in ("comb_drive", "serpentine"):
+        first, last = kind.nodes
+        m.line(f"anchor p1 [at_{last}] []")
+        m.line(f"beam2d p1 [at_{first} held] [l=50u w=2u oz=pi/2]")
+        m.line("anchor p1 [held] []")
+    m.line(f"anchor p1 [extra] []\nbeam2d p1 [extra at_{kind.nodes[0]}] [l=50u w=2u oz=pi/2]" if name == "anchor_pad" else "")
+    assert client.compile(m.netlist()).unknowns >= 0
+
+
+def test_wrong_settings_are_told(client: bimorph.Client) -> None:
+    """Names and numbers that a cell has not are refused where they are written."""
+    with pytest.raises(TypeError, match="no parameter 'lenght'; there are length"):
+        layout.folded_flexure(lenght=1e-4)
+    with pytest.raises(ValueError, match="finite number"):
+        layout.comb(gap=math.nan)
+    m = layout.Mechanism()
+    with pytest.raises(ValueError, match="has the nodes a, b; got a"):
+        m.add("c", layout.comb(), a="x")
+    with pytest.raises(ValueError, match="is no name"):
+        m.add("c d", layout.comb(), a="x", b="y")
+
+
+NETLIST = {
+    "instances": {
+        "spring": {"component": "folded_flexure", "settings": {"length": 150.0, "width": 2.0}},
+        "drive": {"component": "comb_drive", "settings": {"fingers": 30, "gap": 2.0}},
+        "pad-1": {"component": "anchor_pad", "settings": {}},
+    },
+    "placements": {"spring": {"rotation": 0, "mirror": False}, "drive": {"rotation": 90.0}},
+    "nets": [{"p1": "spring,c", "p2": "drive,a"}, {"p1": "drive,b", "p2": "pad-1,a"}],
+    "ports": {"stator": "drive,b"},
+}
+
+
+def test_a_gdsfactory_netlist_becomes_subnets(client: bimorph.Client) -> None:
+    """What ``get_netlist()`` gives: instances with settings in micrometres, nets, outer ports."""
+    text = layout.from_gdsfactory(NETLIST).netlist().files["mechanism.net"]
+    assert "spring folded_flexure p1 [" in text and "length=0.00015" in text
+    assert "pad_1 anchor_pad p1 [stator] []" in text
+    assert "gap=2e-06" in text and f"oz={math.pi / 2!r}" in text
+    assert client.compile(bimorph.Netlist.text(text)).unknowns > 0
+    foreign = {"instances": {"ring": {"component": "ring_single"}}}
+    with pytest.raises(ValueError, match="'ring' is a 'ring_single', which is no cell of the library"):
+        layout.from_gdsfactory(foreign)
+
+
+def test_a_gdsfactory_component_becomes_subnets(client: bimorph.Client) -> None:
+    """The same from a component that gdsfactory itself put together."""
+    gf = pytest.importorskip("gdsfactory")
+    layer = (45, 0)
+
+    @gf.cell
+    def comb_drive(fingers: int = 20, gap: float = 2.0) -> gf.Component:
+        c = gf.Component()
+        c.add_polygon([(0, 0), (40, 0), (40, fingers * gap), (0, fingers * gap)], layer=layer)
+        c.add_port("a", center=(0, 5), width=2, orientation=180, layer=layer, port_type="electrical")
+        c.add_port("b", center=(40, 5), width=2, orientation=0, layer=layer, port_type="electrical")
+        return c
+
+    @gf.cell
+    def anchor_pad(length: float = 10.0) -> gf.Component:
+        c = gf.Component()
+        c.add_polygon([(0, 0), (length, 0), (length, 10), (0, 10)], layer=layer)
+        c.add_port("a", center=(0, 5), width=2, orientation=180, layer=layer, port_type="electrical")
+        return c
+
+    gf.gpdk.PDK.activate() if hasattr(gf, "gpdk") else gf.get_generic_pdk().activate()
+    top = gf.Component("top_of_a_drive")
+    drive, pad = top.add_ref(comb_drive(fingers=12)), top.add_ref(anchor_pad())
+    drive.name, pad.name = "drive", "pad"
+    pad.connect("a", drive["b"])
+    text = layout.from_gdsfactory(top).netlist().files["mechanism.net"]
+    lines = {line.split()[0]: line for line in text.splitlines() if line.startswith(("drive ", "pad "))}
+    node = lines["drive"].split("[")[1].split("]")[0].split()[1]
+    assert "fingers=12.0" in lines["drive"] and f"[{node}]" in lines["pad"]
+
+
+def test_layouts_go_through_the_server(client: bimorph.Client, tmp_path: Path) -> None:
+    """A layout compiles to the model of the netlist that it was drawn from; a broken one says where."""
+    m = layout.Mechanism()
+    m.add("spring", layout.folded_flexure(), c="shuttle")
+    source = tmp_path / "spring.net"
+    source.write_text(m.netlist().files["mechanism.net"])
+    command = os.environ.get("BIMORPH_BIN", "bimorph")
+    for name in ("spring.gds", "spring.cif"):
+        subprocess.run([command, "layout", str(source), "-o", str(tmp_path / name)], check=True, capture_output=True)
+        converted = client.convert(tmp_path / name)
+        assert (converted.by, converted.process, converted.unrecognised) == ("labels", "polymumps", ())
+        assert converted.drawn_m2 > 0
+        drawn = client.compile(source).modes(count=2).frequencies_hz
+        assert client.compile(tmp_path / name).modes(count=2).frequencies_hz == pytest.approx(drawn, rel=1e-9)
+    broken = tmp_path / "broken.gds"
+    broken.write_bytes((tmp_path / "spring.gds").read_bytes()[:100])
+    with pytest.raises(bimorph.InvalidRequest, match="is it whole"):
+        client.convert(broken)
+    with pytest.raises(bimorph.InvalidRequest, match="known ones are polymumps, soi"):
+        client.convert(tmp_path / "spring.gds", process="other")

@@ -1,0 +1,149 @@
+//! A netlist drawn as masks gives the same mechanism back, in both formats; a drawing that was changed gives the changed one, and
+//! what is only in the drawing is told with its area. Sources: the examples of this repository, sizes by hand.
+
+use bimorph::analysis::modes::modes;
+use bimorph::compile::{CompileOptions, compile};
+use bimorph::front::from_bytes;
+use bimorph::layout::drawing::Polygon;
+use bimorph::layout::mask::{MaskError, mask};
+use bimorph::layout::{self, Format, Process, convert};
+use bimorph::netlist::{Bundle, load};
+use std::path::Path;
+
+const EXAMPLES: [&str; 10] = [
+    "arch/arch",
+    "bank/bank",
+    "chevron/chevron",
+    "column/column",
+    "comb_resonator/comb_resonator",
+    "pivots/pivots",
+    "quarter_stage/quarter_stage",
+    "rotary_stage/rotary_stage",
+    "single_bimorph/single_bimorph",
+    "switch/switch",
+];
+
+fn polymumps() -> Process {
+    Process::builtin("polymumps").unwrap()
+}
+
+/// Six modes of a bundle on a mesh of two segments a beam.
+fn frequencies(bundle: &Bundle) -> Vec<f64> {
+    let options = CompileOptions { segments: Some(2), ..CompileOptions::default() };
+    let compiled = compile(bundle, &options).unwrap_or_else(|e| panic!("{}: {e}", bundle.root));
+    let volts: Vec<(String, f64)> = Vec::new();
+    modes(&compiled, 6, &volts).unwrap().frequencies_hz
+}
+
+#[test]
+fn every_planar_example_comes_back_with_its_modes() {
+    for name in EXAMPLES {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("examples/{name}.net"));
+        let drawn = Bundle::read(&path, &[]).unwrap();
+        let before = frequencies(&drawn);
+        let structure = load(&drawn, &[]).unwrap().structure;
+        for (format, file) in [(Format::Gds, "x.gds"), (Format::Cif, "x.cif")] {
+            let mask = mask(&structure, &polymumps(), format, file).unwrap();
+            let source = from_bytes(&mask.bytes, file, None, None).unwrap();
+            let report = source.converted.unwrap().report;
+            assert_eq!((report.by.as_str(), report.areas.unrecognised_m2), ("labels", 0.0), "{name}: {report:?}");
+            let back = load(&source.bundle, &[]).unwrap_or_else(|e| panic!("{name}: {e}")).structure;
+            assert_eq!(back.ports.len(), structure.ports.len(), "{name}");
+            let names = |s: &bimorph::structure::Structure| {
+                let mut all: Vec<String> = s.nodes.iter().filter(|n| n.mechanical).map(|n| n.name.clone()).collect();
+                all.sort();
+                all
+            };
+            assert_eq!(names(&back), names(&structure), "{name}");
+            let after = frequencies(&source.bundle);
+            for (f, g) in before.iter().zip(&after) {
+                assert!((f / g - 1.0).abs() < 1e-9, "{name} {file}: {f} became {g}");
+            }
+        }
+    }
+}
+
+const BEAM: &str = "process p = [Youngsmodulus=165e9 density=2300 h=2u]\nanchor p [root] [l=10u w=10u oz=pi]\n\
+                    arm beam2d p [root tip] [l=100u w=2u oz=0.3]\n";
+
+fn drawn_beam() -> layout::Drawing {
+    let structure = load(&Bundle::from_text("beam.net", BEAM), &[]).unwrap().structure;
+    let mask = mask(&structure, &polymumps(), Format::Gds, "beam.gds").unwrap();
+    layout::from_bytes(&mask.bytes, "beam.gds", None).unwrap()
+}
+
+#[test]
+fn a_beam_that_was_widened_in_the_drawing_is_wider_in_the_netlist() {
+    let mut drawing = drawn_beam();
+    // The same beam 3 um wide, over the one of 2 um.
+    let at = |s: f64, n: f64| {
+        let (sin, cos) = 0.3_f64.sin_cos();
+        [s * cos - n * sin, s * sin + n * cos].map(|x| (x * 1e-6 / drawing.unit_m).round() as i32)
+    };
+    let wider = Polygon::from_contour(vec![at(0.0, -1.5), at(100.0, -1.5), at(100.0, 1.5), at(0.0, 1.5)]);
+    drawing.layers.get_mut("45/0").unwrap().push(wider);
+    let converted = convert::convert(&drawing, None).unwrap();
+    assert!(converted.report.notes.iter().any(|n| n.contains("`arm` is drawn 3 µm wide")), "{:?}", converted.report);
+    assert_eq!(converted.report.areas.unrecognised_m2, 0.0);
+    let beam = load(&Bundle::from_text("x.net", &converted.netlist), &[]).unwrap().structure.beams.remove(0);
+    assert!((beam.width / 3e-6 - 1.0).abs() < 2e-6, "{}", beam.width);
+    assert_eq!(beam.length, 100e-6);
+}
+
+#[test]
+fn a_node_that_was_moved_takes_its_beam_along() {
+    let mut drawing = drawn_beam();
+    let micron = (1e-6 / drawing.unit_m).round() as i32;
+    let tip = drawing.labels.iter_mut().find(|l| l.text == "tip").unwrap();
+    tip.at[0] += 5 * micron;
+    let converted = convert::convert(&drawing, None).unwrap();
+    assert!(converted.report.notes.iter().any(|n| n.contains("`arm` is drawn")), "{:?}", converted.report.notes);
+    assert!(
+        converted.report.notes.iter().any(|n| n.contains("in the mechanism, but not drawn")),
+        "{:?}",
+        converted.report.notes
+    );
+}
+
+#[test]
+fn what_is_only_in_the_drawing_is_told_with_its_area_and_place() {
+    let mut drawing = drawn_beam();
+    let micron = (1e-6 / drawing.unit_m).round() as i32;
+    let extra = Polygon::rectangle([200 * micron, 0], [210 * micron, 4 * micron]);
+    drawing.layers.get_mut("45/0").unwrap().push(extra.clone());
+    drawing.layers.insert("99/0".to_owned(), vec![extra]);
+    let report = convert::convert(&drawing, None).unwrap().report;
+    let areas: Vec<(String, f64)> = report.unrecognised.iter().map(|u| (u.layer.clone(), u.area_um2())).collect();
+    assert_eq!(areas, [("p1".to_owned(), 40.0), ("99/0".to_owned(), 40.0)], "{report:?}");
+    assert!((report.unrecognised[0].box_m[0][0] - 200e-6).abs() < 1e-12);
+    assert!((report.areas.unrecognised_m2 - 80e-12).abs() < 1e-18);
+}
+
+#[test]
+fn labels_that_say_too_little_are_one_error_with_its_place() {
+    let without = |text: &str| {
+        let mut drawing = drawn_beam();
+        drawing.labels.retain(|l| !l.text.starts_with(text));
+        convert::convert(&drawing, None).unwrap_err().to_string()
+    };
+    let error = without("tip");
+    assert!(error.contains("beam.gds, label at") && error.contains("node `tip`, which has no label"), "{error}");
+    let error = without("process");
+    assert!(error.contains("`process p1 = [...]`"), "{error}");
+    let mut drawing = drawn_beam();
+    let line = drawing.labels.iter_mut().find(|l| l.text.contains("beam2d")).unwrap();
+    line.text = "2: arm beam2d p1 [root".to_owned();
+    let error = convert::convert(&drawing, None).unwrap_err().to_string();
+    assert!(error.contains("is no netlist line: expected NAME MODEL PROCESS [nodes]"), "{error}");
+}
+
+#[test]
+fn a_netlist_without_outlines_is_told_as_such() {
+    let text = "anchor * [f] []\nspring2d * [f m] [kx=1 l=5u]\nmass2d * [m] [m=1e-10]\nguide2d * [m] []\n";
+    let structure = load(&Bundle::from_text("x.net", text), &[]).unwrap().structure;
+    // An anchor alone has a pad, and that is all that is drawn.
+    let drawn = mask(&structure, &polymumps(), Format::Gds, "x.gds").unwrap();
+    assert!(drawn.notes.iter().any(|n| n == "1 spring2d has no outline"), "{:?}", drawn.notes);
+    let loose = load(&Bundle::from_text("x.net", "mass2d * [m] [m=1e-10]\nguide2d * [m] []\n"), &[]).unwrap().structure;
+    assert_eq!(mask(&loose, &polymumps(), Format::Gds, "x.gds"), Err(MaskError::Empty));
+}
