@@ -156,7 +156,7 @@ fn etch_holes_are_taken_off_a_plate() {
     sheet.rectangle("POLY1", [0.0, -6.0], [200.0, 6.0]);
     (0..19).map(|k| 8.0 + 10.0 * f64::from(k)).for_each(|x| sheet.rectangle("HOLE1", [x, -2.0], [x + 4.0, 2.0]));
     let found = extracted(sheet.drawing());
-    assert!((found.beams[0].porosity - 19.0 * 16.0 / 2400.0).abs() < 1e-3, "{}", found.beams[0].porosity);
+    assert!((found.beams[0].porosity - 19.0 * 16.0 / 2400.0).abs() < 1e-9, "{}", found.beams[0].porosity);
 }
 
 /// A comb between a shuttle and a pad: 9 fingers in the gaps of 10 make 18 gaps, 2 µm wide, overlapping by 20 µm; what the fingers weigh

@@ -359,7 +359,12 @@ impl Builder<'_> {
         let width = |t: f64| limb.width[0] + t * (limb.width[1] - limb.width[0]);
         let widest = limb.width[0].max(limb.width[1]);
         let mut kept = 0.0;
-        let porosity = self.limb_holes[k] / limb.cell.area;
+        // a free end is a joint of its own, and part of the beam
+        let tips = (0..2).filter(|end| loose(*end)).map(|end| self.parts.at[k][end]);
+        let (solid, missing) = tips.fold((limb.cell.area, self.limb_holes[k]), |(solid, missing), tip| {
+            (solid + self.parts.joints[tip].cell.area, missing + self.joint_holes[tip].area)
+        });
+        let porosity = missing / solid;
         let (loose_start, loose_end) = (loose(0), loose(1));
         let cut = !(free.len() == 1 && free[0] == [0.0, 1.0]);
         let origin = self.origin;
