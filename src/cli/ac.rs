@@ -237,7 +237,9 @@ fn size([re, im]: [f64; 2]) -> f64 {
 }
 
 fn degrees([re, im]: [f64; 2]) -> String {
-    format!("{:.1}°", im.atan2(re).to_degrees())
+    let phase = (10.0 * im.atan2(re).to_degrees()).round() / 10.0;
+    // −0 is written as 0
+    format!("{:.1}°", phase + 0.0)
 }
 
 /// Value of a signal at the frequency on the grid next to `hertz`.

@@ -335,7 +335,7 @@ fn deviation(exact: &mut Exact<'_>, sum: &Sum, frequencies: &[f64], poles: &[Roo
         let s = Complex::new(0.0, TAU * frequency);
         let (Some(values), Some(sums)) = (exact.at(s), sum.at(s)) else { continue };
         for (row, (a, b)) in values.iter().zip(&sums).enumerate() {
-            let size = a.norm().max(ZERO * sum.reach(s, row));
+            let size = a.norm().max(ZERO * sum.reach(s, row)).max(modal::UNSEEN * sum.most(s, row));
             if size > 0.0 {
                 worst = worst.max((a - b).norm() / size);
             }

@@ -25,6 +25,8 @@ use nalgebra::{Complex, DMatrix, DVector};
 /// Modes beyond those asked for that an iteration of a block takes along, and the change of λ at which it ends [1].
 const GUARDS: usize = 6;
 const SETTLED: f64 = 1e-14;
+/// Share of what a row could see below which it sees nothing.
+pub(crate) const UNSEEN: f64 = 1e-7;
 /// Of a mechanism that floats the correction is taken at this share of the frequency up to which modes are known [1].
 const ASIDE: f64 = 0.03;
 
@@ -188,6 +190,21 @@ impl Sum {
         };
         let level = rest + (0..self.lambda.len()).map(mode).sum::<f64>();
         if self.rates[row] { s.norm() * level + self.conducted[row].abs() } else { level }
+    }
+
+    /// What a row could see at most, were the mode that it sees best the one that is pushed most and nearest to its resonance: below a share
+    /// [`UNSEEN`] of that a value is rounding, as across the axis of a symmetric part.
+    pub(crate) fn most(&self, s: Complex<f64>, row: usize) -> f64 {
+        let modes = 0..self.lambda.len();
+        let seen = modes.clone().map(|j| self.seen[(row, j)].abs()).fold(0.0, f64::max);
+        let force = |j: usize| -> f64 {
+            let part = |(c, law): (usize, &Law)| law.factor(s).norm() * self.push[(j, c)].abs();
+            self.laws.iter().enumerate().map(part).sum()
+        };
+        let pushed = modes.clone().map(force).fold(0.0, f64::max);
+        let nearest =
+            modes.map(|j| 1.0 / (s * s + s * self.damping[(j, j)] + self.lambda[j]).norm()).fold(0.0, f64::max);
+        seen * pushed * nearest * if self.rates[row] { s.norm() } else { 1.0 }
     }
 
     /// Nothing damps any of its modes.

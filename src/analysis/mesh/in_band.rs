@@ -140,8 +140,11 @@ impl Sample {
             let pair = at(s).zip(at(s * (1.0 + STEP)));
             values.push(match pair {
                 Some((here, there)) => {
-                    let one = |(a, b): (&Complex<f64>, &Complex<f64>)| (*a, a.norm() + (b - a).norm() / STEP);
-                    here.iter().zip(&there).map(one).collect()
+                    let unseen = |row: usize| sum.as_ref().map_or(0.0, |sum| modal::UNSEEN * sum.most(s, row));
+                    let one = |(row, (a, b)): (usize, (&Complex<f64>, &Complex<f64>))| {
+                        (*a, (a.norm() + (b - a).norm() / STEP).max(unseen(row)))
+                    };
+                    here.iter().zip(&there).enumerate().map(one).collect()
                 }
                 None => vec![(Complex::new(f64::NAN, f64::NAN), 1.0); exact.rows.len()],
             });
