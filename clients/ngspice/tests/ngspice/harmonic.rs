@@ -16,7 +16,7 @@ fn netlist() -> String {
     text.replace("uses ../poly.net", &process)
 }
 
-/// `.ac` of the resonator with these sources, twenty frequencies in a decade from 1 kHz to 200 kHz.
+/// `.ac` of the resonator with these sources, about twenty frequencies in a decade from 1 kHz to 200 kHz, both on the grid.
 fn circuit(sources: &str, line: &str, ngspice: &Path) -> Run {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("resonator.net"), netlist()).unwrap();
@@ -38,8 +38,8 @@ fn direct(run: &Run, drive: &str, signals: &[&str], bias: &[(&str, f64)]) -> Har
         signals: named(signals),
         from: grid[0],
         to: grid[grid.len() - 1],
-        points: 20,
-        spacing: Spacing::PerDecade,
+        points: grid.len(),
+        spacing: Spacing::Logarithmic,
         even: true,
         voltages: bias.iter().map(|(name, volts)| ((*name).to_owned(), *volts)).collect(),
         ..HarmonicOptions::default()
@@ -81,7 +81,7 @@ fn ac_of_a_circuit_and_without_one() {
         // a force of 1 A at a port that shows micrometres
         let pushed = circuit(
             "If 0 f dc 0 ac 1",
-            "A1 %gd [f 0] part\n.model part bimorph(file=\"resonator.net\" segments=2 ports=[\"shuttle.x\"])",
+            "A1 [%hd f 0] null part\n.model part bimorph(file=\"resonator.net\" segments=2 ports=[\"shuttle.x\"])",
             &ngspice,
         );
         let result = direct(&pushed, "shuttle.fx", &["shuttle.x"], &[]);
