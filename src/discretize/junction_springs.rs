@@ -99,7 +99,7 @@ fn scaled(spring: &Matrix3<f64>, beam: &Beam) -> Matrix3<f64> {
 
 /// True where no load gains work from the spring, rounding aside.
 fn gives(spring: &Matrix3<f64>, beam: &Beam) -> bool {
-    scaled(spring, beam).symmetric_eigenvalues().min() >= -1e-9
+    (scaled(spring, beam) + Matrix3::from_diagonal_element(1e-9)).cholesky().is_some()
 }
 
 /// The spring without what would gain work.
