@@ -103,7 +103,7 @@ fn grid(points: usize, analysis: SweepAnalysis) -> (SweepSpec, Bundle) {
     let side = (points as f64).sqrt().round() as usize;
     let axis = |text: String| text.parse::<SweepParameter>().expect("an axis");
     let parameters = vec![axis(format!("wh=1.8u:2.2u:{side}")), axis(format!("pitch=48u:51u:{side}"))];
-    let spec = SweepSpec { parameters, analysis, shard: Shard::default(), threads: Some(1) };
+    let spec = SweepSpec { parameters, samples: None, analysis, shard: Shard::default(), threads: Some(1) };
     let mut bundle = Bundle::read(Path::new("examples/bank/bank.net"), &[]).expect("the bank");
     for text in bundle.files.values_mut() {
         *text = text.replace("pitch = 49.5u", "param pitch = 49.5u");

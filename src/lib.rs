@@ -16,6 +16,7 @@
 pub mod analysis;
 pub mod budget;
 pub mod compile;
+pub mod content;
 pub mod cosim;
 pub mod device;
 pub mod discretize;

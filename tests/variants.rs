@@ -25,7 +25,7 @@ f2d * [t] [F=F/20 oz=0]
 
 fn swept(text: &str, axes: &[&str], analysis: SweepAnalysis, options: &CompileOptions, shard: Shard) -> SweepTable {
     let parameters = axes.iter().map(|axis| axis.parse().expect("an axis")).collect();
-    let spec = SweepSpec { parameters, analysis, shard, threads: Some(2) };
+    let spec = SweepSpec { parameters, samples: None, analysis, shard, threads: Some(2) };
     sweep::run(&spec, &Bundle::from_text("beams.net", text), options, &|_| true).expect("a table")
 }
 
@@ -277,6 +277,7 @@ fn sweeps_of_transients_are_runs_alone() {
     assert_eq!((whole.rows.len(), whole.failed()), (30, 0), "{}", whole.to_csv());
     assert_eq!(whole.units, ["m", "m/s"]);
     let spec = SweepSpec {
+        samples: None,
         parameters: axes.iter().map(|axis| axis.parse().expect("an axis")).collect(),
         analysis: transients.clone(),
         shard: Shard::default(),

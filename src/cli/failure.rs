@@ -1,5 +1,6 @@
 //! Why a command did not finish, and with which exit status.
 
+use super::merge::MergeError;
 use bimorph::analysis::AnalysisError;
 use bimorph::analysis::chart::ChartError;
 use bimorph::compile::CompileError;
@@ -8,10 +9,14 @@ use bimorph::cosim::around::AroundError;
 use bimorph::export::ExportError;
 use bimorph::front::FrontError;
 use bimorph::jobs::sweep::SweepError;
+<<<<<<< HEAD
 use bimorph::layout::LayoutError;
 use bimorph::layout::convert::ConvertError;
 use bimorph::layout::gds::{GdsError, GdsFault};
 use bimorph::layout::mask::MaskError;
+=======
+use bimorph::jobs::sweep::journal::JournalError;
+>>>>>>> 7d10fb1 (Sweeps over samples, kept as they go, resumed and merged)
 use bimorph::options::Refused;
 use bimorph::results::format::UnknownFormat;
 use bimorph::results::plot::render::RenderError;
@@ -65,6 +70,10 @@ pub(crate) enum Failure {
     Render(#[from] RenderError),
     #[error(transparent)]
     Sweep(#[from] SweepError),
+    #[error(transparent)]
+    Journal(#[from] JournalError),
+    #[error(transparent)]
+    Merge(#[from] MergeError),
     #[error(transparent)]
     Client(#[from] ClientError),
     #[error(transparent)]

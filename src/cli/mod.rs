@@ -3,7 +3,11 @@
 //! Every subcommand is an [`clap::Args`] struct with a `run` method. It reads, computes, writes its `--out` file, and
 //! only then prints to standard output, so that a failure leaves standard output empty and no file behind.
 
+<<<<<<< HEAD
 mod ac;
+=======
+mod chance;
+>>>>>>> 7d10fb1 (Sweeps over samples, kept as they go, resumed and merged)
 mod chart;
 mod check;
 mod convert;
@@ -16,7 +20,11 @@ mod draw_motion;
 mod export;
 mod failure;
 mod interrupt;
+<<<<<<< HEAD
 mod layout;
+=======
+mod merge;
+>>>>>>> 7d10fb1 (Sweeps over samples, kept as they go, resumed and merged)
 mod model;
 mod modes;
 mod options;
@@ -63,6 +71,7 @@ enum Command {
     Cosim(cosim::Cosim),
     Serve(serve::Serve),
     Sweep(sweep::Sweep),
+    Merge(merge::Merge),
     Chart(chart::Chart),
     Plot(plot::Plot),
     Doctor(doctor::Doctor),
@@ -85,6 +94,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Cosim(command) => command.run(),
         Command::Serve(command) => command.run(),
         Command::Sweep(command) => command.run(),
+        Command::Merge(command) => command.run(),
         Command::Chart(command) => command.run(),
         Command::Plot(command) => command.run(),
         Command::Doctor(command) => command.run(),

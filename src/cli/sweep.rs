@@ -1,36 +1,51 @@
 //! `bimorph sweep`: many variants.
 
+use super::chance::Chance;
 use super::failure::Failure;
 use super::model::ModelArgs;
 use super::output::{check_folder, print};
 use super::{interrupt, progress, value};
-use bimorph::jobs::sweep::{self, Shard, SweepAnalysis, SweepParameter, SweepProgress, SweepSpec, SweepTable};
+use bimorph::compile::CompileOptions;
+use bimorph::jobs::sweep::journal::{self, Journal, Kept};
+use bimorph::jobs::sweep::{
+    self, Shard, SweepAnalysis, SweepError, SweepParameter, SweepProgress, SweepSpec, SweepTable,
+};
+use bimorph::netlist::Bundle;
 use bimorph::options::Value;
 use bimorph::options::analysis::{MODES_COUNT, PULL_IN_MAX};
 use bimorph::results::atomic;
 use bimorph::service::client::Client;
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
+use std::sync::OnceLock;
 use std::time::Duration;
 
-/// Run one analysis over a grid of parameter values, on all cores, here or on a server.
+/// Run one analysis over a grid of parameter values, or over samples of parameters that vary, on all cores, here or on a server.
 ///
 /// The table is CSV with one row for each point, in grid order whatever the number of cores; a point without a result
-/// has its reason in the column "error". The shards of a sweep put together are the whole sweep.
+/// has its reason in the column "error". The shards of a sweep put together (`bimorph merge`) are the whole sweep.
+///
+/// With --out FILE.csv every point is kept in FILE.csv.journal as soon as it is done, until the table is written: after Ctrl-C, a kill or a
+/// full disk the same command with --resume goes on where it stopped, and the table has the bytes that one run would have.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     bimorph sweep bank.net --param w=1.8u:2.2u:21 --port heat=2.2 --signals yoke.y --out w.csv\n  \
     bimorph sweep bank.net --param w=1.8u:2.2u:21 --param Lh=200u,206u --analysis modes --count 3\n  \
     bimorph sweep switch.net --param gap=1u:3u:201 --analysis pullin --shard 0/4 --out part0.csv\n  \
     bimorph sweep bank.net --param wh=1.8u:2.2u:16 --analysis tran --stop 100u --port heat=2.2 --signals yoke.y\n  \
+    bimorph sweep bank.net --vary wh=normal:2u:0.05u --samples 1000 --seed 7 --analysis modes --out mc.csv\n  \
+    bimorph sweep bank.net --param wh=1.8u:2.2u:201 --out w.csv --resume\n  \
     bimorph sweep bank.net --param w=1.8u:2.2u:21 --to unix:///tmp/bimorph.sock")]
 pub(crate) struct Sweep {
     #[command(flatten)]
     model: ModelArgs,
 
     /// An axis of the grid: LOW:HIGH:COUNT, ends included, or a list A,B,C. Repeatable; the last varies fastest
-    #[arg(long = "param", value_name = "NAME=LOW:HIGH:COUNT", required = true)]
+    #[arg(long = "param", value_name = "NAME=LOW:HIGH:COUNT", required_unless_present = "vary")]
     parameters: Vec<String>,
+
+    #[command(flatten)]
+    chance: Chance,
 
     /// What to compute at each point
     #[arg(long, value_enum, default_value_t = Analysis::Static)]
@@ -79,6 +94,10 @@ pub(crate) struct Sweep {
     /// Write the table to a .csv file [default: standard output]
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+
+    /// Go on with the points in FILE.csv.journal, if there are any
+    #[arg(long, requires = "out", conflicts_with = "to")]
+    resume: bool,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -101,9 +120,7 @@ impl Sweep {
         let (bundle, options) = (self.model.bundle()?, self.model.options()?);
         let bar = progress::bar("sweep");
         let table = match &self.to {
-            None => sweep::check_names(&spec, &bundle, &options)
-                .and_then(|()| sweep::run(&spec, &bundle, &options, &|p| report(&bar, p)))
-                .map_err(Failure::from),
+            None => self.here(&spec, &bundle, &options, &bar),
             Some(uri) => {
                 if !(self.deadline > 0.0 && self.deadline < 1e6) {
                     return Err(Failure::bad("--deadline", "a time above 0 s", self.deadline.to_string()));
@@ -111,17 +128,60 @@ impl Sweep {
                 let deadline = Duration::from_secs_f64(self.deadline);
                 Client::connect(uri, deadline)
                     .and_then(|mut client| client.sweep(&spec, &bundle, &options, &mut |p| report(&bar, p)))
+                    .map(|table| (table, None))
                     .map_err(|e| if interrupt::asked() { Failure::Interrupted } else { e.into() })
             }
         };
         bar.finish_and_clear();
-        let table = table?;
+        let (table, journal) = table?;
         self.deliver(&table)?;
+        if let Some(journal) = journal {
+            journal.finish()?;
+        }
         eprintln!("{}", summary(&table, spec.shard));
         match table.rows.iter().find_map(|row| row.values.as_ref().err()) {
             Some(first) if table.failed() == table.rows.len() => Err(Failure::AllPoints(first.trim_end().to_owned())),
             _ => Ok(()),
         }
+    }
+
+    /// The sweep in this process, each point kept in a journal where there will be a file.
+    fn here(
+        &self,
+        spec: &SweepSpec,
+        bundle: &Bundle,
+        options: &CompileOptions,
+        bar: &indicatif::ProgressBar,
+    ) -> Result<(SweepTable, Option<Journal>), Failure> {
+        sweep::check_names(spec, bundle, options)?;
+        let Some(path) = self.journal() else {
+            return Ok((sweep::run(spec, bundle, options, &|p| report(bar, p))?, None));
+        };
+        let (journal, known) = Journal::open(&path, &journal::name(spec, bundle, options), self.resume)?;
+        if !known.is_empty() {
+            bar.suspend(|| eprintln!("{} points are there from before", known.len()));
+        }
+        let refused = OnceLock::new();
+        let keep = |kept: &Kept| journal.keep(kept).map_err(|error| refused.set(error)).is_ok();
+        let table = sweep::run_on(spec, bundle, options, known, &keep, &|p| report(bar, p));
+        if let Some(error) = refused.into_inner() {
+            return Err(error.into());
+        }
+        match table {
+            Err(SweepError::Cancelled { done, points }) => {
+                bar.suspend(|| eprintln!("{done} of {points} points are in {}: go on with --resume", path.display()));
+                Err(Failure::Interrupted)
+            }
+            table => Ok((table?, Some(journal))),
+        }
+    }
+
+    /// FILE.csv.journal beside FILE.csv; none for a pipe or a device, which keeps nothing.
+    fn journal(&self) -> Option<PathBuf> {
+        let out = self.out.as_ref().filter(|out| !out.exists() || out.is_file())?;
+        let mut name = out.file_name()?.to_owned();
+        name.push(".journal");
+        Some(out.with_file_name(name))
     }
 
     fn spec(&self) -> Result<SweepSpec, Failure> {
@@ -146,7 +206,8 @@ impl Sweep {
                 SweepAnalysis::Transient { stop, outputs, voltages: self.ports.clone() }
             }
         };
-        let spec = SweepSpec { parameters, analysis, shard: self.shard.parse::<Shard>()?, threads: self.threads };
+        let (samples, shard) = (self.chance.samples()?, self.shard.parse::<Shard>()?);
+        let spec = SweepSpec { parameters, samples, analysis, shard, threads: self.threads };
         spec.point_numbers()?;
         Ok(spec)
     }

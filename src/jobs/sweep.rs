@@ -5,20 +5,29 @@
 //! rows come back in grid order, so the table has the same bits on one thread and on many, and the shards of a sweep put
 //! together are the whole sweep.
 
+mod design;
+mod distribution;
 mod family;
+pub mod journal;
 pub mod parse;
 mod point;
+mod samples;
 mod table;
 mod transient;
 
+pub use design::{DESIGNS, Design};
+pub use distribution::{Distribution, Vary};
+pub use samples::{Samples, Sampling};
 pub use table::{SweepRow, SweepTable};
 
 use crate::budget::{self, Budget, Stopped};
 use crate::compile::CompileOptions;
 use crate::netlist::{Bundle, Setting, Source};
 use family::Family;
+use journal::Kept;
+use point::Outcome;
 use rayon::prelude::*;
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use thiserror::Error;
@@ -29,6 +38,8 @@ use transient::Transients;
 pub struct SweepSpec {
     /// The full grid of these is run; the last one varies fastest. Empty: one point, as the netlist stands.
     pub parameters: Vec<SweepParameter>,
+    /// Samples that are drawn at every point of the grid, and vary faster than it.
+    pub samples: Option<Samples>,
     /// What to compute at each point.
     pub analysis: SweepAnalysis,
     /// Which part of the grid to run.
@@ -164,9 +175,30 @@ pub fn run(
     options: &CompileOptions,
     progress: &(dyn Fn(SweepProgress) -> bool + Sync),
 ) -> Result<SweepTable, SweepError> {
-    let numbers = spec.point_numbers()?;
+    run_on(spec, bundle, options, Vec::new(), &|_| true, progress)
+}
+
+/// The same, going on from the points that are `known` from before. `keep` is given each point that is new as soon as it is done, from
+/// any thread, and answers whether to go on.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_on(
+    spec: &SweepSpec,
+    bundle: &Bundle,
+    options: &CompileOptions,
+    known: Vec<Kept>,
+    keep: &(dyn Fn(&Kept) -> bool + Sync),
+    progress: &(dyn Fn(SweepProgress) -> bool + Sync),
+) -> Result<SweepTable, SweepError> {
+    let mut numbers = spec.point_numbers()?;
     let points = numbers.len() as u64;
-    let (done, failed, stop) = (AtomicU64::new(0), AtomicU64::new(0), AtomicBool::new(false));
+    let mut known: BTreeMap<usize, Kept> = known.into_iter().map(|kept| (kept.point, kept)).collect();
+    known.retain(|number, _| numbers.binary_search(number).is_ok());
+    numbers.retain(|number| !known.contains_key(number));
+    let before = known.values().filter(|kept| kept.error.is_some()).count();
+    let (done, failed) = (AtomicU64::new(known.len() as u64), AtomicU64::new(before as u64));
+    let stop = AtomicBool::new(false);
     let (budget, full) = (budget::current(), OnceLock::new());
     let source = Source::new(bundle);
     let family = Family::new(spec, &source, options);
@@ -177,6 +209,9 @@ pub fn run(
         }
         if outcome.values.is_err() {
             failed.fetch_add(1, Ordering::Relaxed);
+        }
+        if !keep(&outcome.kept()) {
+            stop.store(true, Ordering::Relaxed);
         }
         let done = done.fetch_add(1, Ordering::Relaxed) + 1;
         if !progress(SweepProgress { done, points, failed: failed.load(Ordering::Relaxed) }) {
@@ -211,18 +246,34 @@ pub fn run(
         return Err(SweepError::TooLarge { most });
     }
     match outcomes {
-        Some(outcomes) => Ok(table::assemble(spec, outcomes.into_iter().flatten().collect())),
+        Some(outcomes) => {
+            let new = outcomes.into_iter().flatten();
+            let mut all: Vec<Outcome> = known.into_values().map(|kept| kept.outcome(spec)).chain(new).collect();
+            all.sort_by_key(|outcome| outcome.number);
+            Ok(table::assemble(spec, all))
+        }
         None => Err(SweepError::Cancelled { done: done.into_inner(), points }),
     }
 }
 
 impl SweepSpec {
-    /// Points of the whole grid, before sharding.
+    /// Names of what varies, the slowest first.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        let varying = self.samples.iter().flat_map(|samples| &samples.asked.vary);
+        self.parameters.iter().map(|axis| axis.name.as_str()).chain(varying.map(|vary| vary.name.as_str()))
+    }
+
+    /// Samples at each point of the grid.
+    fn sample_count(&self) -> usize {
+        self.samples.as_ref().map_or(1, |samples| samples.asked.count)
+    }
+
+    /// Points of the whole grid with all samples, before sharding.
     ///
     /// # Errors
     /// [`SweepError::BadSpec`] for an axis without values or a grid too large to number.
     pub fn grid_points(&self) -> Result<usize, SweepError> {
-        self.parameters.iter().try_fold(1usize, |product, axis| {
+        self.parameters.iter().try_fold(self.sample_count(), |product, axis| {
             if axis.values.is_empty() {
                 return Err(bad(format!("parameter {}", axis.name), "at least one value", "none"));
             }
@@ -242,16 +293,24 @@ impl SweepSpec {
             return Err(bad("shard".into(), "i/N with 0 <= i < N", &format!("{index}/{count}")));
         }
         let mut seen = HashSet::with_capacity(self.parameters.len());
-        for axis in &self.parameters {
-            if !seen.insert(axis.name.as_str()) {
-                return Err(bad("parameters".into(), "each name once", &format!("\"{}\" twice", axis.name)));
+        for name in self.names() {
+            if !seen.insert(name) {
+                return Err(bad("parameters".into(), "each name once", &format!("\"{name}\" twice")));
             }
         }
         Ok((index..self.grid_points()?).step_by(count).collect())
     }
 
     /// Values of every parameter at one point of the grid.
-    pub fn settings(&self, mut number: usize) -> Vec<(String, Setting)> {
+    pub fn settings(&self, number: usize) -> Vec<(String, Setting)> {
+        let count = self.sample_count();
+        let mut settings = self.grid_settings(number / count);
+        settings.extend(self.samples.iter().flat_map(|samples| samples.values(number % count)));
+        settings
+    }
+
+    /// Values of the parameters of the grid at one of its points, samples aside.
+    fn grid_settings(&self, mut number: usize) -> Vec<(String, Setting)> {
         let mut settings = Vec::with_capacity(self.parameters.len());
         for axis in self.parameters.iter().rev() {
             let n = axis.values.len().max(1);

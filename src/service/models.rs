@@ -6,8 +6,9 @@ use super::server::MakeDevice;
 use super::{proto, status};
 use crate::budget;
 use crate::compile::{CompileOptions, Compiled, compile};
+use crate::content::Fnv;
 use crate::device::OpenRequest;
-use crate::netlist::{Bundle, Setting};
+use crate::netlist::Bundle;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 use tonic::Status;
@@ -133,45 +134,18 @@ fn describe(id: String, compiled: &Arc<Compiled>, make: MakeDevice) -> Result<pr
     })
 }
 
-/// FNV-1a, 128 bits (Fowler, Noll, Vo), over lengths and contents.
+/// The name of what a bundle and options compile to.
 fn hash(bundle: &Bundle, options: &CompileOptions) -> u128 {
-    let mut state = Fnv(0x6c62_272e_07bb_0142_62b8_2175_6295_c58d);
-    state.text(&bundle.root);
-    for (name, text) in &bundle.files {
-        state.text(name);
-        state.text(text);
-    }
-    for (name, value) in &options.set {
-        state.text(name);
-        match value {
-            Setting::Number(x) => state.bytes(&x.to_bits().to_le_bytes()),
-            Setting::Text(text) => state.text(text),
-        }
-    }
-    // Debug output of plain numbers and flags is exact (shortest text that reads back).
-    state.text(&format!("{:?}", CompileOptions { set: Vec::new(), ..options.clone() }));
-    state.0
-}
-
-struct Fnv(u128);
-
-impl Fnv {
-    fn bytes(&mut self, bytes: &[u8]) {
-        for byte in bytes {
-            self.0 = (self.0 ^ u128::from(*byte)).wrapping_mul(0x0000_0000_0100_0000_0000_0000_0000_013b);
-        }
-    }
-
-    fn text(&mut self, text: &str) {
-        self.bytes(&(text.len() as u64).to_le_bytes());
-        self.bytes(text.as_bytes());
-    }
+    let mut state = Fnv::default();
+    state.model(bundle, options);
+    state.value()
 }
 
 #[cfg(test)]
 mod tests {
     //! Ids depend on every part of what is compiled, and on nothing else.
     use super::*;
+    use crate::netlist::Setting;
 
     #[test]
     fn ids_are_content() {
@@ -184,13 +158,5 @@ mod tests {
         assert_ne!(id, hash(&bundle, &CompileOptions { tol: 1e-4, ..options.clone() }));
         let set = |value| CompileOptions { set: vec![("w".into(), Setting::Number(value))], ..options.clone() };
         assert_ne!(hash(&bundle, &set(1.0)), hash(&bundle, &set(2.0)));
-    }
-
-    #[test]
-    fn the_hash_is_fnv1a_128() {
-        // Reference: FNV-1a 128 of "a", d228cb696f1a8caf78912b704e4a8964 (Landon Noll's test vectors).
-        let mut state = Fnv(0x6c62_272e_07bb_0142_62b8_2175_6295_c58d);
-        state.bytes(b"a");
-        assert_eq!(format!("{:032x}", state.0), "d228cb696f1a8caf78912b704e4a8964");
     }
 }

@@ -1,6 +1,7 @@
 //! The `bimorph` command from outside: what it prints, writes and returns.
 
 mod analyses;
+mod batch;
 mod bench;
 mod chart;
 mod errors;

@@ -149,7 +149,7 @@ fn many_names() {
         let mut parameters: Vec<_> = (0..400_000).map(axis).collect();
         parameters[399_999].name = "V7".into();
         let analysis = Some(proto::sweep_spec::Analysis::Modes(proto::SweepModes::default()));
-        let spec = Some(proto::SweepSpec { parameters, analysis, ..Default::default() });
+        let spec = Some(proto::SweepSpec { parameters, samples: None, analysis, ..Default::default() });
         let request = proto::SubmitSweepRequest { bundle: netlist("x"), options: None, spec };
         assert_eq!(wire.submit_sweep(request).await.expect_err("V7 twice").code(), Code::InvalidArgument);
         let mut text = String::new();

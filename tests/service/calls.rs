@@ -148,6 +148,7 @@ fn sweeps_are_submitted_watched_and_fetched() {
             })),
             shard: 0,
             shards: 0,
+            samples: None,
         };
         let request = proto::SubmitSweepRequest { bundle: wire_bundle(), options: None, spec: Some(spec) };
         let submitted = client.submit_sweep(request).await.expect("starts").into_inner();

@@ -199,6 +199,7 @@ fn sweeps_have_the_same_bits() {
     let netlist =
         Bundle::from_text("plate.net", &PLATE.replace("kx=1", "kx=k").replace("param V=0", "param V=0\nparam k=1"));
     let spec = |threads, shard| SweepSpec {
+        samples: None,
         parameters: vec!["k=0.5:4:3".parse().expect("an axis"), "V=0,1".parse().expect("an axis")],
         analysis: SweepAnalysis::PullIn { port: None, max: 9.0 },
         shard,

@@ -264,3 +264,18 @@ def test_ports_take_forces_and_accelerations(plate: bimorph.Model) -> None:
         biased = session.operating_point({"drive": 2.0, "m.x": 0.0, "frame.ax": 0.0})
         assert biased.currents["m.x"] == pytest.approx(closed_form(2.0), rel=1e-6)
         assert biased.dq_dv["drive"]["m.x"] == pytest.approx(biased.di_dv["m.x"]["drive"], rel=1e-9)
+
+
+def test_samples(client: bimorph.Client) -> None:
+    """Samples have the moments asked for, the same seed the same values, and what cannot be drawn raises."""
+    netlist = bimorph.Netlist.text(PLATE, "plate.net")
+    samples = bimorph.Samples({"k": bimorph.LogNormal(1.0, 0.1)}, count=64, seed=5, design="sobol")
+    table = client.sweep(netlist, {}, bimorph.Modes(count=1), samples=samples)
+    drawn = [float(k) for k in table.column("k") if k is not None]
+    assert len(drawn) == 64
+    assert sum(math.log(k) for k in drawn) / 64 == pytest.approx(0.0, abs=2e-3)
+    assert table.column("f1") == pytest.approx([math.sqrt(k / M) / (2 * math.pi) for k in drawn], rel=1e-9)
+    assert client.sweep(netlist, {}, bimorph.Modes(count=1), samples=samples) == table
+    with pytest.raises(bimorph.InvalidRequest, match="deviation"):
+        wrong = bimorph.Samples({"k": bimorph.Normal(1.0, -1.0)}, count=4)
+        client.sweep(netlist, {}, bimorph.Modes(count=1), samples=wrong)

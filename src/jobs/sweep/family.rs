@@ -12,7 +12,7 @@ use crate::analysis::mesh::given::{Judged, judged};
 use crate::analysis::mesh::{self, Request};
 use crate::compile::{CompileOptions, Compiled, Drawn, draw};
 use crate::discretize::DiscretizeError;
-use crate::netlist::Source;
+use crate::netlist::{Setting, Source};
 use crate::refine::model_order::ModelOrder;
 use crate::structure::Beam;
 use std::sync::OnceLock;
@@ -61,7 +61,7 @@ impl<'a> Family<'a> {
 
     /// The middle of the grid.
     fn middle(&self) -> Option<Compiled> {
-        let options = super::point::at(self.options, &self.spec.settings(middle(self.spec)));
+        let options = super::point::at(self.options, &middle(self.spec));
         draw(self.source, &options).ok()?.compile().ok()
     }
 }
@@ -74,9 +74,12 @@ fn search(first: &Compiled, share: f64, request: &Request<'_>) -> Option<Vec<usi
     order.estimated_error.is_some_and(|error| error <= sharper.options.tol).then_some(order.segments)
 }
 
-/// Number of the middle of a grid.
-pub(super) fn middle(spec: &SweepSpec) -> usize {
-    spec.parameters.iter().fold(0, |number, axis| number * axis.values.len() + axis.values.len() / 2)
+/// The middle of a grid, with the median of what is drawn.
+pub(super) fn middle(spec: &SweepSpec) -> Vec<(String, Setting)> {
+    let mut settings: Vec<_> =
+        spec.parameters.iter().map(|axis| (axis.name.clone(), axis.values[axis.values.len() / 2].clone())).collect();
+    settings.extend(spec.samples.iter().flat_map(|samples| samples.quantiles(0.5)));
+    settings
 }
 
 /// True for beams of the same names between the same nodes.

@@ -9,6 +9,7 @@ use crate::analysis::{AnalysisError, statics};
 use crate::budget::{self, Budget};
 use crate::compile::{CompileError, CompileOptions, draw};
 use crate::netlist::{Setting, Severity, Source};
+use std::borrow::Cow;
 use std::collections::HashSet;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -20,7 +21,7 @@ const NO_PARAMETER: &str = "E048";
 /// A result: its column, its unit, and its value; none: the quantity does not exist at this point.
 pub(super) struct Value {
     pub(super) name: String,
-    pub(super) unit: &'static str,
+    pub(super) unit: Cow<'static, str>,
     pub(super) value: Option<f64>,
 }
 
@@ -208,14 +209,14 @@ fn static_values(result: &statics::StaticResult, outputs: &[String]) -> Result<V
     let pick = |name: &String| {
         let found = all.iter().find(|v| v.name == *name);
         found
-            .map(|v| value(v.name.clone(), v.unit, v.value))
+            .map(|v| Value { name: v.name.clone(), unit: v.unit.clone(), value: v.value })
             .ok_or_else(|| format!("no output named \"{name}\"; expected {OUTPUTS}"))
     };
     finite(outputs.iter().map(pick).collect::<Result<_, _>>()?)
 }
 
 fn value(name: String, unit: &'static str, value: Option<f64>) -> Value {
-    Value { name, unit, value }
+    Value { name, unit: unit.into(), value }
 }
 
 /// A table holds numbers or a reason; an infinity or a NaN is neither.

@@ -36,16 +36,13 @@ pub struct SweepRow {
 
 /// Puts the points into one table. A netlist whose nodes depend on a parameter has more columns than any one point.
 pub(super) fn assemble(spec: &SweepSpec, outcomes: Vec<Outcome>) -> SweepTable {
-    let mut table = SweepTable {
-        parameters: spec.parameters.iter().map(|axis| axis.name.clone()).collect(),
-        ..SweepTable::default()
-    };
+    let mut table = SweepTable { parameters: spec.names().map(str::to_owned).collect(), ..SweepTable::default() };
     let mut columns = BTreeMap::new();
     for value in outcomes.iter().filter_map(|outcome| outcome.values.as_ref().ok()).flat_map(|found| &found.values) {
         if !columns.contains_key(&value.name) {
             columns.insert(value.name.clone(), table.results.len());
             table.results.push(value.name.clone());
-            table.units.push(value.unit.to_owned());
+            table.units.push(value.unit.clone().into_owned());
         }
     }
     for outcome in outcomes {

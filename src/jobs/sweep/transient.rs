@@ -120,8 +120,8 @@ impl<'a> Transients<'a> {
     fn search(&self) -> Option<Shared> {
         let options = self.transient();
         let mut shared: Option<Shared> = None;
-        for number in probes(self.spec) {
-            let drawn = draw(self.source, &at(self.options, &self.spec.settings(number)));
+        for settings in probes(self.spec) {
+            let drawn = draw(self.source, &at(self.options, &settings));
             let Some(compiled) = drawn.ok().and_then(|drawn| drawn.compile().ok()) else { continue };
             let Ok(order) = mesh::order_in_time(&compiled, &options) else { continue };
             match &mut shared {
@@ -147,7 +147,7 @@ impl<'a> Transients<'a> {
                 return Err(format!("{name} is not finite"));
             }
             let unit = Signal::find(compiled, name).map_err(|error| error.to_string())?.unit();
-            values.push(Value { name: name.clone(), unit, value: Some(value) });
+            values.push(Value { name: name.clone(), unit: unit.into(), value: Some(value) });
         }
         let estimated_error = compiled.order.estimated_error;
         let beyond = mesh::beyond(self.options.tol, estimated_error);
@@ -175,29 +175,37 @@ fn guarded<T>(budget: Option<&Budget>, job: &mut dyn FnMut() -> Result<T, String
     outcome.unwrap_or_else(|_| Err("internal fault at this point".to_owned()))
 }
 
-/// The middle of the grid and its corners: of each axis of numbers the least and the largest, else the first and the last.
-fn probes(spec: &SweepSpec) -> Vec<usize> {
+/// Share of the samples beyond a probe on either side.
+const RARE: f64 = 1e-3;
+
+/// The middle of the grid and its corners: of each axis of numbers the least and the largest, else the first and the last; of what is
+/// drawn the values beyond which one in a thousand lies.
+fn probes(spec: &SweepSpec) -> Vec<Vec<(String, Setting)>> {
     let ends = |values: &[Setting]| {
         let number = |k: &usize| if let Setting::Number(x) = values[*k] { x } else { *k as f64 };
         let by = |a: &usize, b: &usize| number(a).total_cmp(&number(b));
         let all = 0..values.len();
-        [all.clone().min_by(by).unwrap_or(0), all.max_by(by).unwrap_or(0)]
+        let end = |k: Option<usize>| values[k.unwrap_or(0)].clone();
+        [end(all.clone().min_by(by)), end(all.max_by(by))]
     };
-    let axes = &spec.parameters;
-    let number = |at: &[usize]| axes.iter().zip(at).fold(0, |n, (axis, k)| n * axis.values.len() + k);
-    let centre: Vec<usize> = axes.iter().map(|axis| axis.values.len() / 2).collect();
-    let mut probes = vec![middle(spec)];
+    let middle = middle(spec);
+    let mut axes: Vec<[Setting; 2]> = spec.parameters.iter().map(|axis| ends(&axis.values)).collect();
+    if let Some(samples) = &spec.samples {
+        let both = samples.quantiles(RARE).into_iter().zip(samples.quantiles(1.0 - RARE));
+        axes.extend(both.map(|((_, low), (_, high))| [low, high]));
+    }
+    let mut probes = vec![middle.clone()];
     if axes.len() <= MOST_CORNERS {
         for corner in 0..1usize << axes.len() {
-            let at: Vec<usize> = axes.iter().enumerate().map(|(i, axis)| ends(&axis.values)[corner >> i & 1]).collect();
-            probes.push(number(&at));
+            let at = |i: usize| axes[i][corner >> i & 1].clone();
+            probes.push(middle.iter().enumerate().map(|(i, (name, _))| (name.clone(), at(i))).collect());
         }
     } else {
         for (i, axis) in axes.iter().enumerate() {
-            for end in ends(&axis.values) {
-                let mut at = centre.clone();
-                at[i] = end;
-                probes.push(number(&at));
+            for end in axis {
+                let mut at = middle.clone();
+                at[i].1 = end.clone();
+                probes.push(at);
             }
         }
     }

@@ -8,6 +8,7 @@ pub mod device;
 pub mod harmonic;
 pub mod model;
 pub mod options;
+mod samples;
 pub mod sweep;
 
 use super::proto;

@@ -1,7 +1,7 @@
 //! Sweeps: what to run, and the table.
 
 use super::model::{setting_from_wire, setting_to_wire};
-use super::{Violation, named, number, required, voltages};
+use super::{Violation, named, number, required, samples, voltages};
 use crate::jobs::sweep::parse::linear;
 use crate::jobs::sweep::{Shard, SweepAnalysis, SweepParameter, SweepRow, SweepSpec, SweepTable};
 use crate::options::analysis::MODES_COUNT;
@@ -38,6 +38,7 @@ pub fn spec_to_wire(spec: &SweepSpec) -> proto::SweepSpec {
         analysis: Some(analysis),
         shard: u32::try_from(spec.shard.index).unwrap_or(u32::MAX),
         shards: u32::try_from(spec.shard.count).unwrap_or(u32::MAX),
+        samples: spec.samples.as_ref().map(|samples| samples::to_wire(&samples.asked)),
     }
 }
 
@@ -48,7 +49,8 @@ pub fn grid_points(spec: &proto::SweepSpec) -> usize {
         Some(Values::List(list)) => list.values.len(),
         None => 0,
     };
-    spec.parameters.iter().fold(1, |points, axis| points.saturating_mul(values(axis).max(1)))
+    let samples = spec.samples.as_ref().map_or(1, |samples| samples.count as usize).max(1);
+    spec.parameters.iter().fold(samples, |points, axis| points.saturating_mul(values(axis).max(1)))
 }
 
 /// A checked specification. Lays out every axis: [`grid_points`] says before how long they are.
@@ -80,7 +82,8 @@ pub fn spec_from_wire(spec: Option<proto::SweepSpec>) -> Result<SweepSpec, Viola
         },
     };
     let shard = Shard { index: spec.shard as usize, count: spec.shards.max(1) as usize };
-    Ok(SweepSpec { parameters, analysis, shard, threads: None })
+    let samples = spec.samples.map(samples::from_wire).transpose()?;
+    Ok(SweepSpec { parameters, samples, analysis, shard, threads: None })
 }
 
 fn axis_from_wire(field: &str, axis: proto::SweepParameter) -> Result<SweepParameter, Violation> {
@@ -141,6 +144,15 @@ pub fn chunk_from_wire(chunk: proto::SweepChunk, table: &mut SweepTable) -> Resu
 mod tests {
     //! A specification and a row come back as they were sent.
     use super::*;
+    use crate::jobs::sweep::{Design, Samples, Sampling};
+
+    fn samples() -> Samples {
+        let vary = ["w=normal:2u:0.1u", "g=uniform:1u:2u", "E=lognormal:165e9:0.1"].map(|text| text.parse().unwrap());
+        let correlations = vec![("w".to_owned(), "E".to_owned(), -0.5)];
+        let asked = Sampling { vary: vary.to_vec(), count: 7, seed: u64::MAX, design: Design::Sobol, correlations };
+        Samples::new(asked).unwrap()
+    }
+
     use crate::netlist::Setting;
 
     /// However many and long the axes are, their product is known without them.
@@ -166,6 +178,7 @@ mod tests {
     fn specifications_and_rows_survive_the_wire() {
         let spec = SweepSpec {
             parameters: vec!["w=1u:2u:3".parse().expect("an axis"), "layer=p1,p2".parse().expect("an axis")],
+            samples: Some(samples()),
             analysis: SweepAnalysis::PullIn { port: None, max: 30.0 },
             shard: Shard { index: 1, count: 4 },
             threads: None,

@@ -33,7 +33,7 @@ from .results import (
 )
 from .server import Server, serve
 from .session import Session, Snapshot
-from .sweep import Modes, PullIn, Row, Static, Table, Transient
+from .sweep import LogNormal, Modes, Normal, PullIn, Row, Samples, Static, Table, Transient, Uniform
 
 __all__ = [
     "BimorphError",
@@ -43,6 +43,7 @@ __all__ = [
     "FrequencyResponse",
     "InvalidRequest",
     "LimitExceeded",
+    "LogNormal",
     "Model",
     "Modes",
     "ModesResult",
@@ -50,6 +51,7 @@ __all__ = [
     "NetlistError",
     "NoResult",
     "NodeMotion",
+    "Normal",
     "NotFound",
     "Options",
     "Piece",
@@ -57,6 +59,7 @@ __all__ = [
     "PullInResult",
     "Root",
     "Row",
+    "Samples",
     "Server",
     "Session",
     "Snapshot",
@@ -68,6 +71,7 @@ __all__ = [
     "TransientResult",
     "TrialReply",
     "Unavailable",
+    "Uniform",
     "Violation",
     "serve",
 ]

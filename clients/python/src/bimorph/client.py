@@ -118,18 +118,20 @@ class Client:
         *,
         set: Mapping[str, float | str] | None = None,
         include: Iterable[str | os.PathLike[str]] = (),
+        samples: sweeps.Samples | None = None,
         shard: tuple[int, int] = (0, 1),
         progress: Callable[[int, int], object] | None = None,
         **options: Unpack[Options],
     ) -> sweeps.Table:
         """Runs ``analysis`` on the full grid of ``parameters`` (netlist parameters [SI]), on all cores of the server.
 
+        ``samples`` are drawn at every point of the grid, which may be empty (``{}``): Monte Carlo.
         ``shard`` (i, n) runs only points whose number modulo n is i. ``progress`` is told (points done, points).
         """
         request = sweep_pb2.SubmitSweepRequest(
             bundle=self._bundle(netlist, include),
             options=_options(set or {}, options),
-            spec=sweeps.to_wire(parameters, analysis, shard),
+            spec=sweeps.to_wire(parameters, analysis, shard, samples),
         )
         return sweeps.run(self._channel, request, progress)
 

@@ -6,7 +6,7 @@ import csv
 import io
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 from .channel import Channel
 from .errors import BimorphError
@@ -55,6 +55,79 @@ class Transient:
 
 
 Analysis = Static | Modes | PullIn | Transient
+
+
+@dataclass(frozen=True)
+class Normal:
+    """Gauss' distribution of a parameter."""
+
+    mean: float
+    deviation: float
+    """Standard deviation, from 0."""
+
+
+@dataclass(frozen=True)
+class Uniform:
+    """Every value from ``low`` to ``high`` alike."""
+
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class LogNormal:
+    """A parameter whose logarithm is normal."""
+
+    median: float
+    deviation: float
+    """Standard deviation of the natural logarithm, from 0."""
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Samples of parameters that vary by chance, drawn at every point of the grid.
+
+    >>> Samples({"wh": Normal(2e-6, 5e-8), "pitch": Uniform(49e-6, 50e-6)}, count=1000, seed=7)
+    """
+
+    vary: Mapping[str, Normal | Uniform | LogNormal]
+    count: int
+    seed: int = 0
+    """The same seed draws the same samples."""
+    design: Literal["lhs", "random", "sobol"] = "lhs"
+    """Latin hypercube, independent points, or a scrambled Sobol sequence (at most 65 536 samples)."""
+    correlations: Mapping[tuple[str, str], float] = field(default_factory=dict)
+    """Of two normal or log-normal parameters (of the logarithm there), between -1 and 1."""
+
+
+def _samples(samples: Samples) -> Any:
+    vary = []
+    for name, given in samples.vary.items():
+        if isinstance(given, Normal):
+            one = sweep_pb2.SweepVary(name=name, normal=sweep_pb2.SweepNormal(mean=given.mean, deviation=given.deviation))
+        elif isinstance(given, Uniform):
+            one = sweep_pb2.SweepVary(name=name, uniform=sweep_pb2.SweepUniform(low=given.low, high=given.high))
+        elif isinstance(given, LogNormal):
+            wire = sweep_pb2.SweepLogNormal(median=given.median, deviation=given.deviation)
+            one = sweep_pb2.SweepVary(name=name, log_normal=wire)
+        else:
+            raise TypeError(f"{name}: expected Normal, Uniform or LogNormal, got {given!r}")
+        vary.append(one)
+    designs = {
+        "random": sweep_pb2.SweepSamples.DESIGN_RANDOM,
+        "lhs": sweep_pb2.SweepSamples.DESIGN_LATIN_HYPERCUBE,
+        "sobol": sweep_pb2.SweepSamples.DESIGN_SOBOL,
+    }
+    if samples.design not in designs:
+        raise ValueError(f"design: expected one of {', '.join(designs)}, got {samples.design!r}")
+    correlations = [sweep_pb2.SweepCorrelation(a=a, b=b, value=value) for (a, b), value in samples.correlations.items()]
+    return sweep_pb2.SweepSamples(
+        vary=vary,
+        count=samples.count,
+        seed=samples.seed,
+        design=designs[samples.design],
+        correlations=correlations,
+    )
 
 
 @dataclass(frozen=True)
@@ -111,7 +184,12 @@ def setting(name: str, value: float | str) -> Any:
     return model_pb2.Setting(name=name, number=float(value))
 
 
-def to_wire(parameters: Mapping[str, Sequence[float | str]], analysis: Analysis, shard: tuple[int, int]) -> Any:
+def to_wire(
+    parameters: Mapping[str, Sequence[float | str]],
+    analysis: Analysis,
+    shard: tuple[int, int],
+    samples: Samples | None = None,
+) -> Any:
     """A specification as it travels."""
     axes = [
         sweep_pb2.SweepParameter(
@@ -120,6 +198,8 @@ def to_wire(parameters: Mapping[str, Sequence[float | str]], analysis: Analysis,
         for name, values in parameters.items()
     ]
     spec = sweep_pb2.SweepSpec(parameters=axes, shard=shard[0], shards=shard[1])
+    if samples is not None:
+        spec.samples.CopyFrom(_samples(samples))
     if isinstance(analysis, PullIn):
         spec.pull_in.CopyFrom(sweep_pb2.SweepPullIn(port=analysis.port, max_v=analysis.max_v))
         return spec

@@ -1,0 +1,238 @@
+//! What a sweep has found so far, in a file that a stop in the middle leaves readable: one line of JSON for each point as soon as it
+//! is done, behind a line that names the sweep. Whoever goes on reads the points back to the same bits; a last line that is cut off
+//! was not finished, and its point is computed again.
+
+use super::SweepSpec;
+use super::point::{Found, Outcome, Value};
+use crate::content::Fnv;
+use crate::netlist::Bundle;
+use crate::options::CompileOptions;
+use serde::{Deserialize, Serialize};
+use std::fs::File;
+use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
+use thiserror::Error;
+
+/// Longest time between two points and their way to the disk. A stop of the process loses nothing, a stop of the machine so much.
+const SYNC: Duration = Duration::from_secs(1);
+
+/// A point that is done.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Kept {
+    /// Its number in the full grid, from 0.
+    pub point: usize,
+    /// Name, unit and value; no value where the quantity does not exist at this point.
+    pub values: Vec<(String, String, Option<f64>)>,
+    /// Largest estimated relative error by the mesh [1].
+    pub estimated_error: Option<f64>,
+    /// Why the numbers may be further off than the tolerance.
+    pub warning: String,
+    /// Why there are none.
+    pub error: Option<String>,
+}
+
+/// The first line.
+#[derive(Debug, Serialize, Deserialize)]
+struct Head {
+    bimorph: String,
+    sweep: String,
+}
+
+/// Why points cannot be kept, or not be gone on from.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum JournalError {
+    /// There is one, and nobody said what to do with it.
+    #[error(
+        "{} has points of a sweep that did not end; go on with it by --resume, or remove the file to begin anew", path.display()
+    )]
+    Exists {
+        /// Where.
+        path: PathBuf,
+    },
+    /// It is of another sweep.
+    #[error(
+        "{} is of another sweep: the netlist, the options, the parameters or the version of bimorph differ; remove the file to begin anew",
+        path.display()
+    )]
+    Other {
+        /// Where.
+        path: PathBuf,
+    },
+    /// The file system says no.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// Where.
+        path: PathBuf,
+        /// What it says.
+        source: io::Error,
+    },
+}
+
+/// The file, open for more points.
+#[derive(Debug)]
+pub struct Journal {
+    path: PathBuf,
+    file: Mutex<Open>,
+}
+
+#[derive(Debug)]
+struct Open {
+    file: File,
+    synced: Instant,
+}
+
+/// The name of a sweep: the same for the same points and the same program.
+pub fn name(spec: &SweepSpec, bundle: &Bundle, options: &CompileOptions) -> String {
+    let mut state = Fnv::default();
+    state.text(env!("CARGO_PKG_VERSION"));
+    state.model(bundle, options);
+    // the threads change nothing; samples are named by what was asked for
+    let asked = spec.samples.as_ref().map(|samples| &samples.asked);
+    state.text(&format!("{:?} {asked:?} {:?} {:?}", spec.parameters, spec.analysis, spec.shard));
+    format!("{:032x}", state.value())
+}
+
+impl Journal {
+    /// Opens or makes the file of the sweep `name`. Gives the points that it has, if `resume` says to go on from them.
+    ///
+    /// # Errors
+    /// [`JournalError`]: a file is there and `resume` is not said, it is of another sweep, or the file system refuses.
+    pub fn open(path: &Path, name: &str, resume: bool) -> Result<(Self, Vec<Kept>), JournalError> {
+        let failed = |source| JournalError::Io { path: path.to_owned(), source };
+        let mut file = File::options().read(true).append(true).create(true).open(path).map_err(failed)?;
+        let mut bytes = Vec::new();
+        file.read_to_end(&mut bytes).map_err(failed)?;
+        // a line that is cut off, and a head that is, are as if they had never been
+        let whole = bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |last| last + 1);
+        if whole > 0 && !resume {
+            return Err(JournalError::Exists { path: path.to_owned() });
+        }
+        let mut lines = bytes[..whole].split_inclusive(|byte| *byte == b'\n');
+        let mut known = Vec::new();
+        let mut good = 0;
+        if let Some(line) = lines.next() {
+            let head: Option<Head> = serde_json::from_slice(line).ok();
+            if head.is_none_or(|head| head.sweep != name) {
+                return Err(JournalError::Other { path: path.to_owned() });
+            }
+            good += line.len();
+        }
+        for line in lines {
+            let Ok(kept) = serde_json::from_slice::<Kept>(line) else { break };
+            known.push(kept);
+            good += line.len();
+        }
+        file.set_len(good as u64).and_then(|()| file.seek(SeekFrom::End(0))).map_err(failed)?;
+        let journal = Self { path: path.to_owned(), file: Mutex::new(Open { file, synced: Instant::now() }) };
+        if good == 0 {
+            let head = Head { bimorph: env!("CARGO_PKG_VERSION").to_owned(), sweep: name.to_owned() };
+            journal.line(&head)?;
+        }
+        Ok((journal, known))
+    }
+
+    /// Adds a point.
+    ///
+    /// # Errors
+    /// [`JournalError::Io`].
+    pub fn keep(&self, kept: &Kept) -> Result<(), JournalError> {
+        self.line(kept)
+    }
+
+    fn line(&self, of: &impl Serialize) -> Result<(), JournalError> {
+        let mut open = self.file.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut write = || -> io::Result<()> {
+            let mut line = serde_json::to_vec(of)?;
+            line.push(b'\n');
+            // one call: a line is there whole, or is the last
+            open.file.write_all(&line)?;
+            if open.synced.elapsed() >= SYNC {
+                open.file.sync_data()?;
+                open.synced = Instant::now();
+            }
+            Ok(())
+        };
+        write().map_err(|source| JournalError::Io { path: self.path.clone(), source })
+    }
+
+    /// Removes the file: its table has been written.
+    ///
+    /// # Errors
+    /// [`JournalError::Io`].
+    pub fn finish(self) -> Result<(), JournalError> {
+        std::fs::remove_file(&self.path).map_err(|source| JournalError::Io { path: self.path, source })
+    }
+}
+
+impl Outcome {
+    /// What a journal keeps of it.
+    pub(super) fn kept(&self) -> Kept {
+        let (values, estimated_error, warning, error) = match &self.values {
+            Ok(found) => {
+                let each = found.values.iter().map(|v| (v.name.clone(), v.unit.clone().into_owned(), v.value));
+                (each.collect(), found.estimated_error, found.warning.clone(), None)
+            }
+            Err(error) => (Vec::new(), None, String::new(), Some(error.clone())),
+        };
+        Kept { point: self.number, values, estimated_error, warning, error }
+    }
+}
+
+impl Kept {
+    /// The point as it was.
+    pub(super) fn outcome(self, spec: &SweepSpec) -> Outcome {
+        let Self { point: number, values, estimated_error, warning, error } = self;
+        let parameters = spec.settings(number).into_iter().map(|(_, value)| value).collect();
+        let value = |(name, unit, value): (String, String, _)| Value { name, unit: unit.into(), value };
+        let values = match error {
+            Some(error) => Err(error),
+            None => Ok(Found { values: values.into_iter().map(value).collect(), estimated_error, warning }),
+        };
+        Outcome { number, parameters, values }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! A journal gives back what was put in, however it was cut off.
+    use super::*;
+
+    fn kept(point: usize) -> Kept {
+        let values =
+            vec![("b.x".into(), "m".into(), Some(0.1 + 0.2 * point as f64)), ("release".into(), "V".into(), None)];
+        Kept { point, values, estimated_error: Some(1e-3 / 3.0), warning: "W040: \"off\"".into(), error: None }
+    }
+
+    #[test]
+    fn any_cut_loses_one_point_at_most() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("w.csv.journal");
+        let (journal, known) = Journal::open(&path, "sweep", true).unwrap();
+        assert!(known.is_empty());
+        (0..4).for_each(|k| journal.keep(&kept(k)).unwrap());
+        journal.keep(&Kept { error: Some("no\nway".into()), values: Vec::new(), ..kept(9) }).unwrap();
+        drop(journal);
+        let whole = std::fs::read(&path).unwrap();
+        let ends: Vec<usize> = (0..whole.len()).filter(|&k| whole[k] == b'\n').map(|k| k + 1).collect();
+        for cut in 0..=whole.len() {
+            std::fs::write(&path, &whole[..cut]).unwrap();
+            let (journal, known) = Journal::open(&path, "sweep", true).unwrap();
+            let lines = ends.iter().filter(|end| **end <= cut).count();
+            assert_eq!(known.len(), lines.saturating_sub(1), "{cut}");
+            known.iter().take(4).enumerate().for_each(|(k, found)| assert_eq!(*found, kept(k)));
+            // and goes on where the last whole line ends
+            journal.keep(&kept(7)).unwrap();
+            drop(journal);
+            let (_, again) = Journal::open(&path, "sweep", true).unwrap();
+            assert_eq!(again.last(), Some(&kept(7)), "{cut}");
+            assert_eq!(again.len(), known.len() + 1);
+        }
+        std::fs::write(&path, &whole).unwrap();
+        assert!(matches!(Journal::open(&path, "sweep", false), Err(JournalError::Exists { .. })));
+        assert!(matches!(Journal::open(&path, "another", true), Err(JournalError::Other { .. })));
+        assert_eq!(std::fs::read(&path).unwrap(), whole);
+    }
+}

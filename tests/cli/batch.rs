@@ -1,0 +1,131 @@
+//! Sweeps as jobs: samples of what varies, points that outlive the process, shards put together.
+
+use crate::bench::Bench;
+use std::time::{Duration, Instant};
+
+/// A cantilever under a force, with parameters to vary.
+const CANTILEVER: &str = "param F=1u, w=2u, l=100u
+process p = [Youngsmodulus=165e9 density=2300 h=2u]
+anchor p [a] []
+beam2d p [a b] [l=l w=w oz=0]
+f2d * [b] [F=F oz=deg(90)]
+";
+
+fn column(csv: &str, name: &str) -> Vec<f64> {
+    let mut lines = csv.lines();
+    let head: Vec<&str> = lines.next().expect("a head").split(',').collect();
+    let at = head.iter().position(|column| *column == name).unwrap_or_else(|| panic!("{name} in {head:?}"));
+    lines.map(|line| line.split(',').nth(at).expect("a cell").parse().expect("a number")).collect()
+}
+
+/// The scatter of the deflection is that of its formula, F·l³/(3·E·I): of w³ alone. The mean of w and its deviation are those asked
+/// for to a Latin hypercube's precision, and the same seed gives the same bytes, in shards too.
+#[test]
+fn monte_carlo() {
+    let bench = Bench::new(&[("c.net", CANTILEVER)]);
+    let words = "sweep c.net --linear --junctions centreline --segments 1 --vary w=normal:2u:0.02u --samples 400 --seed 7 --signals b.y";
+    let whole = bench.run(words);
+    assert_eq!(whole.status, 0, "{}", whole.stderr);
+    let (w, y) = (column(&whole.stdout, "w"), column(&whole.stdout, "b.y [m]"));
+    for (w, y) in w.iter().zip(&y) {
+        let formula = 1e-6 * 1e-12 / (3.0 * 165e9 * 2e-6 * w.powi(3) / 12.0);
+        assert!((y / formula - 1.0).abs() < 1e-9, "{w} {y} {formula}");
+    }
+    let mean = w.iter().sum::<f64>() / 400.0;
+    let deviation = (w.iter().map(|w| (w - mean).powi(2)).sum::<f64>() / 400.0).sqrt();
+    assert!((mean / 2e-6 - 1.0).abs() < 1e-4 && (deviation / 2e-8 - 1.0).abs() < 0.01, "{mean} {deviation}");
+    assert_eq!(bench.run(&format!("{words} --threads 1")).stdout, whole.stdout);
+    assert_ne!(bench.run(&words.replace("--seed 7", "--seed 8")).stdout, whole.stdout);
+
+    for k in 0..3 {
+        assert_eq!(bench.run(&format!("{words} --shard {k}/3 --out part{k}.csv")).status, 0);
+    }
+    let merged = bench.run("merge part2.csv part0.csv part1.csv");
+    assert_eq!((merged.status, merged.stdout.as_str()), (0, whole.stdout.as_str()), "{}", merged.stderr);
+    let corners = bench.run(&format!("{words} --param F=1u,2u --samples 3").replace("--samples 400 ", ""));
+    let (force, w) = (column(&corners.stdout, "F"), column(&corners.stdout, "w"));
+    assert_eq!(force, [1e-6, 1e-6, 1e-6, 2e-6, 2e-6, 2e-6]);
+    assert_eq!(w[..3], w[3..]);
+}
+
+/// What cannot be drawn is refused with a way out.
+#[test]
+fn slips() {
+    let bench = Bench::new(&[("c.net", CANTILEVER), ("x.csv", "a,b\n1,2\n"), ("cut.csv", "point,w,\"b.y [m]\n")]);
+    for (words, said) in [
+        ("sweep c.net --vary w=gauss:1:1 --samples 3", "normal"),
+        ("sweep c.net --vary w=normal:1u:1u --samples 0", "at least one"),
+        ("sweep c.net --vary w=normal:1u:1u --samples 100000 --design sobol", "65536"),
+        ("sweep c.net --vary w=normal:1u:1u --vary w=normal:1u:1u --samples 3", "twice"),
+        ("sweep c.net --vary w=normal:1u:1u --param w=1u,2u --samples 3", "twice"),
+        ("sweep c.net --vary w=normal:1u:1u --samples 3 --correlate w,l=0.5", "vary"),
+        ("sweep c.net --vary nosuch=normal:1u:1u --samples 3", "nosuch"),
+        ("merge x.csv", "no table of `bimorph sweep`"),
+        ("merge cut.csv", "no table of `bimorph sweep`"),
+        ("merge nosuch.csv", "nosuch.csv"),
+    ] {
+        let ran = bench.run(words);
+        assert!((1..=2).contains(&ran.status), "{words}: {} {}", ran.status, ran.stderr);
+        assert!(ran.stderr.contains(said) && ran.stdout.is_empty(), "{words}: {}", ran.stderr);
+    }
+}
+
+/// Tables that are not the shards of one sweep are refused, with the point.
+#[test]
+fn shards_that_do_not_fit() {
+    let bench = Bench::new(&[("c.net", CANTILEVER)]);
+    let words = "sweep c.net --segments 1 --param F=1u:2u:6 --signals b.y";
+    for k in 0..3 {
+        assert_eq!(bench.run(&format!("{words} --shard {k}/3 --out part{k}.csv")).status, 0);
+    }
+    assert_eq!(bench.run("sweep c.net --segments 1 --param w=1u,2u --signals b.y --out w.csv").status, 0);
+    for (parts, said) in [
+        ("part0.csv part2.csv", "2 points are in none of the tables, the first of them point 1"),
+        ("part0.csv part1.csv part1.csv part2.csv", "point 1 is in part1.csv and in part1.csv"),
+        ("part0.csv w.csv", "another sweep"),
+    ] {
+        let ran = bench.run(&format!("merge {parts} --out whole.csv"));
+        assert_eq!(ran.status, 1, "{parts}");
+        assert!(ran.stderr.contains(said), "{parts}: {}", ran.stderr);
+        assert!(!bench.path("whole.csv").exists());
+    }
+}
+
+/// A sweep that is killed in the middle, or interrupted, keeps what is done: the same command with --resume goes on, computes at most the
+/// points in flight again, and its table has the bytes of one run. Without --resume, or for another sweep, the points are not touched.
+#[test]
+fn killed_and_resumed() {
+    let bench = Bench::new(&[("c.net", CANTILEVER)]);
+    let words = "sweep c.net --segments 40 --param F=1u:2u:2000 --signals b.y --threads 2";
+    let whole = bench.run(words);
+    assert_eq!(whole.status, 0, "{}", whole.stderr);
+    let lines =
+        || std::fs::read(bench.path("w.csv.journal")).map_or(0, |bytes| bytes.iter().filter(|b| **b == b'\n').count());
+    let mut before = 0;
+    for signal in ["-KILL", "-INT", "-KILL"] {
+        let mut child = bench.command(&format!("{words} --out w.csv --resume")).spawn().expect("the command starts");
+        let begun = Instant::now();
+        while lines() < before + 100 {
+            assert!(begun.elapsed() < Duration::from_secs(60), "no points after a minute");
+            assert!(child.try_wait().expect("a child").is_none(), "it ended before it was stopped");
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        let sent = std::process::Command::new("kill").args([signal, &child.id().to_string()]).status();
+        assert!(sent.is_ok_and(|s| s.success()));
+        let status = child.wait().expect("an end");
+        assert_eq!(status.code(), if signal == "-INT" { Some(130) } else { None });
+        assert!(lines() >= before + 100, "points were lost");
+        assert!(!bench.path("w.csv").exists());
+        before = lines();
+    }
+    let refused = bench.run(&format!("{words} --out w.csv"));
+    assert!(refused.status == 1 && refused.stderr.contains("--resume"), "{}", refused.stderr);
+    let other = bench.run(&format!("{words} --out w.csv --resume --tol 1e-4"));
+    assert!(other.status == 1 && other.stderr.contains("another sweep"), "{}", other.stderr);
+    assert_eq!(lines(), before);
+    let ended = bench.run(&format!("{words} --out w.csv --resume"));
+    assert_eq!(ended.status, 0, "{}", ended.stderr);
+    assert!(ended.stderr.contains(&format!("{} points are there from before", before - 1)), "{}", ended.stderr);
+    assert_eq!(std::fs::read_to_string(bench.path("w.csv")).expect("the table"), whole.stdout);
+    assert!(!bench.path("w.csv.journal").exists());
+}
