@@ -41,7 +41,7 @@ impl FromStr for Design {
 
 /// The points of a design.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Cube {
+pub(super) struct Cube {
     design: Design,
     seed: u64,
     count: usize,
@@ -52,7 +52,7 @@ impl Cube {
     ///
     /// # Errors
     /// [`SweepError::BadSpec`] for more than a design has.
-    pub fn new(design: Design, seed: u64, count: usize, coordinates: usize) -> Result<Self, SweepError> {
+    pub(super) fn new(design: Design, seed: u64, count: usize, coordinates: usize) -> Result<Self, SweepError> {
         if design == Design::Sobol && (count > SOBOL_MOST.0 || coordinates > SOBOL_MOST.1) {
             let expected = format!("at most {} samples of {} parameters for sobol", SOBOL_MOST.0, SOBOL_MOST.1);
             return Err(bad("samples".into(), &expected, &format!("{count} of {coordinates}")));
@@ -64,7 +64,7 @@ impl Cube {
     }
 
     /// Coordinate `c` of point `k`: 0 < u < 1.
-    pub fn at(&self, k: usize, c: usize) -> f64 {
+    pub(super) fn at(&self, k: usize, c: usize) -> f64 {
         match self.design {
             Design::Random => share(self.seed, c, k),
             Design::LatinHypercube => {

@@ -101,7 +101,7 @@ impl FromStr for Vary {
 // digits as published
 #[allow(clippy::excessive_precision)]
 #[rustfmt::skip]
-pub fn normal_score(u: f64) -> f64 {
+pub(super) fn normal_score(u: f64) -> f64 {
     const A: [f64; 8] = [
         3.387_132_872_796_366_608, 1.331_416_678_917_843_774_5e2, 1.971_590_950_306_551_442_7e3, 1.373_169_376_550_946_112_5e4,
         4.592_195_393_154_987_145_7e4, 6.726_577_092_700_870_085_3e4, 3.343_057_558_358_812_810_5e4, 2.509_080_928_730_122_672_7e3,
