@@ -9,14 +9,11 @@ use bimorph::cosim::around::AroundError;
 use bimorph::export::ExportError;
 use bimorph::front::FrontError;
 use bimorph::jobs::sweep::SweepError;
-<<<<<<< HEAD
+use bimorph::jobs::sweep::journal::JournalError;
 use bimorph::layout::LayoutError;
 use bimorph::layout::convert::ConvertError;
 use bimorph::layout::gds::{GdsError, GdsFault};
 use bimorph::layout::mask::MaskError;
-=======
-use bimorph::jobs::sweep::journal::JournalError;
->>>>>>> 7d10fb1 (Sweeps over samples, kept as they go, resumed and merged)
 use bimorph::options::Refused;
 use bimorph::results::format::UnknownFormat;
 use bimorph::results::plot::render::RenderError;

@@ -3,11 +3,8 @@
 //! Every subcommand is an [`clap::Args`] struct with a `run` method. It reads, computes, writes its `--out` file, and
 //! only then prints to standard output, so that a failure leaves standard output empty and no file behind.
 
-<<<<<<< HEAD
 mod ac;
-=======
 mod chance;
->>>>>>> 7d10fb1 (Sweeps over samples, kept as they go, resumed and merged)
 mod chart;
 mod check;
 mod convert;
@@ -20,11 +17,8 @@ mod draw_motion;
 mod export;
 mod failure;
 mod interrupt;
-<<<<<<< HEAD
 mod layout;
-=======
 mod merge;
->>>>>>> 7d10fb1 (Sweeps over samples, kept as they go, resumed and merged)
 mod model;
 mod modes;
 mod options;
