@@ -7,7 +7,7 @@ use bimorph::front::from_bytes;
 use bimorph::layout::drawing::Polygon;
 use bimorph::layout::mask::{MaskError, mask};
 use bimorph::layout::{self, Format, Process, convert};
-use bimorph::netlist::{Bundle, load};
+use bimorph::netlist::{Bundle, Setting, load};
 use std::path::Path;
 
 const EXAMPLES: [&str; 10] = [
@@ -146,4 +146,27 @@ fn a_netlist_without_outlines_is_told_as_such() {
     assert!(drawn.notes.iter().any(|n| n == "1 spring2d has no outline"), "{:?}", drawn.notes);
     let loose = load(&Bundle::from_text("x.net", &text.replace("anchor", "hinge")), &[]).unwrap().structure;
     assert_eq!(mask(&loose, &polymumps(), Format::Gds, "x.gds"), Err(MaskError::Empty));
+}
+
+/// Outlines alone, without a label, give the bank of the paper back: six anchors, seventeen beams, its frequencies.
+#[test]
+fn outlines_alone_give_the_bank_back() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/bank/bank.net");
+    let (drawn, bare) = (Bundle::read(&path, &[]).unwrap(), vec![("comb".to_owned(), Setting::Number(0.0))]);
+    let structure = load(&drawn, &bare).unwrap().structure;
+    let bytes = mask(&structure, &polymumps(), Format::Cif, "bank.cif").unwrap().bytes;
+    let outlines: Vec<u8> =
+        bytes.split_inclusive(|b| *b == b'\n').filter(|line| !line.starts_with(b"94")).flatten().copied().collect();
+    let source = from_bytes(&outlines, "bank.cif", None, None).unwrap();
+    let report = source.converted.unwrap().report;
+    assert_eq!((report.by.as_str(), report.areas.unrecognised_m2), ("geometry", 0.0), "{report:?}");
+    let back = load(&source.bundle, &[]).unwrap().structure;
+    assert_eq!(back.beams.len(), structure.beams.len());
+    let modes_of = |bundle: &Bundle, set: &[(String, Setting)]| {
+        let options = CompileOptions { segments: Some(4), set: set.to_vec(), ..CompileOptions::default() };
+        modes(&compile(bundle, &options).unwrap(), 3, &[]).unwrap().frequencies_hz
+    };
+    for (f, g) in modes_of(&drawn, &bare).iter().zip(modes_of(&source.bundle, &[])) {
+        assert!((f / g - 1.0).abs() < 1e-3, "{f} became {g}");
+    }
 }

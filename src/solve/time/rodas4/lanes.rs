@@ -3,6 +3,9 @@
 //! Everything that all bodies and joints go through is done for all lanes at once, in the order of [`super`] and of
 //! `stages`; gaps and dead loads act on few bodies and have branches of their own, and go variant by variant.
 
+// blocks of fixed size are indexed as the formulas are written
+#![allow(clippy::needless_range_loop)]
+
 mod acted;
 mod motion;
 
