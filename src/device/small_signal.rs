@@ -181,8 +181,8 @@ impl Perturbed<'_> {
             _ => Law::AtOnce,
         };
         let mut laws = vec![Law::AtOnce];
-        for k in 0..heaters.len() {
-            if slopes[k] != 0.0 && !laws.contains(&law(k)) {
+        for (k, slope) in slopes.iter().enumerate() {
+            if *slope != 0.0 && !laws.contains(&law(k)) {
                 laws.push(law(k));
             }
         }

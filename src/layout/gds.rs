@@ -342,7 +342,7 @@ impl Element {
             kind::LAYER => self.layer = Some(short()? as u16),
             kind::DATATYPE | kind::BOXTYPE | kind::TEXTTYPE | kind::NODETYPE => self.datatype = Some(short()? as u16),
             kind::XY => {
-                if record.data.is_empty() || record.data.len() % 8 != 0 {
+                if record.data.is_empty() || !record.data.len().is_multiple_of(8) {
                     return Err(data(record, "pairs of four-byte numbers"));
                 }
                 let count = record.data.len() / 8;

@@ -25,13 +25,7 @@ fn library() -> impl Strategy<Value = Library> {
             library.layer(layer);
         }
         for (k, (shapes, texts, calls)) in cells.into_iter().enumerate() {
-            let call = |(which, (quarter, mirrored, origin), columns, rows, pitch): (
-                proptest::sample::Index,
-                (u8, bool, [f64; 2]),
-                u32,
-                u32,
-                [[f64; 2]; 2],
-            )| {
+            let call = |(which, (quarter, mirrored, origin), columns, rows, pitch): Placed| {
                 let turn = Transform::turn_degrees(90.0 * f64::from(quarter));
                 let transform = Transform::shift(origin).after(&turn).after(&Transform::mirror([false, mirrored]));
                 let cell = format!("c{}", which.index(k));
@@ -43,6 +37,9 @@ fn library() -> impl Strategy<Value = Library> {
         library
     })
 }
+
+/// A call: which cell, turned how, where, how often and how far apart.
+type Placed = (proptest::sample::Index, (u8, bool, [f64; 2]), u32, u32, [[f64; 2]; 2]);
 
 /// What a drawing shows, in nanometres: merged polygons by layer, labels.
 type Shown = (Vec<(String, Vec<Vec<Vec<[i64; 2]>>>)>, Vec<(String, [i64; 2])>);

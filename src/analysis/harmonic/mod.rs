@@ -296,6 +296,9 @@ fn warnings(exact: &Exact<'_>) -> Vec<String> {
     warnings
 }
 
+/// One column of real and imaginary parts for each row.
+type Columns = Vec<Vec<[f64; 2]>>;
+
 /// Every row at every frequency, and at how many there is no bound.
 fn swept(
     exact: &mut Exact<'_>,
@@ -303,7 +306,7 @@ fn swept(
     frequencies: &[f64],
     poles: &[Root],
     watch: Watch<'_>,
-) -> Result<(Vec<Vec<[f64; 2]>>, usize), AnalysisError> {
+) -> Result<(Columns, usize), AnalysisError> {
     let rows = exact.rows.len();
     let mut columns = vec![Vec::with_capacity(frequencies.len()); rows];
     let mut lost = 0;

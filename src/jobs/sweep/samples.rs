@@ -89,7 +89,7 @@ fn factor(asked: &Sampling) -> Result<DMatrix<f64>, SweepError> {
                 return Err(bad(what(), "normal or lognormal parameters", &asked.vary[k].name));
             }
         }
-        if i == j || !(rho.abs() < 1.0) {
+        if i == j || rho.is_nan() || rho.abs() >= 1.0 {
             return Err(bad(what(), "two different parameters and a number between -1 and 1", &rho.to_string()));
         }
         (matrix[(i, j)], matrix[(j, i)]) = (*rho, *rho);

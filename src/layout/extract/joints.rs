@@ -121,8 +121,8 @@ pub(super) fn joints(skeleton: &Skeleton<'_>, mut limbs: Vec<Limb>) -> Parts {
         joints[j].edges.push(e as u32);
         joints[j].cell += edge.cell;
     }
-    for k in 0..joints.len() {
-        joints[k].kind = kind(skeleton, &limbs, &joints[k]);
+    for joint in &mut joints {
+        joint.kind = kind(skeleton, &limbs, joint);
     }
     Parts { limbs, joints, at }
 }

@@ -185,18 +185,14 @@ impl<S: Simd, const M: usize> Wide for Registers<S, M> {
     fn load(simd: S, from: &Eight) -> Self {
         let (registers, _) = S::as_simd_f64s(&from.0);
         let mut to = Self::splat(simd, 0.0);
-        for i in 0..M {
-            to.x[i] = registers[i];
-        }
+        to.x.copy_from_slice(&registers[..M]);
         to
     }
 
     #[inline(always)]
     fn store(self, to: &mut Eight) {
         let (registers, _) = S::as_mut_simd_f64s(&mut to.0);
-        for i in 0..M {
-            registers[i] = self.x[i];
-        }
+        registers[..M].copy_from_slice(&self.x);
     }
 
     #[inline(always)]
