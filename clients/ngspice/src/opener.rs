@@ -32,7 +32,7 @@ pub enum OpenError {
         /// As spelled on the line.
         file: String,
         /// Why not.
-        source: FrontError,
+        source: Box<FrontError>,
     },
     /// The netlist does not compile.
     #[error("netlist \"{file}\":\n{source}")]
@@ -126,7 +126,7 @@ fn read(file: &str, directory: Option<&Path>) -> Result<Bundle, OpenError> {
         Err(FrontError::Convert(ConvertError::Layout(LayoutError::Read { reason, .. }))) => {
             Err(unread(std::io::Error::other(reason)))
         }
-        Err(source) => Err(OpenError::Layout { file: file.to_owned(), source }),
+        Err(source) => Err(OpenError::Layout { file: file.to_owned(), source: Box::new(source) }),
     }
 }
 
