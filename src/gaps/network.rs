@@ -5,7 +5,7 @@
 //! source voltages, found once by nodal analysis, and by reciprocity the same numbers divide displacement currents among the ports.
 //!
 //! Ideal sources form a forest: the nodes of a tree have one unknown potential, or none where it touches ground, and differ by the sources
-//! between them. What is left is a network of conductors ([`super::laplacian`]); the current of each source is what leaves the part of its tree
+//! between them. What is left is a network of conductors (`laplacian`); the current of each source is what leaves the part of its tree
 //! that hangs on it.
 
 use super::laplacian::Laplacian;
