@@ -9,7 +9,7 @@ const FLOORS: [&[&str]; 10] = [
     &["structure", "multibody"],
     &["netlist", "layout", "gaps", "results"],
     &["options", "equations", "front"],
-    &["discretize", "solve"],
+    &["content", "discretize", "solve"],
     &["refine"],
     &["compile", "device", "analysis"],
     &["jobs", "cosim", "export"],

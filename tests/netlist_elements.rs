@@ -162,7 +162,9 @@ fn body2d() {
     same(body.inertia, plate.inertia);
     same(body.drag[0], plate.drag[0]);
     same(body.drag[1], plate.drag[1]);
-    assert_eq!(codes(&format!("{at}body2d p1 [c] [A=2400p Ip=1e-20]")), ["E060"]);
+    let flat = format!("{P1}{at}body2d p1 [c] [A=2400p Ip=1e-20]");
+    let refused = load(&Bundle::from_text("t.net", &flat), &[]).expect_err("no body turns so easily");
+    assert_eq!(refused.items.iter().map(|d| d.code.as_str()).collect::<Vec<_>>(), ["E060"]);
 }
 
 /// The lumped plate over its electrode: positions, axis, and the electrical side.

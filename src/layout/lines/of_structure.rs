@@ -361,8 +361,14 @@ impl<'a> OfStructure<'a> {
             let value = element.value.map(|v| (parameter, v));
             self.push(&element.name, model, "*", &element.nodes, value.as_slice());
         }
-        for (k, ground) in structure.electrical_grounds.iter().enumerate() {
-            self.push(&format!("ground{}", k + 1), "eground", "*", &[*ground], &[]);
+        // in the instance of their node, so that it keeps its name
+        let mut counts: HashMap<&str, usize> = HashMap::new();
+        for ground in &structure.electrical_grounds {
+            let instance = structure.nodes[ground.0].name.rsplit_once('.').map_or("", |(instance, _)| instance);
+            let count = counts.entry(instance).or_default();
+            *count += 1;
+            let dot = if instance.is_empty() { "" } else { "." };
+            self.push(&format!("{instance}{dot}ground{count}"), "eground", "*", &[*ground], &[]);
         }
         for port in &structure.ports {
             let nodes: Vec<NodeId> = [Some(port.plus), port.minus].into_iter().flatten().collect();
