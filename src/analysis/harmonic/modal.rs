@@ -110,6 +110,8 @@ pub(crate) struct Sum {
     pub(super) seen: DMatrix<f64>,
     /// What rows see of the rest, rows × parts.
     pub(super) rest: DMatrix<f64>,
+    /// The same without what is rounding.
+    added: DMatrix<f64>,
     /// Rows that see the rate of it.
     pub(super) rates: Vec<bool>,
     /// Conductance between drive and row [S].
@@ -117,6 +119,9 @@ pub(crate) struct Sum {
     /// Σ_j M·φ_j: a force that stirs every mode.
     pub(super) stir: Vec<Pose>,
 }
+
+/// A rest below this share of what the modes bring is rounding: some 5e-13 were seen where all modes are there.
+const NOTHING_LEFT: f64 = 4e-12;
 
 impl Sum {
     /// Over these modes.
@@ -156,6 +161,17 @@ impl Sum {
             let moved = Moved::held(z, part.volts.clone(), part.rise.clone());
             rows.iter().enumerate().for_each(|(r, row)| rest[(r, c)] = read(row, &moved));
         }
+        let push = DMatrix::from_fn(n, constituents.len(), |j, c| dot(&found.shapes[j], &constituents[c].force));
+        // what is left of a level that the modes make up is its rounding; far above them it would stand alone in the sum
+        let mut added = rest.clone();
+        for r in 0..rows.len() {
+            for c in 0..constituents.len() {
+                let level: f64 = (0..n).map(|j| (seen[(r, j)] * push[(j, c)] / found.lambda[j]).abs()).sum();
+                if f64::abs(added[(r, c)]) <= NOTHING_LEFT * level {
+                    added[(r, c)] = 0.0;
+                }
+            }
+        }
         let conducted = |row: &Row| match row {
             Row::Current(port) => system.electrics.conductance[(*port, exact.source())],
             Row::Signal(_) => 0.0,
@@ -170,9 +186,10 @@ impl Sum {
             lambda: found.lambda.clone(),
             damping,
             laws: constituents.iter().map(|c| c.law).collect(),
-            push: DMatrix::from_fn(n, constituents.len(), |j, c| dot(&found.shapes[j], &constituents[c].force)),
+            push,
             seen,
             rest,
+            added,
             rates: rows.iter().map(|r| matches!(r, Row::Current(_) | Row::Signal(Signal::Rate(..)))).collect(),
             conducted: rows.iter().map(conducted).collect(),
             stir,
@@ -226,7 +243,7 @@ impl Sum {
         };
         let value = |r: usize| {
             let modes: Complex<f64> = (0..n).map(|j| shares[j] * self.seen[(r, j)]).sum();
-            let rest: Complex<f64> = factors.iter().enumerate().map(|(c, f)| f * self.rest[(r, c)]).sum();
+            let rest: Complex<f64> = factors.iter().enumerate().map(|(c, f)| f * self.added[(r, c)]).sum();
             let level = modes + rest;
             if self.rates[r] { s * level + self.conducted[r] } else { level }
         };
