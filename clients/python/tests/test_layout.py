@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import subprocess
 from pathlib import Path
 
@@ -109,15 +108,14 @@ def test_a_gdsfactory_component_becomes_subnets(client: bimorph.Client) -> None:
     assert "fingers=12.0" in lines["drive"] and f"[{node}]" in lines["pad"]
 
 
-def test_layouts_go_through_the_server(client: bimorph.Client, tmp_path: Path) -> None:
+def test_layouts_go_through_the_server(program: str, client: bimorph.Client, tmp_path: Path) -> None:
     """A layout compiles to the model of the netlist that it was drawn from; a broken one says where."""
     m = layout.Mechanism()
     m.add("spring", layout.folded_flexure(), c="shuttle")
     source = tmp_path / "spring.net"
     source.write_text(m.netlist().files["mechanism.net"])
-    command = os.environ.get("BIMORPH_BIN", "bimorph")
     for name in ("spring.gds", "spring.cif"):
-        subprocess.run([command, "layout", str(source), "-o", str(tmp_path / name)], check=True, capture_output=True)
+        subprocess.run([program, "layout", str(source), "-o", str(tmp_path / name)], check=True, capture_output=True)
         converted = client.convert(tmp_path / name)
         assert (converted.by, converted.process, converted.unrecognised) == ("labels", "polymumps", ())
         assert converted.drawn_m2 > 0
