@@ -10,7 +10,7 @@ use bimorph::netlist::{Bundle, load};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 /// No drawing may take more wall time than this, with a release build on a busy machine.
@@ -123,26 +123,33 @@ fn read(bytes: &[u8], name: &str) -> bool {
     }
 }
 
-fn run(format: Format, name: &str, seed: u64, mut done: impl FnMut(usize) -> bool) {
+/// Where a drawing lies that is being read, or was not read well.
+fn kept(name: &str) -> PathBuf {
+    std::env::temp_dir().join(name)
+}
+
+/// Runs a format until `done`; with `keep` each drawing is written down before it is read, so that one that ends the process is known.
+fn run(format: Format, name: &str, (seed, keep): (u64, bool), mut done: impl FnMut(usize) -> bool) {
     let mut maker = Maker { random: ChaCha8Rng::seed_from_u64(seed), corpus: corpus(format) };
     let (mut count, mut converted) = (0, 0);
     while !done(count) {
         let bytes = maker.drawing();
+        if keep {
+            std::fs::write(kept(name), &bytes).expect("a place for drawings");
+        }
         let begun = Instant::now();
         match catch_unwind(AssertUnwindSafe(|| read(&bytes, name))) {
             Ok(good) => converted += usize::from(good),
             Err(fault) => {
-                let path = std::env::temp_dir().join(name);
-                let _ = std::fs::write(&path, &bytes);
-                eprintln!("seed {seed}, drawing {count} of {} bytes: {}", bytes.len(), path.display());
+                let _ = std::fs::write(kept(name), &bytes);
+                eprintln!("seed {seed}, drawing {count} of {} bytes: {}", bytes.len(), kept(name).display());
                 resume_unwind(fault);
             }
         }
         let took = begun.elapsed();
         if took >= LONGEST {
-            let path = std::env::temp_dir().join(name);
-            let _ = std::fs::write(&path, &bytes);
-            panic!("seed {seed}, drawing {count} took {took:?}: {}", path.display());
+            let _ = std::fs::write(kept(name), &bytes);
+            panic!("seed {seed}, drawing {count} took {took:?}: {}", kept(name).display());
         }
         count += 1;
     }
@@ -152,12 +159,12 @@ fn run(format: Format, name: &str, seed: u64, mut done: impl FnMut(usize) -> boo
 
 #[test]
 fn a_few_cif() {
-    run(Format::Cif, "fuzz.cif", 1, |count| count >= QUICK);
+    run(Format::Cif, "fuzz.cif", (1, false), |count| count >= QUICK);
 }
 
 #[test]
 fn a_few_gds() {
-    run(Format::Gds, "fuzz.gds", 1, |count| count >= QUICK);
+    run(Format::Gds, "fuzz.gds", (1, false), |count| count >= QUICK);
 }
 
 /// For `FUZZ_MINUTES` [min], each time with other drawings: the seed is the time, and is told with what fails.
@@ -165,7 +172,7 @@ fn for_minutes(format: Format, name: &str) {
     let minutes: f64 = std::env::var("FUZZ_MINUTES").ok().and_then(|text| text.parse().ok()).unwrap_or(10.0);
     let end = Instant::now() + Duration::from_secs_f64(60.0 * minutes);
     let seed = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).map_or(0, |d| d.as_secs());
-    run(format, name, seed, |_| Instant::now() > end);
+    run(format, name, (seed, true), |_| Instant::now() > end);
 }
 
 #[test]

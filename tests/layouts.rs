@@ -170,3 +170,25 @@ fn outlines_alone_give_the_bank_back() {
         assert!((f / g - 1.0).abs() < 1e-3, "{f} became {g}");
     }
 }
+
+/// Bars across bars, and a star that crosses itself millions of times, are refused with a place before they are merged (they took
+/// gigabytes); twenty across twenty are a mechanism.
+#[test]
+fn what_cuts_itself_too_often_is_refused() {
+    let cif = |shapes: String| format!("DS 1 1 1;\n9 T;\nL POLY1;\n{shapes}L ANCHOR1;\nB 50 50 0 0;\nDF;\nC 1;\nE\n");
+    let bars = |n: usize| -> String {
+        let (long, middle) = (300 * n, 150 * n);
+        (0..n).map(|k| format!("B {long} 100 {middle} {0};\nB 100 {long} {0} {middle};\n", 300 * k)).collect()
+    };
+    let corners = 6001;
+    let star = (0..corners).map(|k| {
+        let angle = std::f64::consts::TAU * f64::from(k * (corners / 2) % corners) / f64::from(corners);
+        format!(" {:.0} {:.0}", 1e6 * angle.cos(), 1e6 * angle.sin())
+    });
+    let read = |text: String| from_bytes(text.as_bytes(), "x.cif", Some("polymumps"), None);
+    for text in [cif(bars(3000)), cif(format!("P{};\n", star.collect::<String>()))] {
+        let error = read(text).unwrap_err().to_string();
+        assert!(error.contains("cut one another") && error.contains("about point"), "{error}");
+    }
+    assert!(read(cif(bars(20))).is_ok());
+}

@@ -73,6 +73,12 @@ enum Command {
 
 /// Runs the command that the process was started with.
 pub(crate) fn main() -> ExitCode {
+    let usual = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |info| {
+        if !bimorph::layout::extract::medial::may_panic() {
+            usual(info);
+        }
+    }));
     let cli = Cli::parse();
     let done = match &cli.command {
         Command::Check(command) => command.run(),

@@ -5,6 +5,7 @@
 //! it; else the finest power of ten of it, down to 1 pm, on which the drawing fits.
 
 use super::cells::{Call, Library, Shape, Transform};
+use super::crossings::Tangled;
 use super::drawing::{Drawing, LARGEST_COORDINATE, Label, Placement, Point, Polygon};
 use super::simple;
 use crate::budget;
@@ -71,6 +72,14 @@ pub enum FlattenError {
         count: u64,
         /// The bound.
         most: u64,
+    },
+    /// A polygon that crosses itself too often.
+    #[error("a polygon on layer {layer}: {tangled}")]
+    Tangled {
+        /// Its layer.
+        layer: String,
+        /// How often, and where.
+        tangled: Tangled,
     },
     /// The chosen cell is not there, or none is chosen and there are several.
     #[error("{message}")]
@@ -141,9 +150,13 @@ impl Library {
             grid,
             places: total.placements <= MOST_PLACEMENTS,
             crossing: 0,
+            tangled: None,
             vanished: 0,
         };
         flat.copy(top, &Transform::IDENTITY, None);
+        if let Some((layer, tangled)) = flat.tangled.take() {
+            return Err(FlattenError::Tangled { layer, tangled });
+        }
         let (drawing, polygons) = flat.finish(total.placements);
         let mut drawing = drawing;
         drawing.layers = self.layers.iter().cloned().zip(polygons).filter(|(_, all)| !all.is_empty()).collect();
@@ -380,6 +393,8 @@ struct Flat<'a> {
     grid: f64,
     places: bool,
     crossing: usize,
+    /// A layer with a polygon that crosses itself too often.
+    tangled: Option<(String, Tangled)>,
     vanished: usize,
 }
 
@@ -458,6 +473,9 @@ impl Flat<'_> {
                 to.extend(parts);
             }
             simple::Outcome::Nothing => self.vanished += 1,
+            simple::Outcome::Tangled(tangled) => {
+                self.tangled.get_or_insert((self.library.layers[shape.layer as usize].clone(), tangled));
+            }
         }
     }
 

@@ -6,8 +6,9 @@
 //! drawings is told with its area and place.
 
 use super::chords::Chords;
+use super::crossings::{Tangled, bounded};
 use super::draw::{self, Role, is_beam};
-use super::drawing::{Drawing, Polygon};
+use super::drawing::{Drawing, LARGEST_COORDINATE, Point, Polygon};
 use super::lines::{Line, LineError, Lines, ProcessLine, is_full_name, text};
 use super::mask::{ROUNDING, Width, Widths, on_notes};
 use super::process::{Process, names};
@@ -53,6 +54,14 @@ pub enum LabelledError {
         /// The process.
         process: String,
     },
+    /// Polygons that cut one another too often to be compared.
+    #[error("{what}: {tangled}")]
+    Tangled {
+        /// A layer of the drawing or of the mechanism that its labels tell of.
+        what: String,
+        /// How often, and where.
+        tangled: Tangled,
+    },
     /// Two nodes of a beam in one place.
     #[error("{place}: `{line}` has both its nodes in one place")]
     Short {
@@ -85,10 +94,10 @@ pub(crate) fn read(drawing: &Drawing, process: &Process) -> Result<(String, Repo
             return Err(LabelledError::Node { place, line, node });
         }
     }
-    let layers = layers_of(drawing, process);
+    let layers = layers_of(drawing, process)?;
     let measured = measure(&mut lines, &places, &at, drawing, process, &layers)?;
     notes.extend(measured);
-    let report = compare(drawing, process, &lines, &at, &layers, notes);
+    let report = compare(drawing, process, &lines, &at, &layers, notes)?;
     let heading = format!("from {}, cell {}, by its labels", drawing.source, drawing.top);
     // A name without dots is the same in the netlist.
     let landmark = at.iter().filter(|(name, _)| !name.contains('.')).min_by_key(|(name, _)| name.as_str());
@@ -135,7 +144,7 @@ fn nodes_of(drawing: &Drawing, lines: &Lines, notes: &mut Vec<String>) -> HashMa
 }
 
 /// Polygons of each layer of the process, merged, and of its anchors.
-fn layers_of(drawing: &Drawing, process: &Process) -> BTreeMap<Role, Vec<Polygon>> {
+fn layers_of(drawing: &Drawing, process: &Process) -> Result<BTreeMap<Role, Vec<Polygon>>, LabelledError> {
     let mut all: BTreeMap<Role, Vec<Polygon>> = BTreeMap::new();
     for (name, polygons) in &drawing.layers {
         for (k, layer) in process.layers.iter().enumerate() {
@@ -146,7 +155,22 @@ fn layers_of(drawing: &Drawing, process: &Process) -> BTreeMap<Role, Vec<Polygon
             }
         }
     }
-    all.into_iter().map(|(role, polygons)| (role, regions::union(&polygons))).collect()
+    let merged = |(role, polygons): (Role, Vec<Polygon>)| Ok((role, merge(&name_of(role, process), &polygons, &[])?));
+    all.into_iter().map(merged).collect()
+}
+
+fn name_of(role: Role, process: &Process) -> String {
+    match role {
+        Role::Layer(k) => process.layers[k].name.clone(),
+        Role::Anchor(k) => format!("anchors of {}", process.layers[k].name),
+    }
+}
+
+/// The union of polygons that can also be held together with others.
+fn merge(what: &str, polygons: &[Polygon], with: &[Polygon]) -> Result<Vec<Polygon>, LabelledError> {
+    bounded(polygons.iter().chain(with))
+        .map_err(|tangled| LabelledError::Tangled { what: what.to_owned(), tangled })?;
+    Ok(regions::union(polygons))
 }
 
 /// Lengths, directions and widths: the label's where the drawing agrees, else the drawing's.
@@ -217,6 +241,16 @@ fn measure(
     Ok(notes)
 }
 
+/// A contour on the grid of a unit [m]; none where it reaches beyond.
+fn on_grid(shape: &[[f64; 2]], unit: f64) -> Option<Vec<Point>> {
+    let largest = f64::from(LARGEST_COORDINATE);
+    let on = |p: &[f64; 2]| {
+        let p = p.map(|x| (x / unit).round());
+        p.iter().all(|x| x.abs() <= largest).then(|| p.map(|x| x as i32))
+    };
+    shape.iter().map(on).collect()
+}
+
 /// Draws the mechanism again and tells what only one of the two drawings has.
 fn compare(
     drawing: &Drawing,
@@ -225,13 +259,21 @@ fn compare(
     at: &HashMap<String, [f64; 2]>,
     layers: &BTreeMap<Role, Vec<Polygon>>,
     mut notes: Vec<String>,
-) -> Report {
+) -> Result<Report, LabelledError> {
     let figure = draw::draw(lines, at, process);
     let unit = drawing.unit_m;
     let mut again: BTreeMap<Role, Vec<Polygon>> = BTreeMap::new();
+    let mut beyond = 0;
     for (role, shape) in &figure.shapes {
-        let contour = shape.iter().map(|p| p.map(|x| (x / unit).round() as i32)).collect();
-        again.entry(*role).or_default().push(Polygon::from_contour(contour));
+        match on_grid(shape, unit) {
+            Some(contour) => again.entry(*role).or_default().push(Polygon::from_contour(contour)),
+            None => beyond += 1,
+        }
+    }
+    if beyond > 0 {
+        notes.push(format!(
+            "{beyond} outlines of parts reach beyond what a drawing can hold: their labels' sizes are too large"
+        ));
     }
     let square = unit * unit;
     let mut areas = Areas::default();
@@ -240,12 +282,9 @@ fn compare(
     let roles: std::collections::BTreeSet<Role> = layers.keys().chain(again.keys()).copied().collect();
     for role in roles {
         let drawn = layers.get(&role).unwrap_or(&none);
-        let ours = regions::union(again.get(&role).unwrap_or(&none));
+        let name = name_of(role, process);
+        let ours = merge(&format!("{name}, as its labels tell it"), again.get(&role).unwrap_or(&none), drawn)?;
         let (more, less) = (regions::difference(drawn, &ours), regions::difference(&ours, drawn));
-        let name = match role {
-            Role::Layer(k) => process.layers[k].name.clone(),
-            Role::Anchor(k) => format!("anchors of {}", process.layers[k].name),
-        };
         let more = Unrecognised::of(&name, &more, unit, "drawn, but in no part of the mechanism");
         let less = Unrecognised::of(&name, &less, unit, "in the mechanism, but not drawn");
         if let Role::Layer(_) = role {
@@ -261,7 +300,7 @@ fn compare(
     }
     areas.extracted_m2 = areas.drawn_m2 - areas.unrecognised_m2;
     for (name, polygons) in drawing.layers.iter().filter(|(name, _)| process.role_of(name).is_none()) {
-        let merged = regions::union(polygons);
+        let merged = merge(&format!("layer {name}"), polygons, &[])?;
         let foreign = Unrecognised::of(name, &merged, unit, "the process has no such layer");
         let area: f64 = foreign.iter().map(|u| u.area_m2).sum();
         areas.drawn_m2 += area;
@@ -272,5 +311,5 @@ fn compare(
     for line in &lines.elements {
         *counts.entry(line.model.clone()).or_insert(0) += 1;
     }
-    Report { by: "labels".to_owned(), counts, areas, unrecognised, notes }
+    Ok(Report { by: "labels".to_owned(), counts, areas, unrecognised, notes })
 }

@@ -5,6 +5,7 @@
 
 use super::cells::{Cell, Library, Shape, Text};
 use super::chords::Chords;
+use super::crossings::bounded;
 use super::draw::{self, Figure, Role, is_beam};
 use super::drawing::{Drawing, LARGEST_COORDINATE};
 use super::lines::{Lines, of_structure};
@@ -178,7 +179,9 @@ impl Widths {
                 by_layer.entry(*k).or_default().push(super::Polygon::from_contour(contour));
             }
         }
-        Self(by_layer.into_iter().map(|(k, all)| (k, Chords::new(&regions::union(&all)))).collect())
+        // what cannot be merged measures nothing
+        let measurable = by_layer.into_iter().filter(|(_, all)| bounded(all.iter()).is_ok());
+        Self(measurable.map(|(k, all)| (k, Chords::new(&regions::union(&all)))).collect())
     }
 
     /// The width of a beam between two places, told to be `w` [units].

@@ -8,6 +8,7 @@ mod cells;
 mod chords;
 pub mod cif;
 pub mod convert;
+pub mod crossings;
 mod draw;
 pub mod drawing;
 pub mod extract;

@@ -1,5 +1,6 @@
 //! One contour as a drawing program writes it, made into polygons that do not cross themselves.
 
+use super::crossings::{Tangled, bounded};
 use super::drawing::{Point, Polygon, twice_area};
 use super::regions;
 use i_overlay::core::fill_rule::FillRule;
@@ -13,6 +14,8 @@ pub(super) enum Outcome {
     Crossing(Vec<Polygon>),
     /// No area.
     Nothing,
+    /// It crosses itself too often to be taken apart.
+    Tangled(Tangled),
 }
 
 /// Contours with more points than this are given to the set operations without looking for crossings.
@@ -30,6 +33,11 @@ pub(super) fn polygons(contour: Vec<Point>) -> Outcome {
         };
     }
     let before = twice_area(&contour).abs();
+    let contour = Polygon { contours: vec![contour] };
+    if let Err(tangled) = bounded(std::iter::once(&contour)) {
+        return Outcome::Tangled(tangled);
+    }
+    let contour = contour.contours.into_iter().next().unwrap_or_default();
     let parts = regions::enclosed(&contour, FillRule::NonZero);
     match parts.as_slice() {
         [] => Outcome::Nothing,

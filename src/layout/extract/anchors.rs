@@ -24,18 +24,24 @@ pub(super) struct Held {
     boxes: Boxes,
 }
 
+fn drawn(drawing: &Drawing, names: &[String]) -> Vec<Polygon> {
+    let of = drawing.layers.iter().filter(|(name, _)| process::names(names, name));
+    of.flat_map(|(_, polygons)| polygons.iter().cloned()).collect()
+}
+
+/// Everything that is drawn to say what of a layer is held.
+pub(super) fn marks(drawing: &Drawing, layer: &Layer) -> Vec<Polygon> {
+    [&layer.anchoring.drawn, &layer.anchoring.released].iter().flat_map(|names| drawn(drawing, names)).collect()
+}
+
 impl Rule {
     /// The rule for a layer of a drawing, as [`process::Anchoring`] says.
     pub(super) fn of(drawing: &Drawing, layer: &Layer, solid: &[Polygon]) -> Self {
-        let drawn = |names: &[String]| -> Vec<Polygon> {
-            let of = drawing.layers.iter().filter(|(name, _)| process::names(names, name));
-            of.flat_map(|(_, polygons)| polygons.iter().cloned()).collect()
-        };
-        let anchors = drawn(&layer.anchoring.drawn);
+        let anchors = drawn(drawing, &layer.anchoring.drawn);
         if !anchors.is_empty() {
             return Self::Drawn(Held::of(&regions::intersection(solid, &anchors)));
         }
-        let released = drawn(&layer.anchoring.released);
+        let released = drawn(drawing, &layer.anchoring.released);
         if !released.is_empty() {
             return Self::Drawn(Held::of(&regions::difference(solid, &released)));
         }

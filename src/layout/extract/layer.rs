@@ -1,6 +1,6 @@
 //! One layer: merged, taken apart into parts that hang together, and put into the result.
 
-use super::anchors::Rule;
+use super::anchors::{self, Rule};
 use super::combs::{self, Finger};
 use super::gaps::{self, Pull};
 use super::holes;
@@ -13,6 +13,7 @@ use super::skeleton::Skeleton;
 use super::snap;
 use super::{Beam, Body, Comb, ExtractError, Extraction, Facing, LayerResult, MOST_POINTS, Node, Plates, Unrecognised};
 use crate::budget;
+use crate::layout::crossings::bounded;
 use crate::layout::drawing::{Drawing, Polygon};
 use crate::layout::process;
 use crate::layout::regions;
@@ -88,6 +89,9 @@ pub(super) fn extract(
         .filter(|(name, _)| process::names(&layer.holes, name))
         .flat_map(|(_, polygons)| polygons.iter().cloned())
         .collect();
+    let held = anchors::marks(drawing, layer);
+    bounded(drawn.iter().chain(&holes).chain(&held))
+        .map_err(|tangled| ExtractError::Tangled { layer: layer.name.clone(), tangled })?;
     let snapped = snap::snap(drawn);
     let solid = regions::difference(snapped.as_deref().unwrap_or(drawn), &holes);
     let drawn_area = match snapped {

@@ -9,6 +9,7 @@
 use super::moments::Moments;
 use crate::layout::drawing::{Point, Polygon};
 use boostvoronoi::prelude::{Builder, BvError, Diagram, SourceCategory};
+use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// What an edge of the axis keeps its distance from.
@@ -69,7 +70,19 @@ impl From<BvError> for NoAxis {
 /// The Voronoi diagram of segments. Its predicates give up on some outlines that are a few database units wide by a panic.
 fn diagram(segments: &[[i32; 4]]) -> Result<Diagram, NoAxis> {
     let build = || Ok(Builder::<i32>::default().with_segments(segments.iter())?.build()?);
-    catch_unwind(AssertUnwindSafe(build)).unwrap_or_else(|_| Err(NoAxis("its edges are too close together".to_owned())))
+    MAY_PANIC.set(true);
+    let built = catch_unwind(AssertUnwindSafe(build));
+    MAY_PANIC.set(false);
+    built.unwrap_or_else(|_| Err(NoAxis("its edges are too close together".to_owned())))
+}
+
+thread_local! {
+    static MAY_PANIC: Cell<bool> = const { Cell::new(false) };
+}
+
+/// True while this thread does what may end in a panic that is caught: a program's hook has nothing to say of it.
+pub fn may_panic() -> bool {
+    MAY_PANIC.get()
 }
 
 const NOWHERE: u32 = u32::MAX;

@@ -27,6 +27,7 @@ mod snap;
 
 pub use netlist::netlist;
 
+use super::crossings::{Tangled, bounded};
 use super::drawing::{Drawing, Polygon};
 use super::process::{self, Process};
 use super::regions;
@@ -58,6 +59,14 @@ pub enum ExtractError {
         expected: String,
         /// Layers of the drawing.
         found: String,
+    },
+    /// Polygons that cut one another too often to be merged.
+    #[error("layer {layer}: {tangled}")]
+    Tangled {
+        /// Name of the layer.
+        layer: String,
+        /// How often, and where.
+        tangled: Tangled,
     },
     /// More points than are worked on.
     #[error("layer {layer}: {points} points after its polygons were merged, at most {MOST_POINTS} are extracted")]
@@ -255,7 +264,7 @@ pub fn extract(drawing: &Drawing, process: &Process, options: &ExtractOptions) -
         notes: drawing.notes.clone(),
         ..Extraction::default()
     };
-    unknown_layers(drawing, process, &mut result);
+    unknown_layers(drawing, process, &mut result)?;
     for layer in &process.layers {
         let drawn: Vec<Polygon> = drawing
             .layers
@@ -285,11 +294,12 @@ pub fn extract(drawing: &Drawing, process: &Process, options: &ExtractOptions) -
 }
 
 /// Tells of layers that the process does not know.
-fn unknown_layers(drawing: &Drawing, process: &Process, result: &mut Extraction) {
+fn unknown_layers(drawing: &Drawing, process: &Process, result: &mut Extraction) -> Result<(), ExtractError> {
     for (name, polygons) in &drawing.layers {
         if process.role_of(name).is_some() {
             continue;
         }
+        bounded(polygons.iter()).map_err(|tangled| ExtractError::Tangled { layer: name.clone(), tangled })?;
         let merged = regions::union(polygons);
         let area = regions::area(&merged) * drawing.unit_m * drawing.unit_m;
         if area > 0.0 {
@@ -300,6 +310,7 @@ fn unknown_layers(drawing: &Drawing, process: &Process, result: &mut Extraction)
             result.unrecognised.push(Unrecognised { layer: name.clone(), area, at, polygons: merged, why });
         }
     }
+    Ok(())
 }
 
 impl Extraction {

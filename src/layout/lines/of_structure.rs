@@ -1,6 +1,7 @@
 //! A structure as lines: each part as the element that makes it, at its place.
 
 use super::{Line, Lines, ProcessLine};
+use crate::sets::Sets;
 use crate::structure::{Beam, CircuitKind, GapVoltage, NodeId, Structure};
 use std::collections::{BTreeMap, HashMap, HashSet};
 
@@ -380,14 +381,7 @@ impl<'a> OfStructure<'a> {
     fn islands(&mut self) {
         let structure = self.structure;
         let ids: HashMap<&str, usize> = structure.nodes.iter().map(|n| n.name.as_str()).zip(0..).collect();
-        let mut root: Vec<usize> = (0..structure.nodes.len()).collect();
-        fn find(root: &mut [usize], mut k: usize) -> usize {
-            while root[k] != k {
-                root[k] = root[root[k]];
-                k = root[k];
-            }
-            k
-        }
+        let mut sets = Sets::new(structure.nodes.len());
         let placing = |line: &&Line| {
             line.process != "*"
                 || matches!(
@@ -400,14 +394,13 @@ impl<'a> OfStructure<'a> {
             let nodes: Vec<usize> = line.nodes.iter().map(|n| ids[n.as_str()]).collect();
             for k in &nodes {
                 placed[*k] = true;
-                let (a, b) = (find(&mut root, nodes[0]), find(&mut root, *k));
-                root[a.max(b)] = a.min(b);
+                sets.join(nodes[0], *k);
             }
         }
         for support in &structure.supports {
             placed[support.node.0] = true;
         }
-        let firsts: Vec<usize> = (0..placed.len()).filter(|k| placed[*k] && find(&mut root, *k) == *k).collect();
+        let firsts: Vec<usize> = (0..placed.len()).filter(|k| placed[*k] && sets.first(*k) == *k).collect();
         let Some((&origin, others)) = firsts.split_first() else { return };
         let start = structure.nodes[origin].position;
         for (n, &k) in others.iter().enumerate() {

@@ -1,0 +1,216 @@
+//! How many times edges of polygons cut one another: what set operations on them lay out, known before they do.
+//!
+//! A sweep over x: edges that it has reached and not yet left lie in a tree over y, each at the O(log n) nodes that cover its range,
+//! and a new edge is tried with those whose range meets its own. O(n·log n) where edges are along x or y, and never more than
+//! all pairs.
+//!
+//! Reference: F. P. Preparata, M. I. Shamos, "Computational Geometry" (1985), 8.8 (rectangles that meet, by interval trees).
+
+use super::drawing::{Point, Polygon};
+use thiserror::Error;
+
+/// Cuts that set operations take on: some 200 bytes each.
+pub const MOST_CUTS: usize = 4_000_000;
+const BYTES_PER_CUT: usize = 200;
+
+/// Polygons whose union could be too large to hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+#[error("its polygons cut one another in more than {MOST_CUTS} places, about point {} {} of its grid", .at[0], .at[1])]
+pub struct Tangled {
+    /// Where the counting ended [database units].
+    pub at: Point,
+}
+
+/// Looks at polygons before a set operation on all of them.
+///
+/// # Errors
+/// [`Tangled`] beyond [`MOST_CUTS`].
+pub(super) fn bounded<'a>(polygons: impl Iterator<Item = &'a Polygon>) -> Result<(), Tangled> {
+    let mut edges: Vec<Edge> = polygons.flat_map(|p| &p.contours).flat_map(|c| edges_of(c)).collect();
+    // fewer pairs than cuts that are taken on
+    if edges.len().saturating_mul(edges.len()) / 2 <= MOST_CUTS {
+        return Ok(());
+    }
+    edges.sort_unstable_by_key(|e| e.a);
+    let cuts = Sweep::new(&edges).count(MOST_CUTS)?;
+    crate::budget::lay_out(cuts.saturating_mul(BYTES_PER_CUT));
+    Ok(())
+}
+
+/// From the lesser end to the greater, by x, then y.
+#[derive(Debug, Clone, Copy)]
+struct Edge {
+    a: Point,
+    b: Point,
+}
+
+fn edges_of(contour: &[Point]) -> impl Iterator<Item = Edge> {
+    let next = contour.iter().cycle().skip(1);
+    contour.iter().zip(next).filter(|(a, b)| a != b).map(|(a, b)| Edge { a: *a.min(b), b: *a.max(b) })
+}
+
+impl Edge {
+    fn low(&self) -> i32 {
+        self.a[1].min(self.b[1])
+    }
+
+    fn high(&self) -> i32 {
+        self.a[1].max(self.b[1])
+    }
+
+    /// On which side of the edge's line a point lies.
+    fn side(&self, p: Point) -> i128 {
+        let [ux, uy, vx, vy] =
+            [self.b[0] - self.a[0], self.b[1] - self.a[1], p[0] - self.a[0], p[1] - self.a[1]].map(i128::from);
+        (ux * vy - uy * vx).signum()
+    }
+
+    /// True when one of the two is divided where they meet: not for edges that share their ends alone, and not for equal ones.
+    fn cuts(&self, other: &Self) -> bool {
+        let (p, q) = (self.side(other.a), self.side(other.b));
+        let (r, s) = (other.side(self.a), other.side(self.b));
+        if (p, q, r, s) == (0, 0, 0, 0) {
+            // on one line: they overlap
+            return (self.a, self.b) != (other.a, other.b) && self.a.max(other.a) < self.b.min(other.b);
+        }
+        let ends = [self.a, self.b].iter().any(|e| *e == other.a || *e == other.b);
+        p * q <= 0 && r * s <= 0 && !ends
+    }
+}
+
+/// Edges in the tree, by the nodes that cover their range of y.
+struct Sweep<'a> {
+    edges: &'a [Edge],
+    /// Ends of ranges, in order.
+    places: Vec<i32>,
+    /// Leaves, a power of two.
+    leaves: usize,
+    at: Vec<Vec<u32>>,
+    /// Edges at a node and below.
+    below: Vec<u32>,
+    /// By edge, the last one that was tried with it.
+    tried: Vec<u32>,
+}
+
+impl<'a> Sweep<'a> {
+    fn new(edges: &'a [Edge]) -> Self {
+        let mut places: Vec<i32> = edges.iter().flat_map(|e| [e.low(), e.high()]).collect();
+        places.sort_unstable();
+        places.dedup();
+        let leaves = places.len().next_power_of_two();
+        let (at, below) = (vec![Vec::new(); 2 * leaves], vec![0; 2 * leaves]);
+        Self { edges, places, leaves, at, below, tried: vec![u32::MAX; edges.len()] }
+    }
+
+    fn count(&mut self, most: usize) -> Result<usize, Tangled> {
+        let mut cuts = 0;
+        for k in 0..self.edges.len() {
+            crate::budget::check();
+            let range = [self.edges[k].low(), self.edges[k].high()].map(|y| self.places.partition_point(|p| *p < y));
+            cuts += self.meet(k, range, 1, [0, self.leaves - 1]);
+            if cuts > most {
+                return Err(Tangled { at: self.edges[k].a });
+            }
+            self.enter(k, range, 1, [0, self.leaves - 1]);
+        }
+        Ok(cuts)
+    }
+
+    /// Cuts of an edge with those at a node and below whose ranges meet its own; those that the sweep has left are dropped.
+    fn meet(&mut self, k: usize, range: [usize; 2], node: usize, [first, last]: [usize; 2]) -> usize {
+        if self.below[node] == 0 || range[1] < first || last < range[0] {
+            return 0;
+        }
+        let edge = self.edges[k];
+        let (mut cuts, mut i) = (0, 0);
+        while let Some(&other) = self.at[node].get(i) {
+            let found = &self.edges[other as usize];
+            if found.b[0] < edge.a[0] {
+                self.at[node].swap_remove(i);
+                let mut up = node;
+                while up > 0 {
+                    self.below[up] -= 1;
+                    up /= 2;
+                }
+                continue;
+            }
+            if std::mem::replace(&mut self.tried[other as usize], k as u32) != k as u32 {
+                cuts += usize::from(edge.cuts(found));
+            }
+            i += 1;
+        }
+        if first < last {
+            let middle = usize::midpoint(first, last);
+            cuts += self.meet(k, range, 2 * node, [first, middle]);
+            cuts += self.meet(k, range, 2 * node + 1, [middle + 1, last]);
+        }
+        cuts
+    }
+
+    fn enter(&mut self, k: usize, range: [usize; 2], node: usize, [first, last]: [usize; 2]) {
+        if range[1] < first || last < range[0] {
+            return;
+        }
+        if range[0] <= first && last <= range[1] {
+            self.at[node].push(k as u32);
+            let mut up = node;
+            while up > 0 {
+                self.below[up] += 1;
+                up /= 2;
+            }
+            return;
+        }
+        let middle = usize::midpoint(first, last);
+        self.enter(k, range, 2 * node, [first, middle]);
+        self.enter(k, range, 2 * node + 1, [middle + 1, last]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! Cuts of bars that cross, of boxes side by side, and of any edges against all pairs.
+    use super::*;
+    use proptest::prelude::*;
+
+    fn count(polygons: &[Polygon]) -> usize {
+        let mut edges: Vec<Edge> = polygons.iter().flat_map(|p| &p.contours).flat_map(|c| edges_of(c)).collect();
+        edges.sort_unstable_by_key(|e| e.a);
+        Sweep::new(&edges).count(usize::MAX).unwrap()
+    }
+
+    fn bars(n: i32) -> Vec<Polygon> {
+        let across = |k| Polygon::rectangle([-5, 10 * k], [10 * n, 10 * k + 4]);
+        let along = |k| Polygon::rectangle([10 * k, -5], [10 * k + 4, 10 * n]);
+        (0..n).flat_map(|k| [across(k), along(k)]).collect()
+    }
+
+    /// n bars across n others: each two cut in four places. Ten thousand of them are refused, in the time of an answer.
+    #[test]
+    fn bars_that_cross() {
+        assert_eq!(count(&bars(20)), 4 * 20 * 20);
+        assert_eq!(bounded(bars(900).iter()), Ok(()));
+        assert!(bounded(bars(10_000).iter()).is_err());
+    }
+
+    /// Boxes side by side share edges and are not cut; shifted ones are, once for each end on another's edge.
+    #[test]
+    fn boxes_side_by_side() {
+        let row = |shift: i32| -> Vec<Polygon> {
+            (0..100).map(|k| Polygon::rectangle([10 * k + shift, shift / 3], [10 * k + 10 + shift, 10])).collect()
+        };
+        assert_eq!(count(&row(0)), 0);
+        assert_eq!(count(&[row(0), row(0)].concat()), 0);
+        assert!(count(&[row(0), row(3)].concat()) > 300);
+    }
+
+    proptest! {
+        /// Any edges on a small grid: as many cuts as all pairs have.
+        #[test]
+        fn any_edges(points in prop::collection::vec(prop::array::uniform2(-6i32..6), 3..60)) {
+            let edges: Vec<Edge> = edges_of(&points).collect();
+            let pairs = (0..edges.len()).flat_map(|i| (0..i).map(move |j| (i, j)));
+            let all = pairs.filter(|(i, j)| edges[*i].cuts(&edges[*j])).count();
+            prop_assert_eq!(count(&[Polygon { contours: vec![points] }]), all);
+        }
+    }
+}
