@@ -11,8 +11,9 @@ use crate::multibody::BodyId;
 use crate::structure::Structure;
 use nalgebra::Vector2;
 
-/// Gaps in the order combs, plates, facing beams, stops; their names; and the pairs of bodies they couple.
-pub fn lay(structure: &Structure, rigid: &Assembly) -> (Vec<Gap>, Vec<String>, Vec<(BodyId, BodyId)>) {
+/// Gaps in the order combs, plates, facing beams, stops; their names; and the pairs of bodies they couple. `chord`: facing beams as SUGAR
+/// has them.
+pub fn lay(structure: &Structure, rigid: &Assembly, chord: bool) -> (Vec<Gap>, Vec<String>, Vec<(BodyId, BodyId)>) {
     let mut gaps = Vec::new();
     let mut names = Vec::new();
     let mut couplings = Vec::new();
@@ -51,6 +52,7 @@ pub fn lay(structure: &Structure, rigid: &Assembly) -> (Vec<Gap>, Vec<String>, V
             strength: pair.permittivity * pair.height * pair.fringe,
             height: pair.height,
             touch: pair.touch.unwrap_or(touching_distance(pair.gap)),
+            chord,
         };
         gaps.push(Gap::Facing { ends, side: pair.side, facing });
         names.push(pair.name.clone());

@@ -165,7 +165,7 @@ pub fn discretize_with(
         lay_spring(spring, options.undamped, &rigid, &mut joints, &mut dampers);
     }
     rigid.hold_hinges(structure, stiffest, &mut joints);
-    let (gaps, gap_names, mut couplings) = gap::lay(structure, &rigid);
+    let (gaps, gap_names, mut couplings) = gap::lay(structure, &rigid, options.as_sugar);
     let loads: Vec<(usize, Load)> = structure
         .loads
         .iter()

@@ -3,6 +3,8 @@
 //! The gap is g(s) = g₀ + w(s), with w the cubic (Hermite) interpolation of the relative displacement and rotation of the
 //! two pairs of ends: z = (w₁, φ₁, w₂, φ₂). Parallel beams get exactly SUGAR's nodal forces and moments, pl/2 and pl²/12
 //! (its `gap2d`); tilted ones differ in second order, because here forces, stiffness and charge come from one potential.
+//! With [`Facing::chord`] they do not: as SUGAR has it, the gap is then measured along the straight lines between the ends, while
+//! its pressure acts through the cubics, so that the forces are the derivatives of no energy.
 //! α is SUGAR's fringe factor 1 + 1.12·g₀/h. Quadrature of the field: Gauss–Legendre with six points; of the contact
 //! pressure: Gauss–Lobatto with nine points, among them the ends, where tilted beams touch first, and the middle.
 
@@ -45,6 +47,8 @@ pub struct Facing {
     pub height: f64,
     /// Distance at which the beams touch [m].
     pub touch: f64,
+    /// The gap along the straight lines between the ends, as SUGAR measures it, instead of that along the cubics.
+    pub chord: bool,
 }
 
 /// C(z) with gradient and Hessian.
@@ -52,9 +56,9 @@ pub struct Facing {
 pub struct FacingCapacitance {
     /// C [F].
     pub value: f64,
-    /// ∂C/∂z [F/m, F/rad].
+    /// ∂C/∂z [F/m, F/rad]; along chords what the pressure exerts instead.
     pub gradient: Vector4<f64>,
-    /// ∂²C/∂z².
+    /// ∂²C/∂z²; along chords the symmetric part of the gradient's derivative.
     pub hessian: Matrix4<f64>,
 }
 
@@ -64,14 +68,14 @@ impl Facing {
         let mut c = FacingCapacitance { value: 0.0, gradient: Vector4::zeros(), hessian: Matrix4::zeros() };
         let closest = self.least();
         for (s, weight) in GAUSS {
-            let n = self.shape(s);
-            let g = self.gap + n.dot(z);
+            let (n, m) = (self.shape(s), self.measure(s));
+            let g = self.gap + m.dot(z);
             let k = self.strength * self.length * weight;
             let d = g.max(closest);
             c.value += k * (1.0 / d + (d - g) / (d * d));
             c.gradient -= n * (k / (d * d));
             if g > closest {
-                c.hessian += n * n.transpose() * (2.0 * k / (d * d * d));
+                c.hessian += (n * m.transpose() + m * n.transpose()) * (k / (d * d * d));
             }
         }
         c
@@ -92,6 +96,12 @@ impl Facing {
             3.0 * s * s - 2.0 * s * s * s,
             l * (s * s * s - s * s),
         )
+    }
+
+    /// The weights with which the gap is measured there: g(s) = g₀ + m·z.
+    #[inline]
+    fn measure(&self, s: f64) -> Vector4<f64> {
+        if self.chord { Vector4::new(1.0 - s, 0.0, s, 0.0) } else { self.shape(s) }
     }
 
     /// Smallest distance among the points where contact is looked at [m], and its derivative with z.
@@ -142,7 +152,7 @@ mod tests {
     use super::*;
 
     fn facing() -> Facing {
-        Facing { length: 100e-6, gap: 2e-6, strength: 8.854e-12 * 2e-6, height: 2e-6, touch: 0.1e-6 }
+        Facing { length: 100e-6, gap: 2e-6, strength: 8.854e-12 * 2e-6, height: 2e-6, touch: 0.1e-6, chord: false }
     }
 
     /// Parallel beams: C = εhl/g, and the work-equivalent nodal loads of a uniform pressure, l/2 and l²/12 (SUGAR gap2d).
@@ -154,6 +164,24 @@ mod tests {
         assert!((c.value / (f.strength * f.length / f.gap) - 1.0).abs() < 1e-14);
         let expected = Vector4::new(0.5, f.length / 12.0, 0.5, -f.length / 12.0) * (-line * f.length);
         assert!((c.gradient - expected).abs().max() < 1e-14 * expected.abs().max());
+    }
+
+    /// Tilted beams along chords get the loads that SUGAR's `gap2dforce` integrates: the pressure k/(g₀ + (1 − s)·w₁ + s·w₂)² in
+    /// the weights of a cubic (sums over 4000 intervals, by Simpson's rule).
+    #[test]
+    fn tilted_beams_along_chords_match_sugar() {
+        let f = Facing { chord: true, ..facing() };
+        let z = Vector4::new(-0.3e-6, 4e-3, -0.35e-6, -6e-3);
+        let (n, mut sum) = (4000, Vector4::zeros());
+        for k in 0..=n {
+            let s = f64::from(k) / f64::from(n);
+            let weight = if k == 0 || k == n { 1.0 } else { 2.0 + 2.0 * f64::from(k % 2) };
+            let g = f.gap + (1.0 - s) * z[0] + s * z[2];
+            sum -= f.shape(s) * (weight / (3.0 * f64::from(n)) * f.strength * f.length / (g * g));
+        }
+        let loads = f.at(&z).gradient;
+        assert!((loads - sum).abs().component_div(&sum.abs()).max() < 1e-12, "{loads} {sum}");
+        assert!((loads - facing().at(&z).gradient).norm() > 1e-3 * loads.norm());
     }
 
     /// Gradient and Hessian are the derivatives of C: central differences to their own error.

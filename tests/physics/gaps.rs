@@ -95,3 +95,33 @@ fn facing_beams() {
     let release = found.release_v.unwrap();
     assert!(0.0 < release && release < 0.8 * found.pull_in_v, "{found:?}");
 }
+
+/// As SUGAR 2 computes, two tilted cantilevers that attract one another stand where it puts them. Source: SUGAR 2 under Octave on
+/// its gap-closing actuator (electrodes 550 µm high), at 40 and 100 V: y and rotation of a free end, eleven digits of which hold.
+#[test]
+fn facing_beams_as_sugar() {
+    let text = |volts: f64| {
+        format!(
+            "process s = [ Poisson=0.3 Youngsmodulus=165e9 density=2300 viscosity=1.78e-5 fluid=2e-6 permittivity=8.854e-12
+               sheetresistance=20 stress=0 straingradient=0 thermalexpansion=2.6e-6 ambienttemperature=0 h=550u ]
+             anchor s [A] [l=5u w=10u oz=pi]
+             beam2de s [A b] [l=10u w=4u h=40u R=100]
+             beam2de s [b c] [l=50u w=4u h=40u R=100]
+             beam2de s [D E] [l=50u w=4u h=40u R=100]
+             beam2de s [E F] [l=10u w=4u h=40u R=100]
+             gap2dforce s [b c D E] [l=50u w1=4u w2=4u gap=4.834u]
+             anchor s [F] [l=5u w=10u]
+             Vsrc * [A G] [V={volts}]
+             eground * [G] []
+             eground * [F] []"
+        )
+    };
+    let as_sugar = CompileOptions { as_sugar: true, ..CompileOptions::default() };
+    for (volts, y, rz) in
+        [(40.0, -7.7283509311554e-9, -1.71963306618205e-4), (100.0, -4.91847747700838e-8, -1.09440895995529e-3)]
+    {
+        let c = node(&balance(&model(&text(volts), &as_sugar), &[]), "c");
+        close(c.y, y, 1e-11);
+        close(c.rz, rz, 1e-11);
+    }
+}

@@ -45,8 +45,9 @@ class Options(TypedDict, total=False):
     branch. Range: -0.1 to 0.1; default: none: as drawn."""
 
     as_sugar: bool | None
-    """As SUGAR 2 computes, in one switch: linear, beams that meet in points (junctions=centreline), modes about
-    the drawing whatever stress, heat and voltages are."""
+    """As SUGAR 2 computes, in one switch: linear, beams that meet in points (junctions=centreline), gaps between
+    facing beams along the straight lines between their ends, modes about the drawing whatever stress, heat and
+    voltages are."""
 
     without_circuit: bool | None
     """The mechanism without the circuit that is drawn around it (R, C, L, sources, amplifiers): its electrical
