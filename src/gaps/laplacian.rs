@@ -1,90 +1,110 @@
-//! Potentials of nodes that conductors join, for given flows into them: G·v = i, G the weighted Laplacian of what conducts.
+//! Potentials of nodes that conductors join, for given flows into them, by star–mesh transforms: a node is taken out, and its
+//! conductors g become one between each two of its neighbours, gᵢ·gⱼ/Σg. In the order and on the pattern of
+//! [`crate::multibody`] that is O(n) for chains and trees.
 //!
-//! Every part of the network hangs on a node whose potential is known, so that G is positive definite, and a sparse L·D·Lᵀ in an
-//! approximate minimum degree ordering needs no pivoting: O(n) for chains and trees, O(n^1.5) for grids.
+//! Nothing is subtracted: every conductance comes out right to some roundings, whether a network has milliohms beside teraohms or not.
+//! The elimination is that of a weighted Laplacian G, without the cancellation on its diagonal.
 //!
-//! Reference: P. R. Amestoy, T. A. Davis, I. S. Duff, "An approximate minimum degree ordering algorithm", SIAM J. Matrix Anal. Appl. 17
-//! (1996); faer's factorization.
+//! Reference: S. Rosen, "A new network theorem", J. IEE 62 (1924); W. K. Grassmann, M. I. Taksar, D. P. Heyman, "Regenerative
+//! analysis and steady state distributions for Markov chains", Operations Research 33 (1985), for what it does to rounding.
 
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::sparse::linalg::cholesky::{LdltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky};
-use faer::sparse::{SparseColMat, Triplet};
-use faer::{Conj, MatMut, Par, Side};
+use crate::multibody::Pattern;
+use crate::multibody::order::elimination_order;
 
-/// G, factored.
+/// Nodes between two looks at the budget.
+const NODES_PER_CHECK: usize = 1024;
+
+/// A network, taken apart.
 pub(super) struct Laplacian {
-    size: usize,
-    symbolic: Option<SymbolicCholesky<usize>>,
-    factor: Vec<f64>,
+    pattern: Pattern,
+    /// Node by node, when it is taken out.
+    turn: Vec<usize>,
+    /// Conductances between nodes as they are when the first of the two is taken out, column by column of the pattern.
+    between: Vec<f64>,
+    /// Sum of a node's conductances then, ground included, in order of elimination.
+    sum: Vec<f64>,
 }
 
 impl Laplacian {
-    /// Of `size` nodes whose potentials are not known, joined by conductors (a, b, conductance); none: a node whose potential is 0. None
-    /// where rounding leaves a pivot of zero, or numbers beyond what doubles hold.
+    /// Of `size` nodes whose potentials are not known, joined by conductors (a, b, conductance above 0); none: a node whose potential is
+    /// 0. None where a node hangs on nothing, or numbers are beyond what doubles hold.
     pub(super) fn new(
         size: usize,
         conductors: impl Iterator<Item = (Option<usize>, Option<usize>, f64)>,
     ) -> Option<Self> {
-        if size == 0 {
-            return Some(Self { size, symbolic: None, factor: Vec::new() });
-        }
-        let mut entries = Vec::new();
-        let mut diagonal = vec![0.0; size];
+        let mut to_ground = vec![0.0; size];
+        let (mut edges, mut conductances) = (Vec::new(), Vec::new());
         for (a, b, g) in conductors {
-            if a == b {
-                continue;
-            }
-            for node in [a, b].into_iter().flatten() {
-                diagonal[node] += g;
-            }
-            if let (Some(a), Some(b)) = (a, b) {
-                entries.push(Triplet::new(a.max(b), a.min(b), -g));
+            match (a, b) {
+                (Some(a), Some(b)) if a != b => {
+                    edges.push((a, b));
+                    conductances.push(g);
+                }
+                (Some(node), None) | (None, Some(node)) => to_ground[node] += g,
+                _ => {}
             }
         }
-        entries.extend(diagonal.iter().enumerate().map(|(k, g)| Triplet::new(k, k, *g)));
-        crate::budget::lay_out(entries.len().saturating_mul(5 * 24));
-        crate::budget::check();
-        let lower = SparseColMat::try_new_from_triplets(size, size, &entries).ok()?;
-        let symbolic =
-            factorize_symbolic_cholesky(lower.symbolic(), Side::Lower, SymmetricOrdering::Amd, Default::default())
-                .ok()?;
-        crate::budget::lay_out_matrix(symbolic.len_val(), 3);
-        crate::budget::check();
-        let mut factor = vec![0.0; symbolic.len_val()];
-        let mut memory = MemBuffer::new(symbolic.factorize_numeric_ldlt_scratch::<f64>(Par::Seq, Default::default()));
-        symbolic
-            .factorize_numeric_ldlt(
-                &mut factor,
-                lower.as_ref(),
-                Side::Lower,
-                Default::default(),
-                Par::Seq,
-                MemStack::new(&mut memory),
-                Default::default(),
-            )
-            .ok()?;
-        Some(Self { size, symbolic: Some(symbolic), factor })
+        let grounded: Vec<usize> = (0..size).filter(|k| to_ground[*k] > 0.0).collect();
+        let order = elimination_order(size, &edges, &grounded);
+        let mut turn = vec![0; size];
+        order.iter().enumerate().for_each(|(k, node)| turn[*node] = k);
+        for edge in &mut edges {
+            *edge = (turn[edge.0], turn[edge.1]);
+        }
+        let pattern = Pattern::new(size, &edges);
+        let mut between = vec![0.0; pattern.off_blocks()];
+        for ((a, b), g) in edges.iter().zip(conductances) {
+            between[pattern.block(*a.max(b), *a.min(b))?] += g;
+        }
+        let mut ground: Vec<f64> = order.iter().map(|node| to_ground[*node]).collect();
+        let mut sum = vec![0.0; size];
+        for j in 0..size {
+            if j.is_multiple_of(NODES_PER_CHECK) {
+                crate::budget::check();
+            }
+            let column = pattern.column(j);
+            sum[j] = ground[j] + between[column.clone()].iter().sum::<f64>();
+            if !(sum[j] > 0.0 && sum[j].is_finite()) {
+                return None;
+            }
+            let mut target = pattern.targets(j).iter();
+            for (k, &row) in column.clone().zip(pattern.rows(j)) {
+                let share = between[k] / sum[j];
+                ground[row as usize] += share * ground[j];
+                for (i, &at) in (column.start..k).zip(target.by_ref()) {
+                    between[at as usize] += share * between[i];
+                }
+            }
+        }
+        Some(Self { pattern, turn, between, sum })
     }
 
     /// Potentials for the flows into the nodes, in place, column after column.
     pub(super) fn solve(&self, flows: &mut [f64]) {
-        let Some(symbolic) = &self.symbolic else { return };
-        let mut memory = MemBuffer::new(symbolic.solve_in_place_scratch::<f64>(1, Par::Seq));
-        for column in flows.chunks_exact_mut(self.size) {
+        let Self { pattern, turn, between, sum } = self;
+        let mut now = vec![0.0; sum.len()];
+        for column in flows.chunks_exact_mut(sum.len().max(1)) {
             crate::budget::check();
-            LdltRef::new(symbolic, &self.factor).solve_in_place_with_conj(
-                Conj::No,
-                MatMut::from_column_major_slice_mut(column, self.size, 1),
-                Par::Seq,
-                MemStack::new(&mut memory),
-            );
+            column.iter().zip(turn).for_each(|(flow, k)| now[*k] = *flow);
+            for j in 0..now.len() {
+                now[j] /= sum[j];
+                for (g, &row) in between[pattern.column(j)].iter().zip(pattern.rows(j)) {
+                    now[row as usize] += g * now[j];
+                }
+            }
+            for j in (0..now.len()).rev() {
+                for (g, &row) in between[pattern.column(j)].iter().zip(pattern.rows(j)) {
+                    now[j] += g / sum[j] * now[row as usize];
+                }
+            }
+            column.iter_mut().zip(turn).for_each(|(potential, k)| *potential = now[*k]);
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    //! A ladder and a grid against what series and parallel say; sizes that a dense matrix could not have.
+    //! A chain against what series and parallel say; a size that a dense matrix could not have, and sizes of conductors far apart.
     use super::*;
 
     /// A chain of 100 000 conductors of 1 S from ground to the last node: a flow of 1 there makes the potentials 1, 2, 3 ….
@@ -97,13 +117,26 @@ mod tests {
         flow[n - 1] = 1.0;
         laplacian.solve(&mut flow);
         assert!(flow.iter().enumerate().all(|(k, v)| (v / (k + 1) as f64 - 1.0).abs() < 1e-9));
-        // by its fill: two entries a node
-        assert!(laplacian.factor.len() < 4 * n, "{}", laplacian.factor.len());
+        // no fill
+        assert_eq!(laplacian.between.len(), n - 1);
     }
 
-    /// A flow into nothing but known potentials changes nothing.
+    /// Two nodes joined by 1 kS, each on ground through 1e-15 S: a flow of 1 into the first puts both at 1/2e-15 V, to rounding, where the
+    /// matrix 1000 + 1e-15 has lost the ground.
     #[test]
-    fn empty() {
+    fn milliohms_beside_teraohms() {
+        let conductors = [(Some(0), Some(1), 1e3), (Some(0), None, 1e-15), (None, Some(1), 1e-15)];
+        let laplacian = Laplacian::new(2, conductors.into_iter()).unwrap();
+        let mut flow = [1.0, 0.0];
+        laplacian.solve(&mut flow);
+        assert!(flow.iter().all(|v| (v * 2e-15 - 1.0).abs() < 1e-14), "{flow:?}");
+    }
+
+    /// A flow into nothing but known potentials changes nothing; a node that hangs on nothing has no potential.
+    #[test]
+    fn extremes() {
         Laplacian::new(0, std::iter::empty()).unwrap().solve(&mut []);
+        assert!(Laplacian::new(2, [(Some(0), None, 1.0)].into_iter()).is_none());
+        assert!(Laplacian::new(1, [(Some(0), None, f64::INFINITY)].into_iter()).is_none());
     }
 }

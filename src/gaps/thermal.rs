@@ -223,16 +223,13 @@ impl Conduction {
 
 /// A heater of a part that holds no sink.
 fn without_sink(heaters: &[Heater], sink: &[bool]) -> Option<usize> {
-    let ambient = sink.len();
-    let mut parts = Sets::new(ambient + 1);
-    for (node, _) in sink.iter().enumerate().filter(|(_, sink)| **sink) {
-        parts.join(node, ambient);
-    }
+    let mut parts = Sets::new(sink.len());
     for h in heaters {
-        crate::budget::check();
         parts.join(h.a, h.b);
     }
-    heaters.iter().position(|h| !parts.together(h.a, ambient))
+    let mut cooled = vec![false; sink.len()];
+    (0..sink.len()).filter(|node| sink[*node]).for_each(|node| cooled[parts.first(node)] = true);
+    heaters.iter().position(|h| !cooled[parts.first(h.a)])
 }
 
 #[cfg(test)]
