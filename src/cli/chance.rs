@@ -17,11 +17,11 @@ pub(crate) struct Chance {
     samples: Option<usize>,
 
     /// The same seed draws the same samples
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, requires = "vary")]
     seed: u64,
 
     /// How samples fill the space: random, lhs (Latin hypercube) or sobol (scrambled Sobol sequence; powers of two fill best)
-    #[arg(long, default_value = "lhs")]
+    #[arg(long, default_value = "lhs", requires = "vary")]
     design: Design,
 
     /// Correlation of two normal or lognormal parameters (of ln x there), -1 < R < 1. Repeatable

@@ -163,7 +163,7 @@ impl Sweep {
         }
         let refused = OnceLock::new();
         let keep = |kept: &Kept| journal.keep(kept).map_err(|error| refused.set(error)).is_ok();
-        let table = sweep::run_on(spec, bundle, options, known, &keep, &|p| report(bar, p));
+        let table = sweep::run_on(spec, bundle, options, known, Some(&keep), &|p| report(bar, p));
         if let Some(error) = refused.into_inner() {
             return Err(error.into());
         }

@@ -175,11 +175,11 @@ pub fn run(
     options: &CompileOptions,
     progress: &(dyn Fn(SweepProgress) -> bool + Sync),
 ) -> Result<SweepTable, SweepError> {
-    run_on(spec, bundle, options, Vec::new(), &|_| true, progress)
+    run_on(spec, bundle, options, Vec::new(), None, progress)
 }
 
-/// The same, going on from the points that are `known` from before. `keep` is given each point that is new as soon as it is done, from
-/// any thread, and answers whether to go on.
+/// The same, going on from the points that are `known` from before. `keep`, if there is one, is given each point that is new as soon as
+/// it is done, from any thread, and answers whether to go on.
 ///
 /// # Errors
 /// As [`run`].
@@ -188,7 +188,7 @@ pub fn run_on(
     bundle: &Bundle,
     options: &CompileOptions,
     known: Vec<Kept>,
-    keep: &(dyn Fn(&Kept) -> bool + Sync),
+    keep: Option<&(dyn Fn(&Kept) -> bool + Sync)>,
     progress: &(dyn Fn(SweepProgress) -> bool + Sync),
 ) -> Result<SweepTable, SweepError> {
     let mut numbers = spec.point_numbers()?;
@@ -210,7 +210,7 @@ pub fn run_on(
         if outcome.values.is_err() {
             failed.fetch_add(1, Ordering::Relaxed);
         }
-        if !keep(&outcome.kept()) {
+        if keep.is_some_and(|keep| !keep(&outcome.kept())) {
             stop.store(true, Ordering::Relaxed);
         }
         let done = done.fetch_add(1, Ordering::Relaxed) + 1;

@@ -60,6 +60,8 @@ fn slips() {
         ("sweep c.net --vary w=normal:1u:1u --param w=1u,2u --samples 3", "twice"),
         ("sweep c.net --vary w=normal:1u:1u --samples 3 --correlate w,l=0.5", "vary"),
         ("sweep c.net --vary nosuch=normal:1u:1u --samples 3", "nosuch"),
+        ("sweep c.net --param w=1u,2u --seed 3", "--vary"),
+        ("sweep c.net --param w=1u,2u --design sobol", "--vary"),
         ("merge x.csv", "no table of `bimorph sweep`"),
         ("merge cut.csv", "no table of `bimorph sweep`"),
         ("merge nosuch.csv", "nosuch.csv"),

@@ -8,7 +8,7 @@ use crate::content::Fnv;
 use crate::netlist::Bundle;
 use crate::options::CompileOptions;
 use serde::{Deserialize, Serialize};
-use std::fs::File;
+use std::fs::{File, TryLockError};
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
@@ -61,6 +61,12 @@ pub enum JournalError {
         /// Where.
         path: PathBuf,
     },
+    /// Another process adds to it.
+    #[error("{}: another sweep is writing these points; wait for it, or give this one an --out of its own", path.display())]
+    Busy {
+        /// Where.
+        path: PathBuf,
+    },
     /// The file system says no.
     #[error("{}: {source}", path.display())]
     Io {
@@ -103,6 +109,11 @@ impl Journal {
     pub fn open(path: &Path, name: &str, resume: bool) -> Result<(Self, Vec<Kept>), JournalError> {
         let failed = |source| JournalError::Io { path: path.to_owned(), source };
         let mut file = File::options().read(true).append(true).create(true).open(path).map_err(failed)?;
+        match file.try_lock() {
+            Err(TryLockError::WouldBlock) => return Err(JournalError::Busy { path: path.to_owned() }),
+            // a file system without locks: whoever starts two sweeps there has been told to give each its own file
+            Err(TryLockError::Error(_)) | Ok(()) => {}
+        }
         let mut bytes = Vec::new();
         file.read_to_end(&mut bytes).map_err(failed)?;
         // a line that is cut off, and a head that is, are as if they had never been
@@ -231,6 +242,9 @@ mod tests {
             assert_eq!(again.len(), known.len() + 1);
         }
         std::fs::write(&path, &whole).unwrap();
+        let (open, _) = Journal::open(&path, "sweep", true).unwrap();
+        assert!(matches!(Journal::open(&path, "sweep", true), Err(JournalError::Busy { .. })));
+        drop(open);
         assert!(matches!(Journal::open(&path, "sweep", false), Err(JournalError::Exists { .. })));
         assert!(matches!(Journal::open(&path, "another", true), Err(JournalError::Other { .. })));
         assert_eq!(std::fs::read(&path).unwrap(), whole);

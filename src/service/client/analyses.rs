@@ -205,8 +205,17 @@ impl Client {
             spec: Some(sweeps::spec_to_wire(spec)),
         };
         let mut rpc = self.link.rpc.clone();
-        let id = self.call(rpc.submit_sweep(request))?.sweep;
-        let outcome = self.follow(&id, progress).and_then(|()| self.fetch(&id));
+        let submitted = self.call(rpc.submit_sweep(request))?;
+        let id = submitted.sweep;
+        let whole = |right: bool| match right {
+            true => Ok(()),
+            false => Err(self.error(&Status::unimplemented("it is of an earlier version, which knows no samples"))),
+        };
+        // a server passes over fields that it does not know
+        let outcome = whole(spec.point_numbers().is_ok_and(|points| points.len() as u64 == submitted.points))
+            .and_then(|()| self.follow(&id, progress))
+            .and_then(|()| self.fetch(&id))
+            .and_then(|table| whole(spec.names().eq(table.parameters.iter().map(String::as_str))).map(|()| table));
         // Done with it, whatever came: the server need not keep it. That it is gone already is no error.
         let _ = self.call(rpc.cancel_sweep(proto::CancelSweepRequest { sweep: id }));
         outcome

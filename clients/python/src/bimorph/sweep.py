@@ -223,7 +223,10 @@ def run(channel: Channel, request: Any, progress: Callable[[int, int], object] |
                 progress(status.done, status.points)
             if status.state in (sweep_pb2.SweepStatus.STATE_FAILED, sweep_pb2.SweepStatus.STATE_CANCELLED):
                 raise BimorphError(f"the sweep ended after {status.done} points: {status.message}")
-        return _fetch(channel, sweep)
+        table = _fetch(channel, sweep)
+        if any(vary.name not in table.parameters for vary in request.spec.samples.vary):
+            raise BimorphError("the server is of an earlier version, which knows no samples")
+        return table
     finally:
         try:
             channel.call("CancelSweep", sweep_pb2.CancelSweepRequest(sweep=sweep))
