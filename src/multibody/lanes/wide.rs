@@ -289,19 +289,30 @@ mod tests {
         })
     }
 
+    /// The instruction sets of this processor that kernels are compiled for, and none.
+    fn everywhere(a: [f64; LANES], b: [f64; LANES]) -> Vec<[[f64; LANES]; 10]> {
+        let mut found = vec![Arch::new().dispatch(Check(a, b)), pulp::Scalar::new().vectorize(Check(a, b))];
+        #[cfg(target_arch = "x86_64")]
+        if let Some(simd) = pulp::x86::V3::try_new() {
+            found.push(Simd::vectorize(simd, Check(a, b)));
+        }
+        found
+    }
+
     #[test]
     fn lanes_are_numbers() {
         for turn in [0.1, 3.0] {
             let a = std::array::from_fn(|k| (k as f64 - 2.7) * turn);
             let b = std::array::from_fn(|k| if k == 3 { 0.0 } else { 1.0 / (k as f64 - 5.1) });
-            let found = Arch::new().dispatch(Check(a, b));
-            for k in 0..LANES {
-                let (x, y) = (a[k], b[k]);
-                let (sin, cos) = crate::multibody::sine::sin_cos(x);
-                let chosen = if y == 0.0 { x } else { x + y };
-                let alone = [x + y, x - y, x * y, x / y, -x, x.abs(), x * 0.3 + 0.7, chosen, sin, cos];
-                for (found, alone) in found.iter().zip(alone) {
-                    assert_eq!(found[k].to_bits(), alone.to_bits(), "{x} {y}");
+            for found in everywhere(a, b) {
+                for k in 0..LANES {
+                    let (x, y) = (a[k], b[k]);
+                    let (sin, cos) = crate::multibody::sine::sin_cos(x);
+                    let chosen = if y == 0.0 { x } else { x + y };
+                    let alone = [x + y, x - y, x * y, x / y, -x, x.abs(), x * 0.3 + 0.7, chosen, sin, cos];
+                    for (found, alone) in found.iter().zip(alone) {
+                        assert_eq!(found[k].to_bits(), alone.to_bits(), "{x} {y}");
+                    }
                 }
             }
         }
