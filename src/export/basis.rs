@@ -7,15 +7,12 @@
 use super::ExportError;
 use super::reduce::{Mechanism, Push, dot};
 use crate::analysis::AnalysisError;
+use crate::analysis::harmonic::modal;
 use crate::multibody::planar::Pose;
-use crate::solve::eigen::{Modes, RELIABLE, lowest_modes, mass_product};
+use crate::solve::eigen::{Modes, mass_product};
 use crate::solve::frequency::refined::Refined;
-use crate::solve::subspace;
 use nalgebra::{DMatrix, SymmetricEigen};
 
-/// Modes beyond those asked for that an iteration of a block takes along, and the change of λ at which it ends [1].
-const GUARDS: usize = 6;
-const SETTLED: f64 = 1e-14;
 /// Share of its energy below which a direction of the static correction depends on others.
 const DEPENDENT: f64 = 1e-9;
 
@@ -60,40 +57,12 @@ impl Mechanism<'_> {
     /// # Errors
     /// [`AnalysisError::NotConverged`] rather than modes that cannot be trusted.
     pub fn modes(&self, count: usize) -> Result<Modes, ExportError> {
-        if self.system().model.linear {
-            return self.linear_modes(count);
-        }
-        let found =
-            lowest_modes(self.system(), (&self.q, &self.drive), &self.tangent, count).map_err(AnalysisError::from)?;
-        let bad = found.residuals.iter().any(|r| r.is_nan() || *r > RELIABLE) || found.missed;
-        if bad || found.lambda.is_empty() || found.lambda.iter().any(|l| *l <= 0.0) {
-            let detail = format!(
-                "the {count} lowest modes at the operating point cannot be told apart from rounding; --count fewer"
-            );
+        let found = modal::lowest(self.system(), (&self.q, &self.drive), &self.tangent, count)?;
+        if found.lambda.iter().any(|l| *l <= 0.0) {
+            let detail = "the operating point is not stable: a mode there does not swing".to_owned();
             return Err(AnalysisError::NotConverged { detail }.into());
         }
         Ok(found)
-    }
-
-    /// The same for small displacements about the drawing, whose small signals leave out what stress adds to the stiffness: those of the
-    /// tangent as it is.
-    fn linear_modes(&self, count: usize) -> Result<Modes, ExportError> {
-        let model = &self.system().model;
-        let mut block = count + GUARDS;
-        while block > 0 {
-            let start = subspace::start(model.bodies.len(), block, self.system().length_scale);
-            if let Some(found) = subspace::iterate(model, (&self.factor, 0.0), start, count.min(block), SETTLED) {
-                let (mut lambda, mut shapes) = (found.lambda, found.shapes);
-                lambda.truncate(count);
-                shapes.truncate(count);
-                let residuals = vec![0.0; lambda.len()];
-                return Ok(Modes { lambda, shapes, residuals, missed: false, rounding: 0.0 });
-            }
-            // there are fewer
-            block -= 1;
-        }
-        let detail = format!("the {count} lowest modes at the operating point do not settle; --count fewer");
-        Err(AnalysisError::NotConverged { detail }.into())
     }
 
     /// What a push yields at rest in all directions but those of a basis.
