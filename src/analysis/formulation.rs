@@ -9,7 +9,7 @@
 
 use super::AnalysisError;
 use super::integrator::Integrator;
-use super::transient::TransientOptions;
+use super::transient::options::TransientOptions;
 use crate::compile::Compiled;
 use crate::gaps::System;
 use crate::multibody::rcr::{Linkage, Parent};

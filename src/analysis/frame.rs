@@ -6,7 +6,8 @@
 use super::modes::{ModesResult, normalized};
 use super::signal::node_signal;
 use super::statics::{NodeMotion, StaticResult, electrical, source_vector};
-use super::transient::{Counters, TransientOptions, TransientResult, check};
+use super::transient::options::{TransientOptions, check};
+use super::transient::result::{Counters, TransientResult};
 use super::{AnalysisError, BeamMotions, NodeMotions, PortVoltages, Watch};
 use crate::compile::Compiled;
 use crate::discretize::frame::{Elements, Frame, FrameOptions, assemble};

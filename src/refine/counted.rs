@@ -4,7 +4,9 @@
 //! pivots of K − ω²M (Sylvester), reaches the number asked for. Found by bisection on a first mesh, then [`model_order`] chooses the mesh for that
 //! band, and the band is looked up again on it until the modes asked for lie within.
 
-use super::model_order::{self, Aim, ModelOrder, mechanics};
+use super::aim::{Aim, ModelOrder};
+use super::look::mechanics;
+use super::model_order;
 use crate::discretize::{DiscretizeError, Discretized, discretize_with, order};
 use crate::multibody::BlockMatrix;
 use crate::multibody::forces::add_inertia;

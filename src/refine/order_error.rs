@@ -31,22 +31,17 @@
 //!
 //! Valid for modes that the nodes can show: kh < 4.73, which [`model_order`](super::model_order) sees to.
 
+use super::reference::{Compared, Pencil, compare};
+use super::span::{Span, spans};
 use crate::discretize::beam::bar;
 use crate::discretize::frame::{Elements, Frame, FrameOptions, assemble};
-use crate::discretize::scheme::{Bar, Part};
 use crate::discretize::{Discretized, cubic, order};
-use crate::gaps::Point;
 use crate::multibody::linear_system::LinearSystem;
 use crate::multibody::planar::Pose;
-use crate::multibody::{BlockMatrix, BodyId, Model, Pattern};
+use crate::multibody::{BlockMatrix, BodyId, Model};
 use crate::options::{CompileOptions, Scheme};
-use crate::solve::frequency::mac;
-use crate::solve::subspace::{columns, ritz};
 use crate::structure::Structure;
-use nalgebra::{DMatrix, Matrix6, Vector2, Vector3, Vector6};
-
-/// Frequencies this close, relatively, in λ, count as equal.
-const NEAR: f64 = 1e-2;
+use nalgebra::Vector3;
 
 /// Estimated errors of modes.
 #[derive(Debug, Clone, PartialEq)]
@@ -82,84 +77,6 @@ pub fn strain_shares(
         spans.iter().zip(&structure.beams).map(one).collect()
     };
     shapes.iter().zip(lambda).map(share).collect()
-}
-
-/// A beam over the points of what is cut of it: between the edges of junctions, where there are any.
-struct Span {
-    points: Vec<Point>,
-    length: f64,
-    along: Vector2<f64>,
-    /// Consistent mass of a segment, or zero where another matrix has it.
-    mass: Matrix6<f64>,
-    /// M₂ of a segment.
-    second: Matrix6<f64>,
-    /// N²·B of a segment.
-    softer: Matrix6<f64>,
-    /// Lumps of the model at the points.
-    lumps: Vec<Part>,
-}
-
-impl Span {
-    /// Motion of the points along and across the beam.
-    fn local(&self, x: &[Pose]) -> Vec<Vector3<f64>> {
-        let at = |p: &Point| match p.body {
-            BodyId::Ground => Vector3::zeros(),
-            BodyId::Free(k) => {
-                let (dx, dy) = (x[k].x - x[k].z * p.arm.y, x[k].y + x[k].z * p.arm.x);
-                Vector3::new(dx * self.along.x + dy * self.along.y, dy * self.along.x - dx * self.along.y, x[k].z)
-            }
-        };
-        self.points.iter().map(at).collect()
-    }
-
-    /// (M_r − M)·x of this beam, over its points, N·A included.
-    fn defect(&self, x: &[Vector3<f64>], lambda: f64) -> Vec<Vector3<f64>> {
-        let mut f = self.segments(x, &(self.mass + self.second * lambda));
-        for ((f, x), lump) in f.iter_mut().zip(x).zip(&self.lumps) {
-            f.x -= lump.mass * x.x;
-            f.y -= lump.mass * x.y + lump.first * x.z;
-            f.z -= lump.first * x.y + lump.second * x.z;
-        }
-        f
-    }
-
-    /// Takes the axial force of the beam into account.
-    fn tighten(&mut self, bar: &Bar, force: f64) {
-        let (cross, twice) = cubic::second_tension(bar, self.length / (self.points.len() - 1) as f64, force);
-        self.mass += cross;
-        self.softer = twice;
-    }
-
-    /// The same matrix for every segment, times x.
-    fn segments(&self, x: &[Vector3<f64>], segment: &Matrix6<f64>) -> Vec<Vector3<f64>> {
-        let mut f = vec![Vector3::zeros(); x.len()];
-        for k in 0..x.len() - 1 {
-            let (a, b) = (x[k], x[k + 1]);
-            let both = segment * Vector6::new(a.x, a.y, a.z, b.x, b.y, b.z);
-            f[k] += both.fixed_rows::<3>(0);
-            f[k + 1] += both.fixed_rows::<3>(3);
-        }
-        f
-    }
-
-    /// Adds forces at the points to those on the bodies.
-    fn scatter(&self, f: &[Vector3<f64>], out: &mut [Pose]) {
-        for (p, f) in self.points.iter().zip(f) {
-            if let BodyId::Free(k) = p.body {
-                let (fx, fy) = (f.x * self.along.x - f.y * self.along.y, f.x * self.along.y + f.y * self.along.x);
-                out[k] += Pose::new(fx, fy, f.z + p.arm.x * fy - p.arm.y * fx);
-            }
-        }
-    }
-}
-
-/// K − σM of a mesh, factored, and its mass matrix.
-struct Pencil<'a> {
-    factor: &'a BlockMatrix<f64, 3>,
-    pattern: &'a Pattern,
-    shift: f64,
-    mass: &'a dyn Fn(&[Pose]) -> Vec<Pose>,
-    project: &'a dyn Fn(&mut [Pose]),
 }
 
 /// True where the model's tangent is that of the cubic frame: schemes E4 and B without rigid beams. Only then is the
@@ -226,117 +143,6 @@ pub fn relative(lambda: &[f64], reference: &[f64]) -> Vec<f64> {
     let rigid = 1e-13 * lambda.last().map_or(0.0, |l| l.abs());
     let error = |(l, r): (&f64, &f64)| if *l <= rigid || *r <= rigid { 0.0 } else { (l / r).sqrt() - 1.0 };
     lambda.iter().zip(reference).map(error).collect()
-}
-
-/// Every beam over its `points`, less the offsets at both ends.
-fn spans(
-    structure: &Structure,
-    options: &CompileOptions,
-    (beams, offsets): (&[Vec<Point>], &[[f64; 2]]),
-    lumped: bool,
-) -> Vec<Span> {
-    let span = |((beam, points), [first, last]): ((&crate::structure::Beam, &Vec<Point>), &[f64; 2])| {
-        let n = points.len() - 1;
-        let bar = Bar { length: beam.length - first - last, ..bar(beam, options.shear, options.rotary_inertia) };
-        let h = bar.length / n as f64;
-        let along = Vector2::new(beam.angle.cos(), beam.angle.sin());
-        let mut points = points.clone();
-        points[0] = points[0].beyond(along * *first);
-        points[n] = points[n].beyond(along * -*last);
-        Span {
-            points,
-            length: bar.length,
-            along,
-            mass: if lumped { cubic::mass(&bar, h) } else { Matrix6::zeros() },
-            second: cubic::second_mass(&bar, h),
-            softer: Matrix6::zeros(),
-            lumps: if lumped { options.scheme.cut(&bar, n, false).parts } else { Vec::new() },
-        }
-    };
-    structure.beams.iter().zip(beams).zip(offsets).map(span).collect()
-}
-
-/// What the reference says of each mode.
-struct Compared {
-    /// λ_r.
-    reference: Vec<f64>,
-    likeness: Vec<f64>,
-    /// The inverse iterates.
-    x: Vec<Vec<Pose>>,
-    /// xᵀM_r·y.
-    norms: Vec<f64>,
-}
-
-/// Modes by inverse iteration and Rayleigh–Ritz with the reference.
-fn compare(pencil: &Pencil<'_>, spans: &[Span], lambda: &[f64], shapes: &[Vec<Pose>]) -> Option<Compared> {
-    let count = lambda.len();
-    let softer = |x: &[Pose]| {
-        let mut f = vec![Pose::zeros(); x.len()];
-        for span in spans.iter().filter(|span| span.softer != Matrix6::zeros()) {
-            span.scatter(&span.segments(&span.local(x), &span.softer), &mut f);
-        }
-        f
-    };
-    let weigh = |x: &[Pose], lambda: f64| {
-        let mut z = (pencil.mass)(x);
-        let base = z.clone();
-        for span in spans {
-            span.scatter(&span.defect(&span.local(x), lambda), &mut z);
-        }
-        (z, base)
-    };
-    let (mut x, mut kx, mut norms) = (Vec::new(), Vec::new(), Vec::new());
-    let (mut mx, mut second, mut plain) = (Vec::new(), Vec::new(), Vec::new());
-    for (y, &lambda) in shapes.iter().zip(lambda) {
-        let (full, base) = weigh(y, lambda);
-        let give = softer(y);
-        let mut z: Vec<Pose> =
-            full.iter().zip(&base).zip(&give).map(|((f, b), s)| f * lambda + s - b * pencil.shift).collect();
-        (pencil.project)(&mut z);
-        let mut solved = z.clone();
-        pencil.factor.solve(pencil.pattern, &mut solved);
-        (pencil.project)(&mut solved);
-        norms.push(dot(&solved, &full));
-        plain.push(base);
-        let (full, base) = weigh(&solved, 0.0);
-        let give = softer(&solved);
-        kx.push(z.iter().zip(&base).zip(&give).map(|((z, b), s)| z + b * pencil.shift - s).collect::<Vec<Pose>>());
-        mx.push(full);
-        let mut bent = vec![Pose::zeros(); solved.len()];
-        for span in spans {
-            span.scatter(&span.segments(&span.local(&solved), &span.second), &mut bent);
-        }
-        second.push(bent);
-        x.push(solved);
-    }
-    let transposed = columns(&x).transpose();
-    let a = &transposed * columns(&kx);
-    // λ·M₂ between two modes at the geometric mean of theirs, which keeps the sum definite
-    let mean = |i: usize, j: usize| (lambda[i].max(0.0) * lambda[j].max(0.0)).sqrt();
-    let mut b = &transposed * columns(&mx);
-    let bent = &transposed * columns(&second);
-    for i in 0..count {
-        for j in 0..count {
-            b[(i, j)] += mean(i, j) * bent[(i, j)];
-        }
-    }
-    let (found, v) = ritz(&a, &b)?;
-    // how much of mode i is in reference mode k
-    let lengths: Vec<f64> = shapes.iter().zip(&plain).map(|(y, m)| dot(y, m)).collect();
-    let common = columns(&plain).transpose() * columns(&x) * &v;
-    let own = v.transpose() * (&transposed * columns(&mx)) * &v;
-    let alike = DMatrix::from_fn(count, count, |i, k| (common[(i, k)].powi(2) / (lengths[i] * own[(k, k)])).min(1.0));
-    let pairs = mac::pair(&alike);
-    let reference: Vec<f64> = pairs.iter().map(|k| k.map_or(f64::NAN, |k| found[k])).collect();
-    // equal frequencies share their shapes
-    let near = |k: usize, r: f64| (found[k] - r).abs() <= NEAR * r.abs();
-    let sum = |(i, r): (usize, &f64)| (0..count).filter(|&k| near(k, *r)).map(|k| alike[(i, k)]).sum::<f64>().min(1.0);
-    let likeness = reference.iter().enumerate().map(sum).collect();
-    Some(Compared { reference, likeness, x, norms })
-}
-
-fn dot(a: &[Pose], b: &[Pose]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a.dot(b)).sum()
 }
 
 /// Errors against a cubic frame on the same mesh, about the drawn geometry.

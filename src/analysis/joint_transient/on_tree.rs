@@ -1,0 +1,82 @@
+//! Motion in joint coordinates whose loops close by springs: one factorization a step, no constraint and no singular
+//! configuration.
+
+use super::super::formulation::Formulation;
+use super::super::transient::first_step::first_step;
+use super::super::transient::options::TransientOptions;
+use super::super::transient::record::{Carrier, record};
+use super::super::transient::result::TransientResult;
+use super::super::{AnalysisError, Watch};
+use super::report::JointReport;
+use crate::compile::Compiled;
+use crate::equations::Joints;
+use crate::gaps::{Ramp, System};
+use crate::solve::baseline::SolverKind;
+use crate::solve::time::adaptive::{Adaptive, Advance, Observer};
+use crate::solve::time::joint_rodas4::JointRodas4;
+use crate::solve::time::method::{Motion, Work};
+use std::sync::Arc;
+
+/// Loops closed by springs: one factorization a step, no constraint and no singular configuration.
+pub(super) fn on_tree(
+    compiled: &Compiled,
+    formulation: Formulation,
+    options: &TransientOptions<'_>,
+    sample: &mut dyn FnMut(f64, &[f64]),
+    watch: Watch<'_>,
+) -> Result<(TransientResult, JointReport), AnalysisError> {
+    let system = &compiled.parts.system;
+    let joints = match &compiled.joints {
+        Some(joints) => joints.clone(),
+        None => Joints::elastic(system).map(Arc::new),
+    };
+    let joints = joints.map_err(|unfit| AnalysisError::BadRequest {
+        what: format!("formulation {}", formulation.name()),
+        detail: unfit.to_string(),
+    })?;
+    let counts = system.model.counts();
+    let mut result = record(compiled, options, &mut OnTree { system, joints: &joints, options }, sample, watch)?;
+    result.unknowns = joints.tree.coordinates;
+    let report = JointReport {
+        coordinates: joints.tree.coordinates,
+        constraints: 0,
+        coordinates_uncut: counts.coordinates,
+        constraints_uncut: counts.constraints,
+        accelerations: result.counters.forces,
+        singular_evaluations: 0,
+        largest_gap_m: 0.0,
+        highest_frequency_hz: None,
+    };
+    Ok((result, report))
+}
+
+/// Joint coordinates whose loops close by springs.
+struct OnTree<'a> {
+    system: &'a System,
+    joints: &'a Arc<Joints>,
+    options: &'a TransientOptions<'a>,
+}
+
+impl Carrier for OnTree<'_> {
+    fn advance(
+        &mut self,
+        ramp: &Ramp<'_>,
+        motion: &mut Motion,
+        observe: Observer<'_>,
+    ) -> Result<(Advance, Work), AnalysisError> {
+        let options = self.options;
+        if options.solver != SolverKind::Recursion {
+            return Err(AnalysisError::BadRequest {
+                what: "solver".into(),
+                detail: format!(
+                    "joint coordinates have the recursion only; the {} solver cannot",
+                    options.solver.name()
+                ),
+            });
+        }
+        let mut h = first_step(self.system, options.stop);
+        let mut stepper = Adaptive::new(self.system, JointRodas4::new(Arc::clone(self.joints), h, &[]));
+        let end = stepper.advance(self.system, ramp, motion, &mut h, options.control(), usize::MAX, observe)?;
+        Ok((end, stepper.work()))
+    }
+}

@@ -1,0 +1,96 @@
+//! Crossings of levels within the steps of a run: those asked for, and the contact of every gap that has one.
+
+use super::super::AnalysisError;
+use super::super::signal::{Signal, View};
+use super::options::TransientOptions;
+use super::result::Event;
+use crate::compile::Compiled;
+use crate::gaps::Ramp;
+use crate::solve::dense::interpolate;
+use crate::solve::time::event::Detector;
+use crate::solve::time::method::Motion;
+
+/// A signal whose crossings of a level are found.
+struct Watched {
+    name: String,
+    signal: Signal,
+    level: f64,
+    contact: bool,
+    detector: Detector,
+}
+
+/// The crossings asked for, and the contact of every gap that has one.
+fn watched(compiled: &Compiled, options: &TransientOptions<'_>) -> Result<Vec<Watched>, AnalysisError> {
+    let watch =
+        |name: String, signal, level, contact| Watched { name, signal, level, contact, detector: Detector::default() };
+    let asked = options
+        .events
+        .iter()
+        .map(|(name, level)| Signal::find(compiled, name).map(|signal| watch(name.clone(), signal, *level, false)));
+    let system = &compiled.parts.system;
+    let touching =
+        (0..system.gaps.len()).filter_map(|g| system.touching(g).map(|[touch, _]| (g, touch))).map(|(g, touch)| {
+            let name = format!("{}.gap", compiled.parts.gap_names[g]);
+            Ok(watch(name, Signal::Distance(g), touch, true))
+        });
+    asked.chain(touching).collect()
+}
+
+/// Finds the crossings of a run.
+pub(super) struct Crossings<'a> {
+    compiled: &'a Compiled,
+    ramp: &'a Ramp<'a>,
+    volts: &'a [f64],
+    watched: Vec<Watched>,
+    within: Motion,
+    rise: Vec<f64>,
+    /// What was found, in order of time.
+    pub(super) events: Vec<Event>,
+}
+
+impl<'a> Crossings<'a> {
+    /// From the motion at the start, where the heaters are `rise` warmer [K].
+    ///
+    /// # Errors
+    /// See [`AnalysisError`].
+    pub(super) fn start(
+        (compiled, options): (&'a Compiled, &'a TransientOptions<'a>),
+        (ramp, volts): (&'a Ramp<'a>, &'a [f64]),
+        (motion, rise): (&Motion, &[f64]),
+    ) -> Result<Self, AnalysisError> {
+        let mut watched = watched(compiled, options)?;
+        for w in &mut watched {
+            let view = View { q: &motion.q, v: &motion.v, rise, volts };
+            w.detector = Detector::new(w.signal.value(compiled, &view) - w.level);
+        }
+        let within = Motion::zeros(compiled.parts.system.bodies());
+        Ok(Self { compiled, ramp, volts, watched, within, rise: rise.to_vec(), events: Vec::new() })
+    }
+
+    /// Finds the crossings in a step of length `h` from time `s`.
+    pub(super) fn step(&mut self, s: f64, h: f64, before: &Motion, after: &Motion) {
+        let (compiled, ramp, volts) = (self.compiled, self.ramp, self.volts);
+        let first = self.events.len();
+        for w in &mut self.watched {
+            let value = |x: f64| {
+                interpolate(before, after, h, x, &mut self.within);
+                for (k, r) in self.rise.iter_mut().enumerate() {
+                    *r = ramp.rise_at(k, s + x * h);
+                }
+                let view = View { q: &self.within.q, v: &self.within.v, rise: &self.rise, volts };
+                w.signal.value(compiled, &view) - w.level
+            };
+            w.detector.step(value, |x, direction| {
+                crate::budget::lay_out(size_of::<Event>() + w.name.len());
+                self.events.push(Event {
+                    signal: w.name.clone(),
+                    level: w.level,
+                    t: s + x * h,
+                    direction,
+                    contact: w.contact,
+                });
+            });
+        }
+        self.events[first..].sort_by(|a, b| a.t.total_cmp(&b.t));
+    }
+}

@@ -1,0 +1,126 @@
+//! A run from its start to its end, and what is taken of it on the way: samples, crossings, and looks at its stability.
+
+use super::super::contact_range::within_contact_range;
+use super::super::signal::Signal;
+use super::super::stability::Stability;
+use super::super::statics::{operating_point, source_vector};
+use super::super::{AnalysisError, Watch};
+use super::crossings::Crossings;
+use super::options::{TransientOptions, check};
+use super::result::{Counters, TransientResult};
+use super::samples::Samples;
+use crate::compile::Compiled;
+use crate::gaps::Ramp;
+use crate::solve::time::adaptive::{Advance, Observer};
+use crate::solve::time::method::{Motion, Work};
+
+/// Times of a run at which its stability is looked at, the end included.
+pub(in crate::analysis) const LOOKS: usize = 16;
+
+/// What carries a motion from the start of a ramp to its end.
+pub(in crate::analysis) trait Carrier {
+    /// Takes the start to where the formulation can go on from.
+    ///
+    /// # Errors
+    /// See [`AnalysisError`].
+    fn begin(&mut self, ramp: &Ramp<'_>, motion: &mut Motion) -> Result<(), AnalysisError> {
+        let _ = (ramp, motion);
+        Ok(())
+    }
+
+    /// Advances it; `observe` sees each step.
+    ///
+    /// # Errors
+    /// See [`AnalysisError`].
+    fn advance(
+        &mut self,
+        ramp: &Ramp<'_>,
+        motion: &mut Motion,
+        observe: Observer<'_>,
+    ) -> Result<(Advance, Work), AnalysisError>;
+}
+
+/// Lets `carrier` go from the start to the end of a run, and takes samples and events on the way.
+pub(in crate::analysis) fn record(
+    compiled: &Compiled,
+    options: &TransientOptions<'_>,
+    carrier: &mut impl Carrier,
+    sample: &mut dyn FnMut(f64, &[f64]),
+    watch: Watch<'_>,
+) -> Result<TransientResult, AnalysisError> {
+    check(options)?;
+    let system = &compiled.parts.system;
+    let signals: Vec<Signal> =
+        options.signals.iter().map(|name| Signal::find(compiled, name)).collect::<Result<_, _>>()?;
+    let sources = source_vector(compiled, &options.voltages)?;
+    let (mut motion, rise) = start(compiled, options)?;
+    let ramp = Ramp::new(&system.electrics, &sources, &sources, &rise, options.stop);
+    let mut drive = system.electrics.drive();
+    ramp.at(0.0, &mut drive);
+    let volts = drive.volts.clone();
+    carrier.begin(&ramp, &mut motion)?;
+
+    let (asked, held) = ((compiled, options), (&ramp, &volts[..]));
+    let mut crossings = Crossings::start(asked, held, (&motion, &rise))?;
+    let mut samples = Samples::start(asked, held, &signals, sample, &motion);
+    let mut stability = Stability::new(system);
+    let mut looks = 0;
+    let mut beyond = None;
+    let mut observe = |s: f64, h: f64, before: &Motion, after: &Motion| {
+        if let Err(error) = within_contact_range(compiled, &after.q) {
+            beyond = Some(error);
+            return false;
+        }
+        samples.step(s, h, before, after);
+        crossings.step(s, h, before, after);
+        let done = ((s + h) / options.stop * LOOKS as f64 * (1.0 + 1e-12)) as usize;
+        if done > looks {
+            looks = done;
+            ramp.at(s + h, &mut drive);
+            stability.look(system, &drive, s + h, (&after.q, &after.v));
+        }
+        watch(((s + h) / options.stop).min(1.0))
+    };
+    let (end, work) = carrier.advance(&ramp, &mut motion, &mut observe)?;
+    if end == Advance::Stopped {
+        return Err(beyond.unwrap_or(AnalysisError::Cancelled));
+    }
+    let named = options.signals.iter().zip(&signals).zip(samples.columns);
+    Ok(TransientResult {
+        t: samples.t,
+        signals: named.map(|((name, s), values)| (name.clone(), s.unit().to_owned(), values)).collect(),
+        counters: Counters {
+            steps: work.steps,
+            rejected: work.rejected,
+            factorizations: work.factorizations,
+            solves: work.solves,
+            forces: work.forces,
+            iterations: work.iterations,
+        },
+        unknowns: compiled.unknowns(),
+        estimated_error: compiled.order.estimated_error,
+        step_error: None,
+        events: crossings.events,
+        warnings: stability.told().into_iter().collect(),
+    })
+}
+
+/// Where a run begins, and how much warmer its heaters are there [K]: at rest as drawn, or in the equilibrium of what is
+/// released.
+fn start(compiled: &Compiled, options: &TransientOptions<'_>) -> Result<(Motion, Vec<f64>), AnalysisError> {
+    let system = &compiled.parts.system;
+    let mut motion = Motion::zeros(system.bodies());
+    let mut rise = vec![0.0; system.electrics.heating.heaters.len()];
+    if let Some(start) = options.release {
+        let point = operating_point(start, &options.voltages)?;
+        if point.q.len() != motion.q.len() {
+            return Err(AnalysisError::BadRequest {
+                what: "release".into(),
+                detail: "the released parameter changes the mechanism itself; release a load or a voltage".into(),
+            });
+        }
+        motion.q.copy_from_slice(&point.q);
+        rise.copy_from_slice(&point.rise);
+    }
+    Ok((motion, rise))
+}

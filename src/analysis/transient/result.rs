@@ -1,0 +1,58 @@
+//! What a transient gives: sampled signals, crossings of levels, and the work that it took.
+
+use crate::solve::time::event::Direction;
+use serde::Serialize;
+
+/// Work done by an integration.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub struct Counters {
+    /// Accepted steps.
+    pub steps: u64,
+    /// Rejected steps.
+    pub rejected: u64,
+    /// Factorizations.
+    pub factorizations: u64,
+    /// Solves with a factor.
+    pub solves: u64,
+    /// Evaluations of the forces, with or without their tangent.
+    pub forces: u64,
+    /// Newton iterations.
+    pub iterations: u64,
+}
+
+/// A signal that crossed a level.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Event {
+    /// Name of the signal; of a gap that closes or opens, its `GAP.gap`.
+    pub signal: String,
+    /// The level, in the signal's unit.
+    pub level: f64,
+    /// When [s].
+    pub t: f64,
+    /// Which way.
+    pub direction: Direction,
+    /// True where the contact force of a gap begins (down) or ends (up) to act.
+    pub contact: bool,
+}
+
+/// Sampled signals.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct TransientResult {
+    /// Times [s].
+    pub t: Vec<f64>,
+    /// Samples of each signal, in the order asked for: (name, unit, values).
+    pub signals: Vec<(String, String, Vec<f64>)>,
+    /// Work done.
+    pub counters: Counters,
+    /// Mechanical unknowns.
+    pub unknowns: usize,
+    /// Largest estimated relative error by the mesh [1]; none without an estimate.
+    pub estimated_error: Option<f64>,
+    /// How far the steps in time may be off by the end, of the amplitude [1]; none where they are not compared, see
+    /// [`super::step_error`].
+    pub step_error: Option<f64>,
+    /// Crossings asked for and contacts of gaps, in order of time.
+    pub events: Vec<Event>,
+    /// What the numbers do not say by themselves.
+    pub warnings: Vec<String>,
+}

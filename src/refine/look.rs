@@ -1,0 +1,120 @@
+//! One mesh looked at: the modes of its model within the band, and their estimated errors.
+//!
+//! Each look starts the iteration of the modes from the shapes of the mesh looked at before, carried over.
+
+use super::aim::Aim;
+use super::carry::carried;
+use super::order_error::{OrderError, of_modes};
+use crate::discretize::{DiscretizeError, Discretized, discretize_with};
+use crate::multibody::BlockMatrix;
+use crate::multibody::planar::Pose;
+use crate::options::CompileOptions;
+use crate::solve::subspace;
+use crate::structure::Structure;
+
+/// Modes within the band beyond which the rule of [`order`] stands as it is.
+const MOST_MODES: usize = 64;
+
+/// A model that was computed.
+pub(super) struct Seen {
+    pub(super) parts: Discretized,
+    pub(super) lambda: Vec<f64>,
+    pub(super) shapes: Vec<Vec<Pose>>,
+    pub(super) modes: usize,
+    pub(super) error: Option<OrderError>,
+}
+
+/// The drawing without what has no share in the modes of the drawn geometry.
+pub(super) fn mechanics(structure: &Structure) -> Structure {
+    let mut bare = Structure {
+        nodes: structure.nodes.clone(),
+        beams: structure.beams.clone(),
+        masses: structure.masses.clone(),
+        links: structure.links.clone(),
+        supports: structure.supports.clone(),
+        springs: structure.springs.clone(),
+        ..Structure::default()
+    };
+    for beam in &mut bare.beams {
+        beam.heater = None;
+        beam.temperature = None;
+        beam.material.stress = 0.0;
+    }
+    bare
+}
+
+/// Modes within the band and their errors; starts from the shapes of a model with other segments.
+pub(super) fn look(
+    structure: &Structure,
+    options: &CompileOptions,
+    aim: &Aim,
+    segments: &[usize],
+    before: Option<&Seen>,
+) -> Result<Seen, DiscretizeError> {
+    let parts = discretize_with(structure, options, segments)?;
+    let (modes, lambda, shapes, error) = modes_in_band(structure, options, aim, &parts, before).unwrap_or_default();
+    Ok(Seen { parts, lambda, shapes, modes, error })
+}
+
+type Found = (usize, Vec<f64>, Vec<Vec<Pose>>, Option<OrderError>);
+
+fn modes_in_band(
+    structure: &Structure,
+    options: &CompileOptions,
+    aim: &Aim,
+    parts: &Discretized,
+    before: Option<&Seen>,
+) -> Option<Found> {
+    let (system, model) = (&parts.system, &parts.system.model);
+    let n = system.bodies();
+    let mut k = BlockMatrix::new(&model.pattern);
+    let (rest, mut residual) = (vec![Pose::zeros(); n], vec![Pose::zeros(); n]);
+    system.tangent(&rest, &system.electrics.drive(), &mut k, &mut residual);
+    let shifted = |sigma: f64| {
+        let mut a = k.clone();
+        for (j, block) in a.diagonal.iter_mut().enumerate() {
+            for i in 0..3 {
+                block[(i, i)] -= sigma * model.mass(j)[i];
+            }
+        }
+        model.project_matrix(&mut a);
+        a
+    };
+    let edge = (std::f64::consts::TAU * aim.band).powi(2);
+    let modes = shifted(edge).factor(&model.pattern).ok()?.negative;
+    if modes == 0 || modes > MOST_MODES {
+        return None;
+    }
+    let mut shift = 0.0;
+    let mut factor = shifted(shift);
+    if factor.factor(&model.pattern).is_err() {
+        shift = -1e-3 * edge;
+        factor = shifted(shift);
+        factor.factor(&model.pattern).ok()?;
+    }
+    let massive: usize = (0..n).map(|j| model.mass(j).iter().filter(|m| **m > 0.0).count()).sum();
+    let block = (modes + (4 + modes / 2).min(12)).min(massive);
+    let fresh = subspace::start(n, block, system.length_scale);
+    let start = match before {
+        Some(before) if before.shapes.len() >= modes => {
+            let mut start: Vec<Vec<Pose>> =
+                (before.shapes.iter().take(block)).map(|x| carried(structure, &before.parts, parts, x, true)).collect();
+            start.extend(fresh.into_iter().skip(start.len()));
+            start
+        }
+        _ => fresh,
+    };
+    // far below the errors that are to be told, which are twice as large in λ
+    let tightest = (0..modes).map(|m| aim.tolerance(options, m)).fold(options.tol, f64::min);
+    let settled = (0.05 * tightest).clamp(1e-9, 1e-3);
+    let found = subspace::iterate(model, (&factor, shift), start, modes, settled)?;
+    // two more than wanted: the highest wanted one is told from its neighbours
+    let some = (modes + 2).min(found.lambda.len());
+    let rigid = parts.beams.iter().any(|points| points.len() == 2 && points[0].body == points[1].body);
+    let error = if rigid {
+        None // compared with the elastic model instead
+    } else {
+        of_modes(structure, options, parts, (&factor, shift), &found.lambda[..some], &found.shapes[..some])
+    };
+    Some((modes, found.lambda, found.shapes, error))
+}

@@ -1,0 +1,145 @@
+//! **Rigid beams.** Beams whose strain does not matter become rigid: those whose share of the strain energy of every mode
+//! in the band predicts less than is left of the tolerance (half of it, as a relative rise of the frequency). This too is
+//! computed: the frequencies with rigid beams are compared with what the elastic model said those of the beams are, and the
+//! compliance wherever a load, an electrode or heat acts with that of the elastic model, both within the tolerance. Beams
+//! that touch ground, that are heated or under stress, and electrodes of facing beams stay elastic, as they may matter where
+//! nothing rings.
+
+use super::aim::{Aim, ModelOrder};
+use super::groups::{Groups, MARGIN};
+use super::look::{Seen, look};
+use super::order_error::{relative, strain_shares};
+use crate::discretize::{DiscretizeError, Discretized, discretize_with};
+use crate::gaps::Point;
+use crate::multibody::planar::Pose;
+use crate::multibody::{BlockMatrix, BodyId};
+use crate::options::CompileOptions;
+use crate::structure::{NodeId, Structure};
+
+/// Makes beams rigid where the tolerance allows.
+pub(super) fn stiffen(
+    structure: &Structure,
+    bare: &Structure,
+    options: &CompileOptions,
+    aim: &Aim,
+    groups: &Groups,
+    elastic: &Seen,
+    order: &mut ModelOrder,
+) -> Result<(), DiscretizeError> {
+    let Some(error) = &elastic.error else { return Ok(()) };
+    let modes = elastic.modes;
+    let shares = strain_shares(bare, options, &elastic.parts, &elastic.lambda[..modes], &elastic.shapes[..modes]);
+    let grounded = |node: NodeId| elastic.parts.nodes[node.0].is_some_and(|p| p.body == BodyId::Ground);
+    let electrodes: Vec<(NodeId, NodeId)> =
+        structure.beam_gaps.iter().flat_map(|g| [(g.nodes[0], g.nodes[1]), (g.nodes[2], g.nodes[3])]).collect();
+    let plain = |b: &usize| {
+        let beam = &structure.beams[*b];
+        let strained = beam.heater.is_some() || beam.temperature.is_some() || beam.material.stress != 0.0;
+        let electrode = electrodes.contains(&(beam.a, beam.b)) || electrodes.contains(&(beam.b, beam.a));
+        !strained && !electrode && !grounded(beam.a) && !grounded(beam.b)
+    };
+    let rise = |mode: usize, g: &[usize]| 0.5 * g.iter().map(|&b| shares[mode][b]).sum::<f64>();
+    let worst = |g: &[usize]| (0..modes).map(|m| rise(m, g)).fold(0.0, f64::max);
+    let mut candidates: Vec<&Vec<usize>> = groups.0.iter().filter(|g| g.iter().all(plain)).collect();
+    candidates.sort_by(|a, b| worst(a).total_cmp(&worst(b)));
+    let mut sums: Vec<f64> = error.relative[..modes].to_vec();
+    let mut chosen: Vec<&Vec<usize>> = Vec::new();
+    for group in candidates {
+        let next: Vec<f64> = sums.iter().enumerate().map(|(m, sum)| sum + rise(m, group)).collect();
+        if next.iter().any(|e| e.abs() > MARGIN * options.tol) {
+            break;
+        }
+        sums = next;
+        chosen.push(group);
+    }
+    let acted = acted_on(structure);
+    let touched = |g: &Vec<usize>| {
+        g.iter().any(|&b| [structure.beams[b].a, structure.beams[b].b].iter().any(|n| acted.contains(n)))
+    };
+    let Some(yields) = compliances(structure, &acted, &elastic.parts) else { return Ok(()) };
+    while !chosen.is_empty() {
+        let mut segments = order.segments.clone();
+        for group in &chosen {
+            for &beam in *group {
+                segments[beam] = 0;
+            }
+        }
+        let stiff = discretize_with(bare, options, &segments)?;
+        let still = compliances(structure, &acted, &stiff).unwrap_or_default();
+        let firm = still.len() == yields.len()
+            && still.iter().zip(&yields).all(|(rigid, elastic)| (rigid - elastic).abs() <= options.tol * elastic);
+        if firm {
+            let now = look(bare, options, aim, &segments, Some(elastic))?;
+            order.passes += 1;
+            let apart = relative(&now.lambda, &error.reference);
+            let worst = apart.iter().take(modes).fold(0.0, |m: f64, e| m.max(e.abs()));
+            if now.lambda.len() >= modes && worst <= options.tol {
+                (order.segments, order.estimated_error) = (segments, Some(worst));
+                break;
+            }
+        }
+        let count = chosen.len();
+        chosen.retain(|g| firm || !touched(g));
+        if chosen.len() == count {
+            chosen.truncate(count / 2);
+        }
+    }
+    Ok(())
+}
+
+/// Nodes at which loads and electrodes act.
+fn acted_on(structure: &Structure) -> Vec<NodeId> {
+    let mut nodes: Vec<NodeId> = structure.loads.iter().map(|load| load.node).collect();
+    nodes.extend(structure.combs.iter().flat_map(|c| [c.a, c.b]));
+    nodes.extend(structure.plate_gaps.iter().flat_map(|g| [g.a, g.b]));
+    nodes.extend(structure.beam_gaps.iter().flat_map(|g| g.nodes));
+    nodes.extend(structure.stops.iter().flat_map(|s| [Some(s.a), s.b]).flatten());
+    nodes.sort_unstable();
+    nodes.dedup();
+    nodes
+}
+
+/// How far the drawn structure gives way where it is acted on: fᵀK⁻¹f for a unit force or moment in each direction at each
+/// of these nodes, and for a unit tension in each beam that heat or stress lengthens. Empty where nothing acts; none where
+/// something does on a structure that floats.
+fn compliances(structure: &Structure, acted: &[NodeId], parts: &Discretized) -> Option<Vec<f64>> {
+    let (system, model) = (&parts.system, &parts.system.model);
+    let n = system.bodies();
+    let mut forces: Vec<Vec<Pose>> = Vec::new();
+    let push = |f: &mut [Pose], p: &Point, x: f64, y: f64, moment: f64| {
+        if let BodyId::Free(k) = p.body {
+            f[k] += Pose::new(x, y, moment + p.arm.x * y - p.arm.y * x);
+        }
+    };
+    for point in acted.iter().filter_map(|node| parts.nodes[node.0]) {
+        for (x, y, moment) in [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)] {
+            let mut f = vec![Pose::zeros(); n];
+            push(&mut f, &point, x, y, moment);
+            forces.push(f);
+        }
+    }
+    for (beam, points) in structure.beams.iter().zip(&parts.beams) {
+        if beam.heater.is_some() || beam.temperature.is_some() || beam.material.stress != 0.0 {
+            let (y, x) = beam.angle.sin_cos();
+            let mut f = vec![Pose::zeros(); n];
+            push(&mut f, &points[0], -x, -y, 0.0);
+            push(&mut f, &points[points.len() - 1], x, y, 0.0);
+            forces.push(f);
+        }
+    }
+    if forces.is_empty() {
+        return Some(Vec::new());
+    }
+    let mut k = BlockMatrix::new(&model.pattern);
+    let (rest, mut residual) = (vec![Pose::zeros(); n], vec![Pose::zeros(); n]);
+    system.tangent(&rest, &system.electrics.drive(), &mut k, &mut residual);
+    model.project_matrix(&mut k);
+    k.factor(&model.pattern).ok()?;
+    let compliance = |mut f: Vec<Pose>| {
+        model.project(&mut f);
+        let mut u = f.clone();
+        k.solve(&model.pattern, &mut u);
+        f.iter().zip(&u).map(|(f, u)| f.dot(u)).sum::<f64>()
+    };
+    Some(forces.into_iter().map(compliance).collect())
+}

@@ -1,0 +1,111 @@
+//! A beam over the points of what is cut of it, with the matrices of its segments along and across the beam.
+//!
+//! Directions along and across a beam are those of the drawing, also about an equilibrium: right as long as beams turn by
+//! small angles.
+
+use crate::discretize::beam::bar;
+use crate::discretize::cubic;
+use crate::discretize::scheme::{Bar, Part};
+use crate::gaps::Point;
+use crate::multibody::BodyId;
+use crate::multibody::planar::Pose;
+use crate::options::CompileOptions;
+use crate::structure::Structure;
+use nalgebra::{Matrix6, Vector2, Vector3, Vector6};
+
+/// A beam over the points of what is cut of it: between the edges of junctions, where there are any.
+pub(super) struct Span {
+    pub(super) points: Vec<Point>,
+    pub(super) length: f64,
+    pub(super) along: Vector2<f64>,
+    /// Consistent mass of a segment, or zero where another matrix has it.
+    pub(super) mass: Matrix6<f64>,
+    /// M₂ of a segment.
+    pub(super) second: Matrix6<f64>,
+    /// N²·B of a segment.
+    pub(super) softer: Matrix6<f64>,
+    /// Lumps of the model at the points.
+    pub(super) lumps: Vec<Part>,
+}
+
+impl Span {
+    /// Motion of the points along and across the beam.
+    pub(super) fn local(&self, x: &[Pose]) -> Vec<Vector3<f64>> {
+        let at = |p: &Point| match p.body {
+            BodyId::Ground => Vector3::zeros(),
+            BodyId::Free(k) => {
+                let (dx, dy) = (x[k].x - x[k].z * p.arm.y, x[k].y + x[k].z * p.arm.x);
+                Vector3::new(dx * self.along.x + dy * self.along.y, dy * self.along.x - dx * self.along.y, x[k].z)
+            }
+        };
+        self.points.iter().map(at).collect()
+    }
+
+    /// (M_r − M)·x of this beam, over its points, N·A included.
+    pub(super) fn defect(&self, x: &[Vector3<f64>], lambda: f64) -> Vec<Vector3<f64>> {
+        let mut f = self.segments(x, &(self.mass + self.second * lambda));
+        for ((f, x), lump) in f.iter_mut().zip(x).zip(&self.lumps) {
+            f.x -= lump.mass * x.x;
+            f.y -= lump.mass * x.y + lump.first * x.z;
+            f.z -= lump.first * x.y + lump.second * x.z;
+        }
+        f
+    }
+
+    /// Takes the axial force of the beam into account.
+    pub(super) fn tighten(&mut self, bar: &Bar, force: f64) {
+        let (cross, twice) = cubic::second_tension(bar, self.length / (self.points.len() - 1) as f64, force);
+        self.mass += cross;
+        self.softer = twice;
+    }
+
+    /// The same matrix for every segment, times x.
+    pub(super) fn segments(&self, x: &[Vector3<f64>], segment: &Matrix6<f64>) -> Vec<Vector3<f64>> {
+        let mut f = vec![Vector3::zeros(); x.len()];
+        for k in 0..x.len() - 1 {
+            let (a, b) = (x[k], x[k + 1]);
+            let both = segment * Vector6::new(a.x, a.y, a.z, b.x, b.y, b.z);
+            f[k] += both.fixed_rows::<3>(0);
+            f[k + 1] += both.fixed_rows::<3>(3);
+        }
+        f
+    }
+
+    /// Adds forces at the points to those on the bodies.
+    pub(super) fn scatter(&self, f: &[Vector3<f64>], out: &mut [Pose]) {
+        for (p, f) in self.points.iter().zip(f) {
+            if let BodyId::Free(k) = p.body {
+                let (fx, fy) = (f.x * self.along.x - f.y * self.along.y, f.x * self.along.y + f.y * self.along.x);
+                out[k] += Pose::new(fx, fy, f.z + p.arm.x * fy - p.arm.y * fx);
+            }
+        }
+    }
+}
+
+/// Every beam over its `points`, less the offsets at both ends.
+pub(super) fn spans(
+    structure: &Structure,
+    options: &CompileOptions,
+    (beams, offsets): (&[Vec<Point>], &[[f64; 2]]),
+    lumped: bool,
+) -> Vec<Span> {
+    let span = |((beam, points), [first, last]): ((&crate::structure::Beam, &Vec<Point>), &[f64; 2])| {
+        let n = points.len() - 1;
+        let bar = Bar { length: beam.length - first - last, ..bar(beam, options.shear, options.rotary_inertia) };
+        let h = bar.length / n as f64;
+        let along = Vector2::new(beam.angle.cos(), beam.angle.sin());
+        let mut points = points.clone();
+        points[0] = points[0].beyond(along * *first);
+        points[n] = points[n].beyond(along * -*last);
+        Span {
+            points,
+            length: bar.length,
+            along,
+            mass: if lumped { cubic::mass(&bar, h) } else { Matrix6::zeros() },
+            second: cubic::second_mass(&bar, h),
+            softer: Matrix6::zeros(),
+            lumps: if lumped { options.scheme.cut(&bar, n, false).parts } else { Vec::new() },
+        }
+    };
+    structure.beams.iter().zip(beams).zip(offsets).map(span).collect()
+}
