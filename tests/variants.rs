@@ -328,3 +328,24 @@ fn rows_tell_what_the_commands_tell() {
     let table = swept(&pulled, &["n=1,2"], closing, &CompileOptions::default(), Shard::default());
     assert!(table.rows.iter().all(|row| row.warning.contains("W042: ")), "{:?}", table.rows);
 }
+
+/// Rows of transients tell how far the steps may be off in the middle of the grid, where that is beyond the tolerance: a part let go far
+/// that exchanges energy between its modes for milliseconds, and not one that has only begun to move.
+#[test]
+fn rows_tell_how_far_their_steps_are_off() {
+    let text = BEAMS;
+    let outputs = vec!["t.y".to_owned()];
+    let options = CompileOptions { segments: Some(3), undamped: true, tol: 1e-2, ..CompileOptions::default() };
+    let run = |stop: f64| {
+        let transients = SweepAnalysis::Transient { stop, outputs: outputs.clone(), voltages: Vec::new() };
+        swept(text, &["F=50u,100u,200u"], transients, &options, Shard::default())
+    };
+    let told = |table: &SweepTable| -> Vec<bool> {
+        table.rows.iter().map(|row| row.warning.contains("the steps in time may be off by")).collect()
+    };
+    let long = run(2e-3);
+    assert_eq!(told(&long), [true; 3], "{:?}", long.rows);
+    assert!(long.rows[0].warning.contains("in the middle of the grid"));
+    let short = run(2e-6);
+    assert_eq!(told(&short), [false; 3], "{:?}", short.rows);
+}

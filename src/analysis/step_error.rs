@@ -9,7 +9,7 @@
 //! is continued in proportion to time, as phases go.
 
 use super::chart::error::relative_error_above;
-use super::transient::{TransientOptions, TransientResult};
+use super::transient::{TransientOptions, TransientResult, transient};
 use super::{AnalysisError, Watch};
 use crate::compile::Compiled;
 
@@ -62,9 +62,7 @@ pub fn with_step_error<T>(
     let share = ((reached - 1) * stride(options)) as f64 / (options.points - 1) as f64;
     let error = if share < 1.0 { SHARE * apart / share } else { SHARE * apart };
     result.step_error = Some(error);
-    if error > options.tol {
-        result.warnings.push(told(options, error));
-    }
+    result.warnings.extend(beyond(options, error, "by the end of the run"));
     Ok((result, more))
 }
 
@@ -158,10 +156,22 @@ impl Picked {
     }
 }
 
-fn told(options: &TransientOptions<'_>, error: f64) -> String {
+/// The estimate alone, for one of several runs that are alike: at `points` output times. None where nothing was compared.
+pub(crate) fn step_error(options: &TransientOptions<'_>, model: &Compiled, watch: Watch<'_>) -> Option<f64> {
+    let mut run = |options: &TransientOptions<'_>, sample: &mut dyn FnMut(f64, &[f64]), watch: Watch<'_>| {
+        Ok((transient(model, options, sample, watch)?, ()))
+    };
+    with_step_error(options, model, &mut run, &mut |_, _| (), watch).ok()?.0.step_error
+}
+
+/// What to say of steps whose estimate is beyond the tolerance; `place` says where it was made.
+pub(crate) fn beyond(options: &TransientOptions<'_>, error: f64, place: &str) -> Option<String> {
+    if error <= options.tol {
+        return None;
+    }
     let way = if options.step.is_some() { "take a shorter --step" } else { "take a smaller --tol" };
-    format!(
-        "the steps in time may be off by {error:.1e} of the amplitude by the end of the run, more than the tolerance {:e}; {way}",
+    Some(format!(
+        "the steps in time may be off by {error:.1e} of the amplitude {place}, more than the tolerance {:e}; {way}",
         options.tol
-    )
+    ))
 }

@@ -3,6 +3,9 @@
 //! To find the mesh of a transient costs more than to run it. So meshes are found at the corners of the grid and in its middle
 //! (`probes`); all points take what is the finest of them beam by beam, and are told the largest of their estimates. A
 //! point whose drawing has other beams finds its own.
+//!
+//! How far the steps may be off is estimated in the middle of the grid, at the cost of some two runs, and told at every point where it is
+//! beyond the tolerance.
 
 use super::family::{alike, middle};
 use super::point::{Found, Outcome, Value, at, brief};
@@ -11,6 +14,7 @@ use crate::analysis::AnalysisError;
 use crate::analysis::mesh;
 use crate::analysis::side_by_side::{self, RunEnd};
 use crate::analysis::signal::Signal;
+use crate::analysis::step_error;
 use crate::analysis::transient::{TransientOptions, transient};
 use crate::budget::{self, Budget};
 use crate::compile::{CompileOptions, Compiled, draw};
@@ -25,10 +29,22 @@ pub(super) const CHUNK: usize = 64;
 /// Axes whose corners are all looked at; of more, the ends of each with the others in the middle.
 const MOST_CORNERS: usize = 3;
 
+/// Output times of the run by which the steps are judged.
+const JUDGED: usize = 201;
+
 /// The mesh of a sweep.
 struct Shared {
     beams: Vec<Beam>,
     order: ModelOrder,
+    /// How far the steps may be off in the middle of the grid, as a share of the amplitude; none: not compared.
+    step_error: Option<f64>,
+}
+
+/// A point on its mesh.
+struct Prepared {
+    compiled: Compiled,
+    /// How far its steps may be off, and where that was found.
+    step_error: Option<(f64, &'static str)>,
 }
 
 /// What all points have in common.
@@ -53,10 +69,11 @@ impl<'a> Transients<'a> {
     ) -> Option<Vec<Outcome>> {
         let options = self.transient();
         let within = |job: &mut dyn FnMut() -> Result<Found, String>| guarded(budget, job);
-        let prepared: Vec<Result<Compiled, String>> =
-            numbers.iter().map(|&number| guarded(budget, &mut || self.prepare(&self.spec.settings(number)))).collect();
+        let go_on = || finished(None);
+        let prepare = |&number: &usize| guarded(budget, &mut || self.prepare(&self.spec.settings(number), &go_on));
+        let prepared: Vec<Result<Prepared, String>> = numbers.iter().map(prepare).collect();
         let variants: Vec<(usize, &Compiled)> =
-            prepared.iter().enumerate().filter_map(|(k, p)| Some((k, p.as_ref().ok()?))).collect();
+            prepared.iter().enumerate().filter_map(|(k, p)| Some((k, &p.as_ref().ok()?.compiled))).collect();
         let compiled: Vec<&Compiled> = variants.iter().map(|(_, compiled)| *compiled).collect();
         let side_by_side = guarded(budget, &mut || {
             side_by_side::ends(&compiled, &options, &mut || finished(None)).map_err(|error| error.to_string())
@@ -71,8 +88,8 @@ impl<'a> Transients<'a> {
         for ((&number, prepared), end) in numbers.iter().zip(&prepared).zip(ends) {
             let values = match (prepared, end) {
                 (Err(error), _) => Err(error.clone()),
-                (Ok(compiled), Some(end)) => self.found(compiled, end),
-                (Ok(compiled), None) => within(&mut || self.found(compiled, alone(compiled, &options)?)),
+                (Ok(point), Some(end)) => self.found(point, end),
+                (Ok(point), None) => within(&mut || self.found(point, alone(&point.compiled, &options)?)),
             };
             let parameters = self.spec.settings(number).into_iter().map(|(_, value)| value).collect();
             let outcome = Outcome { number, parameters, values };
@@ -99,25 +116,33 @@ impl<'a> Transients<'a> {
     }
 
     /// A point on its mesh.
-    fn prepare(&self, settings: &[(String, Setting)]) -> Result<Compiled, String> {
+    fn prepare(&self, settings: &[(String, Setting)], go_on: &dyn Fn() -> bool) -> Result<Prepared, String> {
         let drawn = draw(self.source, &at(self.options, settings)).map_err(|error| brief(&error))?;
         let shared = if self.spec.grid_points().is_ok_and(|n| n > 1) {
-            self.mesh.get_or_init(|| self.search()).as_ref()
+            self.mesh.get_or_init(|| self.search(go_on)).as_ref()
         } else {
             None
         };
         match shared.filter(|shared| alike(&shared.beams, &drawn.structure.beams)) {
-            Some(shared) => drawn.on(shared.order.clone()).map_err(|error| error.to_string()),
+            Some(shared) => {
+                let compiled = drawn.on(shared.order.clone()).map_err(|error| error.to_string())?;
+                Ok(Prepared {
+                    compiled,
+                    step_error: shared.step_error.map(|error| (error, "in the middle of the grid")),
+                })
+            }
             None => {
                 let compiled = drawn.compile().map_err(|error| brief(&error))?;
-                let fitted = mesh::fitted_in_time(&compiled, &self.transient());
-                fitted.map(|(moving, _)| moving).map_err(|error| error.to_string())
+                let (compiled, _) =
+                    mesh::fitted_in_time(&compiled, &self.transient()).map_err(|error| error.to_string())?;
+                let step_error = self.steps(&compiled, go_on).map(|error| (error, "by the end of the run"));
+                Ok(Prepared { compiled, step_error })
             }
         }
     }
 
     /// The mesh that is fine enough at every probe.
-    fn search(&self) -> Option<Shared> {
+    fn search(&self, go_on: &dyn Fn() -> bool) -> Option<Shared> {
         let options = self.transient();
         let mut shared: Option<Shared> = None;
         for settings in probes(self.spec) {
@@ -125,7 +150,7 @@ impl<'a> Transients<'a> {
             let Some(compiled) = drawn.ok().and_then(|drawn| drawn.compile().ok()) else { continue };
             let Ok(order) = mesh::order_in_time(&compiled, &options) else { continue };
             match &mut shared {
-                None => shared = Some(Shared { beams: compiled.structure.beams, order }),
+                None => shared = Some(Shared { beams: compiled.structure.beams, order, step_error: None }),
                 Some(shared) if alike(&shared.beams, &compiled.structure.beams) => {
                     for (most, n) in shared.order.segments.iter_mut().zip(order.segments) {
                         *most = (*most).max(n);
@@ -136,10 +161,22 @@ impl<'a> Transients<'a> {
                 Some(_) => {}
             }
         }
-        shared
+        let mut shared = shared?;
+        let drawn = draw(self.source, &at(self.options, &middle(self.spec))).ok();
+        let middle = drawn.filter(|drawn| alike(&shared.beams, &drawn.structure.beams));
+        let middle = middle.and_then(|drawn| drawn.on(shared.order.clone()).ok());
+        shared.step_error = middle.and_then(|compiled| self.steps(&compiled, go_on));
+        Some(shared)
     }
 
-    fn found(&self, compiled: &Compiled, end: RunEnd) -> Result<Found, String> {
+    /// How far the steps of a run of this variant may be off.
+    fn steps(&self, compiled: &Compiled, go_on: &dyn Fn() -> bool) -> Option<f64> {
+        let options = TransientOptions { points: JUDGED, ..self.transient() };
+        step_error::step_error(&options, compiled, &mut |_| go_on())
+    }
+
+    fn found(&self, point: &Prepared, end: RunEnd) -> Result<Found, String> {
+        let Prepared { compiled, step_error } = point;
         let options = self.transient();
         let mut values = Vec::with_capacity(end.values.len());
         for (name, value) in options.signals.iter().zip(end.values) {
@@ -152,7 +189,8 @@ impl<'a> Transients<'a> {
         let estimated_error = compiled.order.estimated_error;
         let beyond = mesh::beyond(self.options.tol, estimated_error);
         let beyond = beyond.map(|message| format!("{}: {message}", mesh::WARNING));
-        let warnings: Vec<String> = beyond.into_iter().chain(end.warnings).collect();
+        let steps = step_error.and_then(|(error, place)| step_error::beyond(&options, error, place));
+        let warnings: Vec<String> = beyond.into_iter().chain(steps).chain(end.warnings).collect();
         Ok(Found { values, estimated_error, warning: warnings.join("; ") })
     }
 }
