@@ -115,6 +115,8 @@ fn element_heads() {
     error("anchor p1 [a] []\nbeam2d p1 [a b c] [l=1u w=1u]", "E054", (2, 11), 7, message, "write `beam2d LAYER [a b]`");
     let reason = "it is in SUGAR's manual only; use `gap2d` or `gap2dforce`";
     error("gapV2 * [a b] []", "E056", (1, 1), 5, "the element `gapV2` is not supported", reason);
+    let reason = "its file is not part of SUGAR; a support that lets its node turn is `hinge`";
+    error("anchorrot p1 [a] []", "E056", (1, 1), 9, "the element `anchorrot` is not supported", reason);
 }
 
 /// Variables, functions, types and whole numbers.
@@ -141,7 +143,8 @@ fn expressions() {
 #[test]
 fn element_parameters() {
     let beam = |list: &str| format!("anchor p1 [a] []\nbeam2d p1 [a b] [{list}]");
-    error(&beam("l=-10u w=1u"), "E060", (2, 18), 6, "`l` (length [m]) must be positive, this is -1e-5", "");
+    let turned = "a part that runs the other way has its length, and `oz` half a turn on";
+    error(&beam("l=-10u w=1u"), "E060", (2, 18), 6, "`l` (length [m]) must be positive, this is -1e-5", turned);
     error(&beam("l=10u w=0"), "E060", (2, 24), 3, "`w` (width [m]) must be positive, this is 0", "");
     let help = "give `w=` here or in the layer `p1`";
     error(&beam("l=10u"), "E053", (2, 1), 6, "`beam2d` needs `w` (width [m])", help);

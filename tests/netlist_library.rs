@@ -93,6 +93,17 @@ fn arcs_lie_as_drawn() {
     assert_eq!((s.beams[0].name.as_str(), s.beams[35].name.as_str()), ("x.1", "x.36"));
 }
 
+/// A full turn as wide as its diameter is a disk of twice the radius, π·(2r)²·h of volume; wider, its inner edge would pass its centre.
+#[test]
+fn arcs_as_wide_as_their_diameter() {
+    let s = drawn("semicircularbeam p1 [a b] [radius=100u alpha=2*pi w=200u]\nbeam2d p1 [a c] [l=10u w=2u]");
+    let chords = s.beams.iter().filter(|b| b.width > 100e-6);
+    let volume: f64 = chords.map(|b| b.length * b.width * b.thickness).sum();
+    near(volume, PI * 4e-8 * 2e-6, 1e-3);
+    let found = refused("semicircularbeam p1 [a b] [radius=100u alpha=pi w=201u]");
+    assert_eq!(found[0].0, "E060", "{found:?}");
+}
+
 /// A predisplaced beam runs along its cubic: ends and slopes as given.
 #[test]
 fn predisplaced_beams_lie_as_drawn() {

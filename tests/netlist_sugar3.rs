@@ -125,6 +125,27 @@ fn nodes_with_coordinates() {
     assert_eq!((s.loads[0].force, s.loads[0].moment), ([10e-6, 0.0], 1e-12));
 }
 
+/// `constraint` holds two nodes in one rigid body where they are drawn, as SUGAR 3's multipliers do: the end of the link goes along
+/// with the force on its other end. Called like a function it is told how it is written.
+#[test]
+fn constraints_are_rigid_links() {
+    let text = |model: &str| {
+        format!(
+            "{LAYER}A = node {{0, 0, 0; name = \"A\"}}\nb = node {{100u, 0, 0; name = \"b\"}}\nc = node {{100u, 100u, 0; name = \"c\"}}\n\
+             anchor {{A; material=p1}}\nbeam2d {{A, b; material=p1, w=2u}}\nelement {{b, c; model=\"{model}\"}}\n"
+        )
+    };
+    for model in ["constraint", "constraint2d"] {
+        let s = drawn(&text(model));
+        assert_eq!((s.links.len(), s.nodes[s.links[0].b.0].position), (1, [100e-6, 100e-6]));
+        assert_eq!((s.nodes[s.links[0].a.0].name.as_str(), s.nodes[s.links[0].b.0].name.as_str()), ("b", "c"));
+    }
+    let displaced = refused(&text("displace"));
+    assert_eq!((displaced.code.as_str(), displaced.help.contains("`force`")), ("E056", true), "{displaced:?}");
+    let called = refused(&format!("{LAYER}force {{node \"A\"; x=1u}}\n"));
+    assert_eq!((called.code.as_str(), called.help.as_str()), ("E055", "write `element {…; model=\"force\"}`"));
+}
+
 /// Files are used once, and found by their name; a file that is not there, and one of SUGAR 2, are told.
 #[test]
 fn files() {

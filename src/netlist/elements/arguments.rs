@@ -153,7 +153,12 @@ impl Site<'_, '_> {
     pub(super) fn out_of_range(&mut self, name: &str, x: f64, wanted: &str) -> Reported {
         let span = self.span_of(name);
         let message = format!("`{name}` ({}) must be {wanted}, this is {}", meaning(name), short(x));
-        self.sink.error("E060", span, message, "")
+        let help = if name == "l" && x < 0.0 {
+            "a part that runs the other way has its length, and `oz` half a turn on"
+        } else {
+            ""
+        };
+        self.sink.error("E060", span, message, help)
     }
 
     /// Warns of lengths that can only be a forgotten suffix.

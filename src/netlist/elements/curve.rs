@@ -65,10 +65,11 @@ pub(super) fn arc(site: &mut Site<'_, '_>) -> Result<(), Reported> {
         let wanted = "an angle in radians, not 0 and at most a full turn";
         return Err(site.out_of_range("alpha", alpha, wanted));
     }
-    if width >= 2.0 * radius {
+    // an arc as wide as its diameter is a sector: its inner edge is its centre
+    if width > 2.0 * radius * (1.0 + 1e-9) {
         let message =
             format!("`{}` is {} m wide with a radius of {} m", site.instance.name, short(width), short(radius));
-        return Err(site.error("E060", message, "a width below twice the radius; a plate is drawn with `plate2d`"));
+        return Err(site.error("E060", message, "a width up to twice the radius; a plate is drawn with `plate2d`"));
     }
     site.flat()?;
     let chords = CHORDS.max((alpha.abs() / TURN).ceil() as usize);

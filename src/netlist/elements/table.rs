@@ -188,6 +188,7 @@ pub(crate) const MODELS: &[Model] = &[
     sugar("gap2de_f", &[4], "[a b c d]", GAP_SHEET, gap::gap2de_b),
     sugar("gap2de_g", &[4], "[a b c d]", GAP_SHEET, gap::gap2de_b),
     sugar("gap2de_h", &[4], "[a b c d]", GAP_SHEET, gap::gap2de_b),
+    sugar("gap2de_h_passive", &[4], "[a b c d]", GAP_SHEET, gap::gap2de_b),
     sugar("comb2d", &[2], "[a b]", &["l", "L", "w", "gap", "N", "h", "V", "permittivity"], comb::comb2d),
     sugar("R", &[2], "[a b]", &["R", "G"], circuit::resistor),
     sugar("C", &[2], "[a b]", &["C"], circuit::capacitor),
@@ -241,10 +242,19 @@ pub(crate) const MODELS: &[Model] = &[
     own("port", &[1, 2], "[plus] or [plus minus]", &[], circuit::port),
 ];
 
+/// Why there are no triangles.
+const TRIANGLE: &str =
+    "in SUGAR its matrices are those of one fixed plate, whatever its sides; draw it with beams, or as `body2d`";
+
 /// Elements of SUGAR's that have no counterpart here, and why.
 pub(super) const LEFT_OUT: &[(&str, &str)] = &[
     ("gapV2", "it is in SUGAR's manual only; use `gap2d` or `gap2dforce`"),
     ("gap3dV2", "it is in SUGAR's manual only; use `gap2d` or `gap2dforce`"),
+    ("anchorrot", "its file is not part of SUGAR; a support that lets its node turn is `hinge`"),
+    ("beamjoint12", "its file is not part of SUGAR; a beam that bends easily is `softjointlr`"),
+    ("triangle", TRIANGLE),
+    ("triangle2", TRIANGLE),
+    ("displace", "no displacement is prescribed here: pull with a `force` of the size that brings the node there"),
 ];
 
 /// What a parameter is, with its unit, for messages.

@@ -22,6 +22,8 @@ const MOST_ELEMENTS: usize = 300_000;
 const MOST_KEYS: usize = 10_000;
 /// Elements whose short names hide common names of variables: they are there after `use "stdlib.net"`.
 const SHORT: [&str; 3] = ["R", "L", "C"];
+/// Elements that SUGAR 3 alone has, built by `element` only: their names are common names of variables.
+pub(super) const OWN: [&str; 3] = ["force", "constraint", "constraint2d"];
 
 /// A message was put into the sink, and the netlist cannot go on.
 fn told(state: &State) -> mlua::Error {
@@ -235,7 +237,7 @@ fn element(lua: &Lua, shared: &Shared, model: Option<&str>, table: &Table) -> ml
         return Ok(());
     };
     let model = named.strip_prefix("MF_").unwrap_or(&named);
-    if elements::model(model).is_none() && model != "force" {
+    if elements::model(model).is_none() && !OWN.contains(&model) {
         elements::unknown(&mut state.sink, model, span, []);
         return Ok(());
     }
@@ -259,6 +261,8 @@ fn build(state: &mut State, model: &str, call: &Call, span: Span) -> Result<(), 
     if model == "force" {
         return force(state, name, call, span);
     }
+    // SUGAR 3's rigid link between nodes that lie where others place them
+    let model = if OWN.contains(&model) { "link2d" } else { model };
     let layer = call.material.iter().map(|(entry, value)| (entry.as_str(), value.clone())).collect();
     let given = call.given.iter().map(|(name, value)| Argument { name, value: value.clone(), span }).collect();
     let instance = Instance {

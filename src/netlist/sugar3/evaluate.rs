@@ -323,7 +323,12 @@ fn tell(shared: &Shared, progress: &Progress, error: &mlua::Error) {
         ),
         None if syntax => ("E071", text, ""),
         None if let Some(name) = called_nothing(&text) => {
-            elements::unknown(&mut state.sink, name, span, []);
+            if builtins::OWN.contains(&name) {
+                let help = format!("write `element {{…; model=\"{name}\"}}`");
+                state.sink.error("E055", span, format!("`{name}` is no function"), help);
+            } else {
+                elements::unknown(&mut state.sink, name, span, []);
+            }
             return;
         }
         None => {
