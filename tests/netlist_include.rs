@@ -164,3 +164,31 @@ fn other_encodings() {
     fs::write(&path, b"% 10 \xb5m wide\nparam a=1").expect("file");
     assert_eq!(parameters(&Bundle::read(&path, &[]).expect("readable")).len(), 1);
 }
+
+/// `uses degrees.net` turns `ox oy oz` of its own file to degrees, wherever it stands; other angles and other files stay in radians. What a subnet
+/// is handed as `oz` comes in its file's own unit. A file of that name is read as any other.
+#[test]
+fn angles_in_degrees() {
+    let layer = "process p1 = [Youngsmodulus=160e9 density=2000 h=2u]\n";
+    let turned = "subnet turned [a b] [oz=0] [beam2d parent [a b] [l=10u w=1u]]\n";
+    let other =
+        "subnet other [a b] [oz=0] [beam2d parent [a m] [l=10u w=1u]\nbeam2d parent [m b] [l=10u w=1u oz=oz]]\n";
+    let root = "uses other.net\nanchor p1 [a] []\nbeam2d p1 [a b] [l=10u w=1u oz=90]\nturned p1 [b c] [oz=45]\n\
+                other p1 [c d] [oz=30]\nbeam3dlink p1 [d e] [l=10u w=1u oz=180 L1=10u oz1=pi/2]\nuses degrees.net\n";
+    let bundle = Bundle::from_text("t.net", &format!("{layer}{turned}{root}")).with_file("other.net", other);
+    let loaded = load(&bundle, &[]).unwrap_or_else(|d| panic!("{d}"));
+    assert!(loaded.warnings.items.iter().all(|d| d.code != "W003"), "{}", loaded.warnings);
+    let s = loaded.structure;
+    let angles: Vec<f64> = s.beams.iter().map(|b| b.angle.to_degrees()).collect();
+    for (got, want) in angles.iter().zip([90.0, 45.0, 30.0, 60.0, 180.0]) {
+        assert!((got - want).abs() < 1e-9, "{angles:?}");
+    }
+    // the arm turns by pi/2 from 180 degrees: against y
+    let at = |name: &str| s.nodes[s.node(name).expect(name).0].position;
+    let (d, e) = (at("d"), at("e"));
+    assert!((e[0] - d[0] + 10e-6).abs() < 1e-12 && (e[1] - d[1] + 10e-6).abs() < 1e-12, "{d:?} {e:?}");
+    let own = bundle.with_file("degrees.net", "param own=1\n");
+    let loaded = load(&own, &[]).unwrap_or_else(|d| panic!("{d}"));
+    assert_eq!(loaded.parameters, [("own".to_owned(), Setting::Number(1.0))]);
+    assert!(loaded.warnings.items.iter().any(|d| d.code == "W003" && d.help.contains("uses degrees.net")));
+}

@@ -154,6 +154,8 @@ pub(crate) struct Program {
     pub(crate) subnets: Vec<Subnet>,
     /// Number of variables of the netlist itself, once resolved.
     pub(crate) variables: usize,
+    /// Files whose `ox oy oz` are in degrees, by their numbers.
+    pub(crate) degrees: Vec<u16>,
     /// True when an included file is missing: names it would have defined are then unknown.
     pub(crate) incomplete: bool,
 }

@@ -130,7 +130,7 @@ fn facts(drawing: &Drawing, sink: &mut Sink) {
             Fact::Degrees => (
                 "W003",
                 format!("angles are in radians; {number} looks like degrees ({elements})"),
-                "for degrees write `deg(…)` around the number",
+                "for degrees write `deg(…)` around the number, or `uses degrees.net` in a file of such angles",
             ),
             Fact::OddDensity => (
                 "W035",

@@ -62,6 +62,7 @@ impl<'p> Elaborator<'p> {
         let mut given = Vec::with_capacity(element.parameters.len());
         let mut angles = [0.0; 3];
         let mut failed = false;
+        let degrees = self.in_degrees(element.model.span.file);
         for def in &element.parameters {
             let Ok(value) = self.evaluate(&def.value) else {
                 failed = true;
@@ -75,10 +76,17 @@ impl<'p> Elaborator<'p> {
                     failed = true;
                 }
                 (Some(axis), Value::Number(angle)) => {
-                    angles[axis] = *angle;
-                    self.check_angle(*angle, def.value.span);
+                    angles[axis] = if degrees { angle.to_radians() } else { *angle };
+                    if !degrees {
+                        self.check_angle(*angle, def.value.span);
+                    }
                     // it turns a subnet's instance, and is a parameter besides where the subnet has one of that name
-                    if element.subnet.is_some() {
+                    if let Some(subnet) = element.subnet {
+                        let value = match (degrees, self.in_degrees(self.program.subnets[subnet].name.span.file)) {
+                            (true, false) => Value::Number(angle.to_radians()),
+                            (false, true) => Value::Number(angle.to_degrees()),
+                            _ => value,
+                        };
                         given.push(Argument { name: &def.name.name, value, span: def.name.span.to(def.value.span) });
                     }
                 }
@@ -124,6 +132,11 @@ impl<'p> Elaborator<'p> {
                 elements::build(&instance, &mut self.drawing, self.sink)
             }
         }
+    }
+
+    /// True when the file writes `ox oy oz` in degrees.
+    fn in_degrees(&self, file: u16) -> bool {
+        self.program.degrees.contains(&file)
     }
 
     fn check_angle(&mut self, angle: f64, span: Span) {

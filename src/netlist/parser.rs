@@ -12,6 +12,8 @@ use std::sync::Arc;
 
 /// Blocks, conditions and loops may nest this deep.
 const DEEPEST_NESTING: usize = 100;
+/// What a file uses to say that its `ox oy oz` are in degrees, unless there is a file of that name.
+const DEGREES: &str = "degrees.net";
 
 /// Parses a bundle. Every syntax error goes to the sink.
 pub(crate) fn parse(bundle: &Bundle, sink: &mut Sink) -> Program {
@@ -155,6 +157,12 @@ impl<'a> Parser<'a> {
         let name = lexer::used_name(self.text_of(token.span));
         if name.is_empty() {
             self.sink.error("E020", token.span, "`uses` names no file".into(), "write `uses FILE`");
+            return;
+        }
+        if name == DEGREES && !self.bundle.files.contains_key(name) {
+            if !self.program.degrees.contains(&token.span.file) {
+                self.program.degrees.push(token.span.file);
+            }
             return;
         }
         let root = self.bundle.root.as_str();
