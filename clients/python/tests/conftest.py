@@ -11,6 +11,8 @@ import pytest
 
 import bimorph
 
+pytest_plugins = ["pytester"]
+
 ROOT = Path(__file__).resolve().parents[3]
 BUILDS = [ROOT / "target" / kind / "bimorph" for kind in ("release", "debug")]
 

@@ -5,6 +5,8 @@ or a test bench steps. ``serve()`` starts a server for the time of a ``with`` bl
 V, A, C, K, Hz.
 """
 
+import importlib.metadata
+
 from .client import Client, Model
 from .conversion import Conversion, Piece
 from .errors import (
@@ -19,6 +21,7 @@ from .errors import (
     Unavailable,
     Violation,
 )
+from .executors import sweep_on
 from .netlist import Netlist
 from .options import Options
 from .results import (
@@ -34,6 +37,7 @@ from .results import (
 from .server import Server, serve
 from .session import Session, Snapshot
 from .sweep import LogNormal, Modes, Normal, PullIn, Row, Samples, Static, Table, Transient, Uniform
+from .sweep_handle import Sweep, SweepStatus
 
 __all__ = [
     "BimorphError",
@@ -66,6 +70,8 @@ __all__ = [
     "Static",
     "StaticResult",
     "StepFailed",
+    "Sweep",
+    "SweepStatus",
     "Table",
     "Transient",
     "TransientResult",
@@ -74,4 +80,8 @@ __all__ = [
     "Uniform",
     "Violation",
     "serve",
+    "sweep_on",
 ]
+
+__version__ = importlib.metadata.version("bimorph")
+"""Of this package; :meth:`Client.version` is that of a server."""

@@ -101,19 +101,25 @@ class Channel:
             while True:
                 try:
                     yield next(call)
+                    continue
                 except StopIteration:
                     return
                 except grpc.RpcError as error:
-                    raise from_rpc(error, self.address) from None
+                    failure = from_rpc(error, self.address)
+                raise failure
         finally:
             call.cancel()
 
     def guard(self, call: Callable[[], T]) -> T:
-        """Turns a status into an error of this package."""
+        """Turns a status into an error of this package.
+
+        It is raised outside of the handler: gRPC's own error, which cannot be pickled, must not come along as its context.
+        """
         try:
             return call()
         except grpc.RpcError as error:
-            raise from_rpc(error, self.address) from None
+            failure = from_rpc(error, self.address)
+        raise failure
 
     def close(self) -> None:
         """Lets go of the connection of this process; it closes when nobody else uses it."""

@@ -19,7 +19,9 @@ from .netlist import Netlist
 from .options import WIRE, Options
 from .results import FrequencyResponse, ModesResult, NodeMotion, PullInResult, Root, StaticResult, TransientResult
 from .session import Session, Snapshot
+from .sweep_handle import Sweep
 from .v1 import analysis_pb2, device_pb2, model_pb2, sweep_pb2
+from .waveforms import Waveform, drive
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -128,12 +130,40 @@ class Client:
         ``samples`` are drawn at every point of the grid, which may be empty (``{}``): Monte Carlo.
         ``shard`` (i, n) runs only points whose number modulo n is i. ``progress`` is told (points done, points).
         """
+        with self.submit(
+            netlist, parameters, analysis, set=set, include=include, samples=samples, shard=shard, **options
+        ) as running:
+            return running.wait(progress)
+
+    def submit(
+        self,
+        netlist: str | os.PathLike[str] | Netlist,
+        parameters: Mapping[str, Sequence[float | str]],
+        analysis: sweeps.Analysis,
+        *,
+        set: Mapping[str, float | str] | None = None,
+        include: Iterable[str | os.PathLike[str]] = (),
+        samples: sweeps.Samples | None = None,
+        shard: tuple[int, int] = (0, 1),
+        **options: Unpack[Options],
+    ) -> Sweep:
+        """Starts a :meth:`sweep` and comes back at once: ``wait()`` has its table, and its ``id`` finds it again (:meth:`attach`)."""
         request = sweep_pb2.SubmitSweepRequest(
             bundle=self._bundle(netlist, include),
             options=_options(set or {}, options),
             spec=sweeps.to_wire(parameters, analysis, shard, samples),
         )
-        return sweeps.run(self._channel, request, progress)
+        vary = tuple(samples.vary) if samples else ()
+        return Sweep(self._channel, self._channel.call("SubmitSweep", request).sweep, vary)
+
+    def attach(self, sweep: str) -> Sweep:
+        """A sweep of this server by its ``id``.
+
+        Raises :class:`NotFound` for one that the server does not have (any more).
+        """
+        found = Sweep(self._channel, sweep)
+        found.status()
+        return found
 
     def _bundle(self, netlist: str | os.PathLike[str] | Netlist, include: Iterable[str | os.PathLike[str]]) -> Any:
         if not isinstance(netlist, Netlist) and Path(netlist).suffix.lower() in LAYOUTS:
@@ -254,7 +284,7 @@ class Model:
         ``"decade"``; more are added about resonances and zeros unless ``even``. ``by_modes`` sums over modes with static correction, the
         ``modes`` lowest or, with 0, those to twice ``stop``; else each frequency is exact.
         """
-        kinds = {"log": 0, "decade": 1, "linear": 2}
+        kinds: dict[str, Any] = {"log": 0, "decade": 1, "linear": 2}
         if spacing not in kinds:
             raise InvalidRequest(f'spacing: expected "log", "decade" or "linear", got {spacing!r}')
         request = analysis_pb2.FrequencyResponseRequest(
@@ -308,6 +338,7 @@ class Model:
         points: int = 1001,
         tol: float = 0.0,
         voltages: Voltages | None = None,
+        inputs: Mapping[str, Waveform] | None = None,
         release: Model | None = None,
         progress: Callable[[float], object] | None = None,
     ) -> TransientResult:
@@ -316,7 +347,16 @@ class Model:
         ``release`` is a variant of the same netlist whose static equilibrium is the initial state; without it the part
         starts at rest as drawn. ``tol`` is the relative error of a step [1], 0: the model's. ``progress`` is told the
         fraction done.
+
+        ``inputs`` are waveforms of ports, ``{"heat": (times, volts)}``: straight lines between corners, constant before and after. The
+        run then begins in the static equilibrium at 0, and its steps end at every corner.
         """
+        if inputs is not None:
+            if release is not None or tol:
+                raise ValueError("a run along inputs begins in their equilibrium, with the model's own tolerance: no release, no tol")
+            held: dict[str, Waveform] = {port: ([0.0], [volts]) for port, volts in (voltages or {}).items()}
+            with self.session(signals=signals) as session:
+                return drive(session, {**held, **inputs}, stop, points, progress)
         request = analysis_pb2.TransientRequest(
             model=self.id,
             stop_s=stop,
@@ -340,11 +380,11 @@ class Model:
                     column.extend(more.values)
             if event.HasField("finished"):
                 end = event.finished
-                named = dict(zip(signals, columns))
+                named = {name: np.array(column) for name, column in zip(signals, columns)}
                 units = dict(zip(signals, end.units))
                 work = (end.steps, end.rejected, end.unknowns)
                 step_error = end.step_error if end.HasField("step_error") else None
-                return TransientResult(t, named, units, *work, _estimate(end), tuple(end.warnings), step_error)
+                return TransientResult(np.array(t), named, units, *work, _estimate(end), tuple(end.warnings), step_error)
         raise Unavailable(f"server {self._channel.address}: the stream ended before the run did")
 
     def session(

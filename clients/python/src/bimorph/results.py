@@ -4,9 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+
+from . import showing
+
+if TYPE_CHECKING:
+    import pandas
+    from matplotlib.axes import Axes
 
 
 @dataclass(frozen=True)
@@ -46,6 +53,16 @@ class StaticResult:
     warnings: tuple[str, ...] = ()
     """What the numbers do not say by themselves."""
 
+    def to_pandas(self) -> pandas.DataFrame:
+        """Displacement [m] and rotation [rad] of every node."""
+        columns = {axis: [getattr(node, axis) for node in self.nodes.values()] for axis in ("x", "y", "rz")}
+        return showing.frame(columns, ("node", list(self.nodes)))
+
+    def _repr_html_(self) -> str:
+        rows = ((name, node.x, node.y, node.rz) for name, node in self.nodes.items())
+        note = showing.note(self.estimated_error, self.warnings)
+        return showing.table(["node", "x [m]", "y [m]", "rz [rad]"], rows, note)
+
 
 @dataclass(frozen=True)
 class ModesResult:
@@ -65,6 +82,15 @@ class ModesResult:
     """Largest displacement of the equilibrium that the modes are about [m]."""
     warnings: tuple[str, ...] = ()
     """What may surprise about these modes."""
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Frequency [Hz], residual and estimated error, by number from 1."""
+        columns = {"frequency_hz": self.frequencies_hz, "residual": self.residuals, "error": self.errors}
+        return showing.frame(columns, ("mode", range(1, len(self.frequencies_hz) + 1)))
+
+    def _repr_html_(self) -> str:
+        rows = zip(range(1, len(self.frequencies_hz) + 1), self.frequencies_hz, self.errors)
+        return showing.table(["mode", "frequency [Hz]", "error [1]"], rows, showing.note(None, self.warnings))
 
 
 @dataclass(frozen=True)
@@ -133,6 +159,24 @@ class FrequencyResponse:
         """Phase of each signal, between -π and π [rad]."""
         return {name: np.angle(values) for name, values in self.signals.items()}
 
+    def to_pandas(self) -> pandas.DataFrame:
+        """A complex column for each signal, by frequency [Hz]."""
+        return showing.frame(self.signals, ("frequency_hz", self.frequencies_hz))
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draws the magnitude of every signal over frequency, both on logarithmic scales."""
+        ax = showing.axes(ax)
+        for name, values in self.magnitude.items():
+            ax.loglog(self.frequencies_hz, values, label=f"{name} [{self.units[name]}]")
+        ax.set_xlabel("f [Hz]")
+        ax.legend()
+        return ax
+
+    def _repr_html_(self) -> str:
+        head = ["f [Hz]", *(f"|{name}| [{self.units[name]}]" for name in self.signals)]
+        rows = zip(self.frequencies_hz.tolist(), *(values.tolist() for values in self.magnitude.values()))
+        return showing.table(head, rows, showing.note(self.estimated_error, self.warnings))
+
 
 @dataclass(frozen=True)
 class PullInResult:
@@ -152,13 +196,13 @@ class PullInResult:
     """What the numbers do not say by themselves."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class TransientResult:
     """Sampled signals."""
 
-    t: list[float]
+    t: NDArray[np.float64]
     """Times [s]."""
-    signals: dict[str, list[float]]
+    signals: dict[str, NDArray[np.float64]]
     """Samples of each signal, in its unit."""
     units: dict[str, str]
     """Unit of each signal."""
@@ -174,6 +218,28 @@ class TransientResult:
     """What may surprise about the run."""
     step_error: float | None = None
     """How far the steps in time may be off by the end, of the amplitude [1]; None where they were not compared."""
+
+    def __repr__(self) -> str:
+        names = ", ".join(f"{name} [{unit}]" for name, unit in self.units.items())
+        return f"<TransientResult of {names}: {len(self.t)} times to {self.t[-1] if len(self.t) else 0.0:g} s>"
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """A column for each signal, by time [s]."""
+        return showing.frame(self.signals, ("t", self.t))
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draws every signal over time, in its unit."""
+        ax = showing.axes(ax)
+        for name, values in self.signals.items():
+            ax.plot(self.t, values, label=f"{name} [{self.units[name]}]")
+        ax.set_xlabel("t [s]")
+        ax.legend()
+        return ax
+
+    def _repr_html_(self) -> str:
+        head = ["t [s]", *(f"{name} [{unit}]" for name, unit in self.units.items())]
+        rows = zip(self.t.tolist(), *(values.tolist() for values in self.signals.values()))
+        return showing.table(head, rows, showing.note(self.estimated_error, self.warnings))
 
 
 @dataclass(frozen=True)

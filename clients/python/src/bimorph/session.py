@@ -196,7 +196,8 @@ class Session:
         if state is None:
             raise ValueError("there is no accepted state; call operating_point first")
         request = device_pb2.SmallSignalRequest(token=state.token, omega=omega, noise=noise)
-        return self._ask(device_pb2.DeviceRequest(linearize=request)).linearized
+        answer: device_pb2.SmallSignal = self._ask(device_pb2.DeviceRequest(linearize=request)).linearized
+        return answer
 
     def read(self, signal: str) -> float:
         """Value of an opened signal in the accepted state, in its unit."""

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable, Mapping, Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
-from .channel import Channel
-from .errors import BimorphError
+from . import showing
 from .v1 import analysis_pb2, model_pb2, sweep_pb2
+
+if TYPE_CHECKING:
+    import pandas
 
 
 @dataclass(frozen=True)
@@ -148,7 +151,7 @@ class Row:
     """Why the results may be further off than the tolerance; empty when they are not."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Table:
     """Everything a sweep found, in grid order."""
 
@@ -163,6 +166,27 @@ class Table:
         if name not in self.parameters and name not in self.results:
             raise KeyError(f"no column {name!r}; there are {', '.join([*self.parameters, *self.results])}")
         return [row.parameters.get(name, row.results.get(name)) for row in self.rows]
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """A column for each parameter and each result (NaN where a point has none), by number of the point; with ``estimated_error``,
+        ``warning`` and ``error``."""
+        columns: dict[str, list[Any]] = {name: [row.parameters[name] for row in self.rows] for name in self.parameters}
+        columns |= {name: [row.results.get(name, math.nan) for row in self.rows] for name in self.results}
+        columns |= {name: [getattr(row, name) for row in self.rows] for name in ("estimated_error", "warning", "error")}
+        return showing.frame(columns, ("point", [row.point for row in self.rows]))
+
+    def __repr__(self) -> str:
+        failed = sum(1 for row in self.rows if row.error)
+        points = f"{len(self.rows)} points" + (f", {failed} of them failed" if failed else "")
+        return f"<Table of {', '.join(self.results)} over {', '.join(self.parameters) or 'nothing'}: {points}>"
+
+    def _repr_html_(self) -> str:
+        head = ["point", *self.parameters, *(f"{name} [{self.units[name]}]" for name in self.results), ""]
+        rows = (
+            [row.point, *row.parameters.values(), *(row.results.get(name) for name in self.results), row.error or row.warning]
+            for row in self.rows
+        )
+        return showing.table(head, rows)
 
     def to_csv(self) -> str:
         """CSV with the columns of ``bimorph sweep``: point, parameters, results with units, estimate, warning, error."""
@@ -212,40 +236,3 @@ def to_wire(
     else:
         spec.modes.CopyFrom(sweep_pb2.SweepModes(count=analysis.count, voltages=voltages))
     return spec
-
-
-def run(channel: Channel, request: Any, progress: Callable[[int, int], object] | None) -> Table:
-    """Submits, watches to the end, fetches; whatever happens, the server is told to forget the sweep."""
-    sweep = channel.call("SubmitSweep", request).sweep
-    try:
-        for status in channel.stream("WatchSweep", sweep_pb2.WatchSweepRequest(sweep=sweep)):
-            if progress is not None:
-                progress(status.done, status.points)
-            if status.state in (sweep_pb2.SweepStatus.STATE_FAILED, sweep_pb2.SweepStatus.STATE_CANCELLED):
-                raise BimorphError(f"the sweep ended after {status.done} points: {status.message}")
-        table = _fetch(channel, sweep)
-        if any(vary.name not in table.parameters for vary in request.spec.samples.vary):
-            raise BimorphError("the server is of an earlier version, which knows no samples")
-        return table
-    finally:
-        try:
-            channel.call("CancelSweep", sweep_pb2.CancelSweepRequest(sweep=sweep))
-        except BimorphError:
-            pass
-
-
-def _fetch(channel: Channel, sweep: str) -> Table:
-    parameters: list[str] = []
-    results: list[str] = []
-    units: dict[str, str] = {}
-    rows: list[Row] = []
-    for chunk in channel.stream("FetchSweep", sweep_pb2.FetchSweepRequest(sweep=sweep)):
-        if chunk.parameters or chunk.results:
-            parameters, results = list(chunk.parameters), list(chunk.results)
-            units = dict(zip(results, chunk.units))
-        for row in chunk.rows:
-            values = [v.number if v.WhichOneof("value") == "number" else v.text for v in row.parameters]
-            present = {name: x for name, x in zip(results, row.results) if x == x}
-            estimate = row.estimated_error if row.HasField("estimated_error") else None
-            rows.append(Row(row.point, dict(zip(parameters, values)), present, row.error, estimate, row.warning))
-    return Table(parameters, results, units, rows)

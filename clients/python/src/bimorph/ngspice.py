@@ -1,0 +1,111 @@
+"""ngspice with the plug-in loaded: decks in, waveforms out. It needs the program ``bimorph`` and ngspice 39 or later."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import tempfile
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import BimorphError, Unavailable
+from .server import program
+
+
+@dataclass(frozen=True, eq=False)
+class Plot:
+    """Waveforms of one analysis."""
+
+    name: str
+    """As ngspice calls it: "Transient Analysis", "AC Analysis", …"""
+    vectors: dict[str, NDArray[Any]]
+    """Waveforms by name, the independent one first; complex in small-signal analyses. [V, A, s, Hz]"""
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        if name not in self.vectors:
+            raise KeyError(f"no vector {name!r}; there are {', '.join(self.vectors)}")
+        return self.vectors[name]
+
+
+@dataclass(frozen=True)
+class Run:
+    """What came of a deck."""
+
+    plots: list[Plot]
+    """One for each analysis, in the order in which ngspice ran them."""
+    output: str = field(repr=False)
+    """What ngspice said."""
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        """A waveform of the last analysis."""
+        return self.plots[-1][name]
+
+
+def run(deck: str | os.PathLike[str], *, remote: str | None = None, timeout: float = 600.0) -> Run:
+    """Runs a deck: a path, or its text (anything with a line break). The netlists that a text names are found from the working directory.
+
+    ``remote`` is the address of a server that steps every device of the deck.
+
+    Raises :class:`BimorphError` with what ngspice or the device said where the run has no result.
+    """
+    binary = program()
+    if binary is None:
+        raise Unavailable("the program bimorph was not found; set BIMORPH_BIN to its path, or put it on PATH")
+    with tempfile.TemporaryDirectory(prefix="bimorph-") as folder:
+        path = Path(deck) if not (isinstance(deck, str) and "\n" in deck) else Path(folder) / "deck.cir"
+        if path.parent == Path(folder):
+            path.write_text(_absolute(str(deck)))
+        raw = Path(folder) / "waves.raw"
+        words = [binary, "cosim", str(path), "--out", str(raw)]
+        words += ["--remote", remote] if remote else []
+        try:
+            done = subprocess.run(words, capture_output=True, text=True, timeout=timeout)
+        except subprocess.TimeoutExpired:
+            raise BimorphError(f"{path.name}: ngspice had no end after {timeout:g} s") from None
+        if done.returncode != 0 or not raw.is_file():
+            raise BimorphError(_reason(done.stderr) or _reason(done.stdout) or f"ngspice ended with {done.returncode}")
+        return Run(read_raw(raw.read_bytes()), done.stdout)
+
+
+_FILE = re.compile(r"""(\bfile\s*=\s*")([^"]+)(")""", re.IGNORECASE)
+
+
+def _absolute(text: str) -> str:
+    """The deck lies in another folder than the netlists that it names."""
+    return _FILE.sub(lambda m: m[1] + os.path.abspath(m[2]) + m[3], text)
+
+
+def _reason(said: str) -> str:
+    """The errors among what a program said; without any, its last lines."""
+    lines = [line for line in said.splitlines() if line.strip()]
+    errors = [line for line in lines if re.search(r"error|fatal|singular|too small", line, re.IGNORECASE)]
+    return "\n".join((errors or lines)[-8:])
+
+
+def read_raw(content: bytes) -> list[Plot]:
+    """Plots of a binary raw file.
+
+    Raises :class:`ValueError` for another file.
+    """
+    plots = []
+    while content.strip():
+        head, found, content = content.partition(b"Binary:\n")
+        if not found:
+            raise ValueError("not a binary raw file: no line 'Binary:'")
+        text = head.decode("utf-8", "replace")
+        entries = dict(re.findall(r"^([A-Z][\w. ]*?):[ \t]*(.*)$", text, re.MULTILINE))
+        count, points = int(entries["No. Variables"]), int(entries["No. Points"])
+        names = [line.split()[1] for line in text[text.index("Variables:\n") :].splitlines()[1 : count + 1]]
+        kind: Any = np.complex128 if "complex" in entries["Flags"] else np.float64
+        size = count * points * np.dtype(kind).itemsize
+        if len(content) < size:
+            raise ValueError(f"the raw file ends within its numbers: {len(content)} bytes of {size}")
+        table = np.frombuffer(content[:size], dtype=kind).reshape(points, count)
+        content = content[size:]
+        plots.append(Plot(entries["Plotname"].strip(), {name: table[:, k].copy() for k, name in enumerate(names)}))
+    return plots

@@ -1,0 +1,57 @@
+"""Results as tables and pictures: pandas and matplotlib are asked for when somebody wants them."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import pandas
+    from matplotlib.axes import Axes
+
+_SHOWN = 20
+"""Rows that a notebook shows of a long table."""
+
+
+def frame(columns: Mapping[str, Any], index: tuple[str, Any] | None = None) -> pandas.DataFrame:
+    """A table of pandas; ``index`` is its name and values."""
+    try:
+        import pandas
+    except ImportError:
+        raise ImportError("to_pandas() needs pandas: pip install pandas") from None
+    if index is None:
+        return pandas.DataFrame(dict(columns))
+    return pandas.DataFrame(dict(columns), index=pandas.Index(index[1], name=index[0]))
+
+
+def axes(given: Axes | None) -> Axes:
+    """Where to draw: what was given, or a new figure."""
+    if given is not None:
+        return given
+    try:
+        from matplotlib import pyplot
+    except ImportError:
+        raise ImportError("plot() needs matplotlib: pip install matplotlib") from None
+    return pyplot.subplots()[1]
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[object]], note: str = "") -> str:
+    """An HTML table of the first rows, with a note below it."""
+    cells = [[f"<td>{html.escape(_short(value))}</td>" for value in row] for row in rows]
+    shown = cells[:_SHOWN]
+    if len(cells) > _SHOWN:
+        note = " · ".join(filter(None, [f"{len(cells)} rows, the first {_SHOWN} of them", note]))
+    titles = "".join(f"<th>{html.escape(title)}</th>" for title in head)
+    body = "".join(f"<tr>{''.join(row)}</tr>" for row in shown)
+    return f"<table><tr>{titles}</tr>{body}</table>" + (f"<p>{html.escape(note)}</p>" if note else "")
+
+
+def note(estimated_error: float | None, warnings: Iterable[str]) -> str:
+    """What stands below a table: how far its numbers may be off, and what they do not say."""
+    error = "" if estimated_error is None else f"estimated error {estimated_error:.1e}"
+    return " · ".join(filter(None, [error, *warnings]))
+
+
+def _short(value: object) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else "" if value is None else str(value)

@@ -1,0 +1,80 @@
+"""Inputs of ports over time: what a run in time is driven with."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .results import TransientResult
+from .session import Session
+
+Waveform = tuple[ArrayLike, ArrayLike]
+"""Times [s], ascending, and what is given to the port at them [V, or the unit of its kind]: straight lines between, constant before
+and after."""
+
+
+def checked(inputs: Mapping[str, Waveform]) -> dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]]:
+    """Waveforms as arrays.
+
+    Raises :class:`ValueError` for one that is none.
+    """
+    found = {}
+    for port, (t, values) in inputs.items():
+        times, levels = np.asarray(t, dtype=float), np.asarray(values, dtype=float)
+        if times.ndim != 1 or times.shape != levels.shape or times.size == 0:
+            raise ValueError(f"input {port!r}: expected as many times as values, got {times.shape} and {levels.shape}")
+        if not (np.isfinite(times).all() and np.isfinite(levels).all()):
+            raise ValueError(f"input {port!r}: times and values must be finite")
+        if (np.diff(times) <= 0).any():
+            late = int(np.argmax(np.diff(times) <= 0))
+            raise ValueError(f"input {port!r}: times must ascend, got {times[late]:g} s before {times[late + 1]:g} s")
+        found[port] = (times, levels)
+    return found
+
+
+def drive(
+    session: Session,
+    inputs: Mapping[str, Waveform],
+    stop: float,
+    points: int,
+    progress: Callable[[float], object] | None = None,
+) -> TransientResult:
+    """Steps a session along waveforms from 0 to ``stop`` [s] and reads its signals at ``points`` equally spaced times.
+
+    It begins in the static equilibrium of the inputs at 0. Steps end at every corner of a waveform; within one the device controls
+    its own.
+    """
+    if not (stop > 0.0 and points >= 2):
+        raise ValueError(f"expected stop > 0 and at least 2 points, got {stop:g} s and {points}")
+    waves = checked(inputs)
+    output = np.linspace(0.0, stop, points)
+    corners = [t[(t > 0.0) & (t < stop)] for t, _ in waves.values()]
+    times = _apart(np.concatenate([output, *corners]), stop)
+
+    def at(t: float) -> dict[str, float]:
+        return {port: float(np.interp(t, *wave)) for port, wave in waves.items()}
+
+    reply = session.operating_point(at(0.0))
+    columns: dict[str, list[float]] = {name: [reply.outputs[name]] for name in session.signals}
+    wanted, now = 1, 0.0
+    for t in times[1:]:
+        reply = session.step(at(t), dt=float(t - now))
+        now = float(t)
+        if wanted < points and abs(output[wanted] - t) <= 1e-12 * stop:
+            for name, column in columns.items():
+                column.append(reply.outputs[name])
+            wanted += 1
+            if progress is not None:
+                progress(now / stop)
+    signals = {name: np.array(column) for name, column in columns.items()}
+    return TransientResult(output, signals, dict(session.signals), len(times) - 1, 0, session.unknowns)
+
+
+def _apart(times: NDArray[np.float64], stop: float) -> NDArray[np.float64]:
+    """Ascending times; those closer than rounding to one before are that one."""
+    ordered = np.sort(times)
+    keep: NDArray[np.bool_] = np.concatenate([[True], np.diff(ordered) > 1e-12 * stop])
+    return np.asarray(ordered[keep], dtype=float)
+
