@@ -1,8 +1,10 @@
 //! A run repeated with half the steps and a tenth of the tolerances: how far off it may be.
 
 use super::compare::{self, Plot, Printed};
+use super::error::{CosimError, io};
 use super::finer::{TIGHTER, finer, keeping_plots, measuring};
-use super::{CosimError, CosimOptions, CosimReport, Scratch, io, run_whatever};
+use super::run::{CosimOptions, CosimReport, run_whatever};
+use super::scratch::Scratch;
 use crate::results::raw;
 use crate::results::table::Table;
 use std::path::Path;

@@ -5,7 +5,7 @@
 //! Yuan, Dickens, Earthquake Eng. Struct. Dyn. 10 (1982)).
 
 use super::ExportError;
-use super::reduce::{Mechanism, Push, dot};
+use super::mechanism::{Mechanism, Push, dot};
 use crate::analysis::AnalysisError;
 use crate::analysis::harmonic::modal;
 use crate::multibody::planar::Pose;

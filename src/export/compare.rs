@@ -9,7 +9,7 @@
 
 use super::basis::Basis;
 use super::linear::Reduced;
-use super::reduce::{Mechanism, port_names};
+use super::mechanism::{Mechanism, port_names};
 use super::{ExportError, Request};
 use crate::compile::Compiled;
 use crate::device::local::LocalDevice;

@@ -12,7 +12,7 @@
 use super::ExportError;
 use super::Request;
 use super::linear::{Port, SignalShown};
-use super::reduce::port_names;
+use super::mechanism::port_names;
 use crate::analysis::signal::Signal;
 use crate::compile::Compiled;
 use crate::device::PortKind;

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | [`linear`] | the reduced linear model: modes, static correction, lags of heaters, ports; its response |
 //! | [`reduce`], [`basis`] | how it is made of a mechanism at an operating point, and in which directions it moves |
+//! | `mechanism` | that mechanism, and what its inputs do there |
 //! | [`compare`] | how far it is from the exact small-signal answer, and how many modes that takes |
 //! | [`spice`] | it as a subcircuit |
 //! | [`verilog_a`] | it as a Verilog-A module |
@@ -22,6 +23,7 @@ pub mod linear;
 pub mod lumped;
 pub mod lumped_spice;
 pub mod lumped_verilog_a;
+mod mechanism;
 pub mod names;
 mod parts;
 pub mod reduce;

@@ -14,6 +14,8 @@
 //! | [`capacitor`] | C(u) of a comb and of parallel plates |
 //! | [`contact`] | pressure between surfaces that touch |
 //! | [`facing`] | two facing beams: pressure along a gap that varies over their length |
+//! | `facing_ends` | where facing beams measure |
+//! | `gap` | the forces of a gap, and their tangent |
 //! | [`network`] | potentials of a resistive network driven by ports and sources |
 //! | `laplacian` | potentials in a network of conductors |
 //! | [`thermal`] | mean temperature rise of beams that carry current |
@@ -32,6 +34,8 @@ pub mod contact;
 pub mod drive;
 pub mod energy;
 pub mod facing;
+mod facing_ends;
+mod gap;
 pub mod inputs;
 pub mod lag;
 mod laplacian;

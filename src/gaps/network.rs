@@ -8,8 +8,11 @@
 //! between them. What is left is a network of conductors (`laplacian`); the current of each source is what leaves the part of its tree
 //! that hangs on it.
 
+mod known;
+
 use super::laplacian::Laplacian;
 use crate::sets::Sets;
+use known::Known;
 use nalgebra::{DMatrix, DVector};
 use thiserror::Error;
 
@@ -64,7 +67,7 @@ impl Circuit {
             crate::budget::check();
             part.join(a, b);
         }
-        let known = Known::new(self, &mut part, ground);
+        let known = Known::new((self.nodes, &self.grounds), &self.sources, &mut part, ground);
         let count = self.sources.len();
         let free = known.free;
         // right-hand sides with their solutions, potentials with what sources fix of them, and conductances
@@ -129,114 +132,6 @@ impl Circuit {
             }
         }
         conductance
-    }
-}
-
-/// A node that a source touches, reached from the one before it.
-struct Step {
-    node: usize,
-    /// The source that it hangs on, 1 where it is at its plus and −1 where at its minus, and the node at the other end; none: ground.
-    by: Option<(usize, f64, Option<usize>)>,
-}
-
-/// What sources say of potentials: nodes that they join have one unknown between them, and differ by the sources in between.
-struct Known {
-    /// The unknown that a node's potential stands on; none: it is at ground but for sources.
-    row: Vec<Option<usize>>,
-    /// Number of unknowns.
-    free: usize,
-    /// Nodes that sources touch, each after the one that it hangs on.
-    order: Vec<Step>,
-    /// For each node that a source touches the sources between it and where its unknown is, with signs, in `sources`.
-    offsets: Vec<(usize, usize)>,
-    sources: Vec<(usize, f64)>,
-}
-
-impl Known {
-    /// Of a circuit whose parts are joined in `part`; one that nothing ties to ground has its first node there.
-    fn new(circuit: &Circuit, part: &mut Sets, ground: usize) -> Self {
-        let nodes = circuit.nodes;
-        let mut grounded = vec![false; nodes];
-        for &node in &circuit.grounds {
-            grounded[node] = true;
-        }
-        for (node, at_ground) in grounded.iter_mut().enumerate() {
-            if !part.together(node, ground) {
-                *at_ground = true;
-                part.join(node, ground);
-            }
-        }
-        // the sources at each node, ground last
-        let index = |node: Option<usize>| node.filter(|n| !grounded[*n]).unwrap_or(nodes);
-        let mut first = vec![0usize; nodes + 2];
-        let ends = |&(plus, minus): &(usize, Option<usize>)| [index(Some(plus)), index(minus)];
-        for end in circuit.sources.iter().flat_map(ends) {
-            first[end + 1] += 1;
-        }
-        for k in 0..=nodes {
-            first[k + 1] += first[k];
-        }
-        let (mut next, mut at) = (first.clone(), vec![0usize; 2 * circuit.sources.len()]);
-        for (s, source) in circuit.sources.iter().enumerate() {
-            for end in ends(source) {
-                at[next[end]] = s;
-                next[end] += 1;
-            }
-        }
-        let mut known = Self {
-            row: vec![None; nodes],
-            free: 0,
-            order: Vec::new(),
-            offsets: vec![(0, 0); nodes],
-            sources: Vec::new(),
-        };
-        let mut reached = grounded.clone();
-        reached.push(true);
-        let mut waiting: Vec<usize> = Vec::new();
-        let spread = |known: &mut Self, reached: &mut Vec<bool>, waiting: &mut Vec<usize>, from: usize| {
-            waiting.push(from);
-            while let Some(node) = waiting.pop() {
-                crate::budget::check();
-                for &s in &at[first[node]..first[node + 1]] {
-                    let [plus, minus] = ends(&circuit.sources[s]);
-                    let (other, sign) = if plus == node { (minus, -1.0) } else { (plus, 1.0) };
-                    if reached[other] {
-                        continue;
-                    }
-                    reached[other] = true;
-                    let begin = known.sources.len();
-                    if node < nodes {
-                        let (from, to) = known.offsets[node];
-                        crate::budget::lay_out((to - from + 1) * 16);
-                        known.sources.extend_from_within(from..to);
-                        known.row[other] = known.row[node];
-                    }
-                    known.sources.push((s, sign));
-                    known.offsets[other] = (begin, known.sources.len());
-                    known.order.push(Step { node: other, by: Some((s, sign, (node < nodes).then_some(node))) });
-                    waiting.push(other);
-                }
-            }
-        };
-        spread(&mut known, &mut reached, &mut waiting, nodes);
-        for node in 0..nodes {
-            if !reached[node] {
-                reached[node] = true;
-                known.row[node] = Some(known.free);
-                known.free += 1;
-                if first[node] < first[node + 1] {
-                    known.order.push(Step { node, by: None });
-                    spread(&mut known, &mut reached, &mut waiting, node);
-                }
-            }
-        }
-        known
-    }
-
-    /// The sources that a node's potential lies above its unknown, with signs.
-    fn offset(&self, node: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
-        let (from, to) = self.offsets[node];
-        self.sources[from..to].iter().copied()
     }
 }
 

@@ -5,10 +5,11 @@
 //! body that turns by θ carries the point at its arm r along, and the force F, which keeps its direction, gets the lever
 //! −θ·r, a moment of −θ·(r·F). Left out, a beam of N segments under thrust is too stiff by a share that falls with 1/N only.
 
-use super::System;
 use super::approach::Approach;
 use super::drive::Drive;
-use super::system::Gap;
+use super::facing_ends;
+use super::gap::Gap;
+use super::system::System;
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, BodyId, forces};
 use nalgebra::Vector2;
@@ -47,7 +48,7 @@ impl System {
                     pair(approach, factor * capacitor.at(u).slope + touch);
                 }
                 Gap::Facing { ends, side, facing } => {
-                    let z = self.ends(ends, *side, q);
+                    let z = facing_ends::values(&self.model, ends, *side, q);
                     let first = facing.at(&z).gradient * factor + facing.contact(&z).0;
                     pair(&ends[0], first[0]);
                     pair(&ends[1], first[2]);

@@ -1,7 +1,9 @@
 //! Which gaps of a system touch, how far each is from where it could not be closed further, and the energy in contacts.
 
 use super::contact::TOUCH;
-use super::system::{Gap, System};
+use super::facing_ends;
+use super::gap::Gap;
+use super::system::System;
 use crate::multibody::planar::Pose;
 
 impl System {
@@ -40,7 +42,9 @@ impl System {
         let of = |(g, gap): (usize, &Gap)| match gap {
             Gap::Single { contact: None, .. } => 0.0,
             Gap::Single { contact: Some(contact), .. } => contact.energy(self.distance(g, q)),
-            Gap::Facing { ends, side, facing } => facing.contact_energy(&self.ends(ends, *side, q)),
+            Gap::Facing { ends, side, facing } => {
+                facing.contact_energy(&facing_ends::values(&self.model, ends, *side, q))
+            }
             Gap::Stop { approach, ways, stop } => {
                 let u = approach.value(q, self.model.linear);
                 let side = |way: Option<f64>, u: f64| way.map_or(0.0, |w| stop.energy(w - u));
@@ -59,8 +63,12 @@ impl System {
                 if force == 0.0 { 0.0 } else { force * self.distance_slope(g, q, dq) }
             }
             Gap::Facing { ends, side, facing } => {
-                let force = facing.contact(&self.ends(ends, *side, q)).0;
-                if force.x == 0.0 && force.z == 0.0 { 0.0 } else { force.dot(&self.end_changes(ends, *side, q, dq)) }
+                let force = facing.contact(&facing_ends::values(&self.model, ends, *side, q)).0;
+                if force.x == 0.0 && force.z == 0.0 {
+                    0.0
+                } else {
+                    force.dot(&facing_ends::changes(&self.model, ends, *side, q, dq))
+                }
             }
             Gap::Stop { stop, .. } => {
                 let force = stop.force(self.distance(g, q)).0;

@@ -6,7 +6,7 @@
 //! until every mode is predicted to hold. The prediction is then computed; what fails is refined, what holds may be coarsened
 //! further. Beams of equal length, section and material get equal numbers, so that symmetric mechanisms stay symmetric.
 //!
-//! Then beams whose strain does not matter become rigid ([`rigid_beams`](super::rigid_beams)).
+//! Then beams whose strain does not matter become rigid (`rigid_beams`).
 //!
 //! More than 64 modes in the band, or a start of more than ten thousand segments, keep what the rule of [`order`] gives.
 //!

@@ -15,161 +15,23 @@
 //! nonlinear eigenvalue problems" (1977); W. Wagner, P. Wriggers, Eng. Comput. 5 (1988) 103, for switching along φ.
 
 mod branching;
+mod corrector;
 pub mod family;
+mod options;
 mod stepping;
+mod traced;
+
+pub use corrector::Continuation;
+pub use options::{Branch, ContinuationOptions};
+pub use traced::{Event, PathEnd, PathPoint, Traced};
+
+use corrector::{Place, Plane};
 
 use super::SolveError;
 use crate::gaps::System;
 use crate::multibody::BlockMatrix;
-use crate::multibody::factor::ZeroPivot;
 use crate::multibody::planar::Pose;
-use crate::options::analysis::PATH_POINTS;
 use family::Blend;
-
-/// Where to go at a bifurcation that takes the path's stability away.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Branch {
-    /// Straight on, along the unstable path.
-    Stay,
-    /// Along the null vector whose largest translation is positive.
-    #[default]
-    Plus,
-    /// Against it.
-    Minus,
-}
-
-/// How a path is traced. `Default` is the only place where the numbers stand.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ContinuationOptions {
-    /// Newton stops when a correction is below this share of the displacement, default 1e-9. Smaller: one more iteration.
-    pub tolerance: f64,
-    /// Newton iterations before a step is halved, default 8.
-    pub iterations: usize,
-    /// Longest step in s, default 0.04 of the way. Smaller: more points.
-    pub longest: f64,
-    /// Longest step as a share of s, default 0: where it exceeds `longest`, steps grow with s.
-    pub growth: f64,
-    /// The path arrives where s comes to this, default 1.
-    pub target: f64,
-    /// Largest change of a gap in one step, as a share of what is left of it, default 0.2: no step leads across a gap to
-    /// another branch. Smaller: more points.
-    pub closing: f64,
-    /// Largest distance of a point from where the tangent led, in steps, default 0.5. Tangents as straight as `straightness`
-    /// asks for lead within 0.1; what is further off lies on another branch.
-    pub aside: f64,
-    /// End where stability is lost, at a fold or a bifurcation; default false.
-    pub stop_at_loss: bool,
-    /// Smallest step, in s and in length scales, default 1e-9: below it the path is lost.
-    pub smallest: f64,
-    /// Smallest cosine between the tangents at both ends of a step, default 0.98. Larger: more points where the path bends.
-    pub straightness: f64,
-    /// Most points.
-    pub points: usize,
-    /// The path ends where s falls below this, default −1.
-    pub lowest: f64,
-    /// What to do at bifurcations.
-    pub branch: Branch,
-}
-
-impl Default for ContinuationOptions {
-    fn default() -> Self {
-        Self {
-            tolerance: 1e-9,
-            iterations: 8,
-            longest: 0.04,
-            growth: 0.0,
-            target: 1.0,
-            closing: 0.2,
-            aside: 0.5,
-            stop_at_loss: false,
-            smallest: 1e-9,
-            straightness: 0.98,
-            points: PATH_POINTS.count(),
-            lowest: -1.0,
-            branch: Branch::Plus,
-        }
-    }
-}
-
-/// A point of the path.
-#[derive(Debug, Clone, PartialEq)]
-pub struct PathPoint {
-    /// The family's number.
-    pub s: f64,
-    /// Displacements.
-    pub q: Vec<Pose>,
-    /// Negative eigenvalues of the tangent: 0 where stable under fixed loads and voltages.
-    pub negative: usize,
-}
-
-/// What happened at a point.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Event {
-    /// s turns back.
-    Fold,
-    /// Another path crosses.
-    Bifurcation,
-}
-
-/// Why a path ends.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum PathEnd {
-    /// It came to the last s asked for.
-    #[default]
-    Arrived,
-    /// s fell below the lowest one asked for.
-    TurnedBack,
-    /// It lost its stability, and was to end there.
-    Unstable,
-    /// It has as many points as asked for.
-    Full,
-    /// The next point was not found even with the smallest step.
-    Lost,
-    /// [`Continuation::trace`]'s watch said stop.
-    Stopped,
-}
-
-/// A traced path.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Traced {
-    /// Its points; folds and bifurcations are among them.
-    pub points: Vec<PathPoint>,
-    /// What happened, with the index of its point.
-    pub events: Vec<(Event, usize)>,
-    /// Why it ends.
-    pub end: PathEnd,
-    /// Newton iterations, each with one factorization.
-    pub iterations: usize,
-}
-
-/// Position and unit tangent.
-#[derive(Debug, Clone, Default)]
-struct Place {
-    q: Vec<Pose>,
-    s: f64,
-    dq: Vec<Pose>,
-    ds: f64,
-    negative: usize,
-}
-
-/// The plane that a corrector returns across: ⟨n_q, q − q₀⟩ + n_s·(s − s₀) = distance.
-struct Plane<'a> {
-    from: &'a Place,
-    dq: &'a [Pose],
-    ds: f64,
-    distance: f64,
-}
-
-/// Tracer with its storage.
-#[derive(Debug)]
-pub struct Continuation {
-    /// Options.
-    pub options: ContinuationOptions,
-    tangent: BlockMatrix<f64, 3>,
-    residual: Vec<Pose>,
-    slope: Vec<Pose>,
-    iterations: usize,
-}
 
 impl Continuation {
     /// Storage for a system.
@@ -250,94 +112,6 @@ impl Continuation {
         }
     }
 
-    /// Newton across a plane. Leaves the factored tangent of the last iterate. The error is a vanished pivot, or none where
-    /// the iteration did not settle.
-    fn correct(
-        &mut self,
-        family: &mut Blend,
-        plane: &Plane<'_>,
-        mut at: Place,
-    ) -> Result<(Place, usize), Option<ZeroPivot>> {
-        let mut last = f64::INFINITY;
-        for count in 1..=self.options.iterations {
-            crate::budget::check();
-            self.iterations += 1;
-            at.negative = self.linearize(family, &at)?;
-            let system = family.system();
-            self.tangent.solve(&system.model.pattern, &mut self.residual);
-            self.tangent.solve(&system.model.pattern, &mut self.slope);
-            let mut off = plane.ds * (at.s - plane.from.s) - plane.distance;
-            off += plane
-                .dq
-                .iter()
-                .zip(at.q.iter().zip(&plane.from.q))
-                .map(|(n, (a, b))| dot(system, n, &(a - b)))
-                .sum::<f64>()
-                / at.q.len() as f64;
-            let lean = plane.ds - inner(system, plane.dq, &self.slope);
-            let ds = (inner(system, plane.dq, &self.residual) - off) / lean;
-            let mut correction = ds.abs() * system.length_scale;
-            for (q, (a, b)) in at.q.iter_mut().zip(self.residual.iter().zip(&self.slope)) {
-                let dq = -a - b * ds;
-                *q += dq;
-                correction = correction.max(extent(system, &dq));
-            }
-            at.s += ds;
-            if !correction.is_finite() || (count > 2 && correction > last && correction > 1e-3 * system.length_scale) {
-                return Err(None);
-            }
-            let reach = at.q.iter().map(|q| extent(system, q)).fold(system.length_scale, f64::max);
-            // rounding: corrections that are small and no longer shrink. In stiff contacts they shrink by a quarter each time
-            let small = correction <= 1e-6 * reach && correction > 0.8 * last;
-            let stalled = small || (correction <= 1e-8 * reach && correction > 0.1 * last);
-            last = correction;
-            if correction <= self.options.tolerance * reach || stalled {
-                return Ok((at, count));
-            }
-        }
-        Err(None)
-    }
-
-    /// Factors the tangent at a place, with residual and slope; counts negative pivots.
-    fn linearize(&mut self, family: &mut Blend, at: &Place) -> Result<usize, Option<ZeroPivot>> {
-        family.slope(&at.q, at.s, &mut self.slope);
-        family.tangent(&at.q, &mut self.tangent, &mut self.residual);
-        let inertia = self.tangent.factor(&family.system().model.pattern).map_err(Some)?;
-        Ok(inertia.negative)
-    }
-
-    /// Sets the unit tangent of a place, in the sense of the one before, and its inertia. Where the tangent matrix is
-    /// singular to the last digit the secant stands in.
-    fn turn(&mut self, family: &mut Blend, at: &mut Place, before: &Place) {
-        match self.linearize(family, at) {
-            Ok(negative) => {
-                let system = family.system();
-                at.negative = negative;
-                self.tangent.solve(&system.model.pattern, &mut self.slope);
-                let mut ds = 1.0 / (1.0 + inner(system, &self.slope, &self.slope)).sqrt();
-                if ds * (before.ds - inner(system, &before.dq, &self.slope)) < 0.0 {
-                    ds = -ds;
-                }
-                at.ds = ds;
-                for (dq, slope) in at.dq.iter_mut().zip(&self.slope) {
-                    *dq = slope * -ds;
-                }
-            }
-            Err(_) => {
-                let system = family.system();
-                for (dq, (a, b)) in at.dq.iter_mut().zip(at.q.iter().zip(&before.q)) {
-                    *dq = a - b;
-                }
-                at.ds = at.s - before.s;
-                let length = (inner(system, &at.dq, &at.dq) + at.ds * at.ds).sqrt();
-                if length > 0.0 {
-                    at.dq.iter_mut().for_each(|dq| *dq /= length);
-                    at.ds /= length;
-                }
-            }
-        }
-    }
-
     /// Records what happened between two points; at a bifurcation that is to be left, the first point of the new branch.
     fn note(
         &mut self,
@@ -387,20 +161,4 @@ impl Continuation {
 
 fn point(place: &Place) -> PathPoint {
     PathPoint { s: place.s, q: place.q.clone(), negative: place.negative }
-}
-
-fn dot(system: &System, a: &Pose, b: &Pose) -> f64 {
-    let l = system.length_scale;
-    (a.x * b.x + a.y * b.y) / (l * l) + a.z * b.z
-}
-
-/// ⟨a, b⟩ of the module's text.
-fn inner(system: &System, a: &[Pose], b: &[Pose]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| dot(system, a, b)).sum::<f64>() / a.len() as f64
-}
-
-/// Largest displacement [m]: translation, or rotation times the length scale.
-fn extent(system: &System, p: &Pose) -> f64 {
-    let e = p.x.abs().max(p.y.abs()).max(p.z.abs() * system.length_scale);
-    if p.iter().all(|v| v.is_finite()) { e } else { f64::INFINITY }
 }

@@ -1,6 +1,6 @@
 //! Nodes by name.
 
-use super::{Node, NodeId};
+use super::node::{Node, NodeId};
 use std::collections::HashMap;
 use std::sync::OnceLock;
 

@@ -5,7 +5,8 @@
 //! strains nothing, but the entries of the block cancel to rounding only, and rounding of the stiffest joint is more than
 //! the whole stiffness of the softest. Strains that are taken first, with digits to spare, are right.
 
-use super::{JointKinematics, Symmetric, turn};
+use super::joint::{JointKinematics, Symmetric};
+use super::turn;
 use crate::multibody::double::Double;
 use nalgebra::{Vector2, Vector3};
 

@@ -18,6 +18,7 @@
 
 use super::geometric::Geometric;
 use super::kinematics::Map;
+use super::products::{gather, left, right, shift_columns, shift_rows, spread};
 use super::tree::{Link, Parent, Tree};
 use crate::multibody::factor::{Inertia, Scalar, ZeroPivot};
 use crate::multibody::planar::Block;
@@ -283,75 +284,6 @@ fn clear_locked<T: Scalar>(link: &Link, c: &mut Matrix3<T>) {
             c.column_mut(i).fill(T::zero());
         }
     }
-}
-
-/// A·S.
-#[inline(always)]
-fn right<T: Scalar>(a: &Matrix3<T>, map: &Map<f64>, link: &Link) -> Matrix3<T> {
-    let mut out = Matrix3::zeros();
-    for (k, column) in map.columns.iter().enumerate() {
-        for i in 0..3 {
-            out[(i, k)] = a[(i, 0)] * T::from_real(column[0]) + a[(i, 1)] * T::from_real(column[1]);
-        }
-    }
-    for i in 0..3 {
-        out[(i, 2)] += a[(i, 2)] * T::from_real(link.sign);
-    }
-    out
-}
-
-/// Sᵀ·A.
-#[inline(always)]
-fn left<T: Scalar>(a: &Matrix3<T>, map: &Map<f64>, link: &Link) -> Matrix3<T> {
-    let mut out = Matrix3::zeros();
-    for (k, column) in map.columns.iter().enumerate() {
-        for i in 0..3 {
-            out[(k, i)] = a[(0, i)] * T::from_real(column[0]) + a[(1, i)] * T::from_real(column[1]);
-        }
-    }
-    for i in 0..3 {
-        out[(2, i)] += a[(2, i)] * T::from_real(link.sign);
-    }
-    out
-}
-
-/// A·X.
-#[inline(always)]
-fn shift_columns<T: Scalar>(a: &Matrix3<T>, map: &Map<f64>) -> Matrix3<T> {
-    let mut out = *a;
-    for i in 0..3 {
-        out[(i, 2)] += a[(i, 0)] * T::from_real(map.lever[0]) + a[(i, 1)] * T::from_real(map.lever[1]);
-    }
-    out
-}
-
-/// Xᵀ·A.
-#[inline(always)]
-fn shift_rows<T: Scalar>(a: &Matrix3<T>, map: &Map<f64>) -> Matrix3<T> {
-    let mut out = *a;
-    for i in 0..3 {
-        out[(2, i)] += a[(0, i)] * T::from_real(map.lever[0]) + a[(1, i)] * T::from_real(map.lever[1]);
-    }
-    out
-}
-
-/// Sᵀ·f.
-#[inline(always)]
-fn gather<T: Scalar>(map: &Map<f64>, sign: f64, f: &Vector3<T>) -> Vector3<T> {
-    let [u, g, p] = map.columns.map(|c| T::from_real(c[0]) * f.x + T::from_real(c[1]) * f.y);
-    Vector3::new(u, g, p + T::from_real(sign) * f.z)
-}
-
-/// X·V + S·s.
-#[inline(always)]
-fn spread<T: Scalar>(map: &Map<f64>, sign: f64, parent: &Vector3<T>, s: &Vector3<T>) -> Vector3<T> {
-    let [u, g, p] = &map.columns;
-    let along = |i: usize| {
-        parent[i]
-            + T::from_real(map.lever[i]) * parent.z
-            + (T::from_real(u[i]) * s.x + T::from_real(g[i]) * s.y + T::from_real(p[i]) * s.z)
-    };
-    Vector3::new(along(0), along(1), parent.z + T::from_real(sign) * s.z)
 }
 
 /// The inverse of a symmetric block by its L·D·Lᵀ without exchanges, and the signs of its pivots.

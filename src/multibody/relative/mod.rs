@@ -10,6 +10,7 @@
 //! | [`tree`] | which body hangs on which, directions that move; closures |
 //! | [`number`] | `f64`, or a value with its derivative |
 //! | [`kinematics`] | poses, rates and accelerations, root → leaf, and the maps of motion |
+//! | `products` | products with those maps |
 //! | [`dynamics`] | forces over the coordinates, leaf → root; coordinates of a pose |
 //! | [`geometric`] | the stiffness that a force brings |
 //! | [`factor`] | factorization of a symmetric form over the coordinates, leaf → root |
@@ -19,6 +20,7 @@ pub mod factor;
 pub mod geometric;
 pub mod kinematics;
 pub mod number;
+mod products;
 pub mod tree;
 
 pub use factor::JointMatrix;

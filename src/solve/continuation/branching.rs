@@ -1,6 +1,7 @@
 //! Folds and bifurcations between two points of a path, and the branches that leave or return there.
 
-use super::{Branch, Continuation, Place, Plane, inner};
+use super::corrector::{Continuation, Place, Plane, inner};
+use super::options::Branch;
 use crate::multibody::planar::Pose;
 use crate::solve::family::Blend;
 

@@ -1,6 +1,6 @@
 //! One step along a path: how long it may be, and whether it stayed on its branch.
 
-use super::{Continuation, Place, Plane, dot, inner};
+use super::corrector::{Continuation, Place, Plane, dot, inner};
 use crate::solve::family::Blend;
 
 impl Continuation {

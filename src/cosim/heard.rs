@@ -1,0 +1,89 @@
+//! What ngspice says while it runs, how it ends, and whether the run was good.
+
+use super::error::CosimError;
+use std::io::{BufRead, BufReader, Read, Write};
+use std::path::Path;
+use std::process::Child;
+use std::time::Duration;
+
+/// What ngspice said and how it ended.
+pub(super) struct Heard {
+    status: std::process::ExitStatus,
+    aborted: Option<String>,
+    nothing_run: bool,
+    pub(super) cancelled: bool,
+    pub(super) output: String,
+}
+
+/// How often a run looks whether it is still wanted.
+const LOOK: Duration = Duration::from_millis(10);
+
+/// Passes ngspice's messages on, or keeps them, and hears the ones that tell a failure. Ends ngspice when it shall not go on.
+pub(super) fn listen(mut child: Child, capture: bool, keep_going: &dyn Fn() -> bool) -> std::io::Result<Heard> {
+    let stdout = child.stdout.take().map(|mut out| {
+        std::thread::spawn(move || {
+            let mut bytes = Vec::new();
+            out.read_to_end(&mut bytes).map(|_| bytes)
+        })
+    });
+    let stderr = child.stderr.take().map(|err| std::thread::spawn(move || hear(err, capture)));
+    let mut cancelled = false;
+    let status = loop {
+        if let Some(status) = child.try_wait()? {
+            break status;
+        }
+        if !cancelled && !keep_going() {
+            cancelled = true;
+            child.kill()?;
+        }
+        std::thread::sleep(LOOK);
+    };
+    let mut output = match stdout.map(std::thread::JoinHandle::join) {
+        Some(Ok(bytes)) => bytes?,
+        _ => Vec::new(),
+    };
+    let (aborted, nothing_run, mut messages) = match stderr.map(std::thread::JoinHandle::join) {
+        Some(Ok(heard)) => heard?,
+        _ => (None, false, Vec::new()),
+    };
+    output.append(&mut messages);
+    Ok(Heard { status, aborted, nothing_run, cancelled, output: String::from_utf8_lossy(&output).into_owned() })
+}
+
+pub(super) fn judge(heard: &Heard, failure: &Path, deck: &Path, has_control: bool) -> Result<(), CosimError> {
+    let output = || heard.output.clone();
+    if let Ok(reason) = std::fs::read_to_string(failure) {
+        return Err(CosimError::Stopped { reason, output: output() });
+    }
+    if let Some(line) = &heard.aborted {
+        return Err(CosimError::Failed { status: heard.status.to_string(), line: line.clone(), output: output() });
+    }
+    // ngspice ends with 1 when a deck's work was all done in .control and there are no other lines to run.
+    match (heard.nothing_run, has_control) {
+        (true, true) => Ok(()),
+        (true, false) => Err(CosimError::NothingRun { deck: deck.to_owned() }),
+        (false, _) if heard.status.success() => Ok(()),
+        _ => Err(CosimError::Failed { status: heard.status.to_string(), line: String::new(), output: output() }),
+    }
+}
+
+/// Reads ngspice's messages to their end: the line that tells an abort, whether nothing was run, and what was kept.
+fn hear(stderr: impl Read, capture: bool) -> std::io::Result<(Option<String>, bool, Vec<u8>)> {
+    let (mut aborted, mut nothing_run, mut messages) = (None, false, Vec::new());
+    let mut stderr = BufReader::new(stderr);
+    let mut line = Vec::new();
+    while stderr.read_until(b'\n', &mut line)? > 0 {
+        let text = String::from_utf8_lossy(&line);
+        if text.contains("simulation(s) aborted") {
+            aborted.get_or_insert_with(|| text.trim().to_owned());
+        }
+        nothing_run |= text.contains("no simulations run");
+        if capture {
+            messages.extend_from_slice(&line);
+        } else {
+            let _ = std::io::stderr().write_all(&line);
+        }
+        line.clear();
+    }
+    Ok((aborted, nothing_run, messages))
+}

@@ -1,0 +1,58 @@
+//! The folder of one run, and the initialisation file in it that ngspice reads at its start.
+
+use super::error::{CosimError, io};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU32, Ordering};
+
+/// A folder of this run, gone afterwards.
+pub(super) struct Scratch(pub(super) PathBuf);
+
+impl Scratch {
+    pub(super) fn new() -> Result<Self, CosimError> {
+        static COUNT: AtomicU32 = AtomicU32::new(0);
+        let count = COUNT.fetch_add(1, Ordering::Relaxed);
+        let path = std::env::temp_dir().join(format!("bimorph-cosim-{}-{count}", std::process::id()));
+        std::fs::create_dir(&path).map_err(io(|| format!("cannot make the folder {}", path.display())))?;
+        Ok(Self(path))
+    }
+}
+
+/// Writes the initialisation file. The plug-in is linked under a plain name: ngspice splits paths at blanks; so is the folder in which
+/// the includes of a deck are looked for that is run as a copy.
+pub(super) fn initialise(folder: &Path, plugin: &Path, includes: Option<&Path>) -> Result<(), CosimError> {
+    let link = folder.join("bimorph.cm");
+    #[cfg(unix)]
+    let linked = std::os::unix::fs::symlink(plugin, &link);
+    #[cfg(not(unix))]
+    let linked = std::fs::copy(plugin, &link).map(|_| ());
+    linked.map_err(io(|| format!("cannot write {}", link.display())))?;
+    let mut lines = String::from("* read by ngspice at its start\n");
+    let home = std::env::var_os("HOME").map(PathBuf::from);
+    let user = [Some(PathBuf::from(".")), home].into_iter().flatten().map(|d| d.join(".spiceinit"));
+    if let Some(user) = user.filter_map(|p| p.canonicalize().ok()).next() {
+        lines += &format!("source {}\n", user.display());
+    }
+    lines += &format!("codemodel {}\n", link.display());
+    if let Some(includes) = includes {
+        lines += &format!("set sourcepath = ( {} $sourcepath )\n", plain(includes, folder)?.display());
+    }
+    let path = folder.join(".spiceinit");
+    std::fs::write(&path, lines).map_err(io(|| format!("cannot write {}", path.display())))
+}
+
+impl Drop for Scratch {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+/// A folder under a name without blanks: its own, or that of a link.
+fn plain(folder: &Path, scratch: &Path) -> Result<PathBuf, CosimError> {
+    if !folder.to_string_lossy().contains(char::is_whitespace) {
+        return Ok(folder.to_owned());
+    }
+    let link = scratch.join("includes");
+    #[cfg(unix)]
+    std::os::unix::fs::symlink(folder, &link).map_err(io(|| format!("cannot write {}", link.display())))?;
+    Ok(link)
+}

@@ -1,0 +1,54 @@
+//! A traced path: its points, what happened at them, and why it ends.
+
+use crate::multibody::planar::Pose;
+
+/// A point of the path.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PathPoint {
+    /// The family's number.
+    pub s: f64,
+    /// Displacements.
+    pub q: Vec<Pose>,
+    /// Negative eigenvalues of the tangent: 0 where stable under fixed loads and voltages.
+    pub negative: usize,
+}
+
+/// What happened at a point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Event {
+    /// s turns back.
+    Fold,
+    /// Another path crosses.
+    Bifurcation,
+}
+
+/// Why a path ends.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum PathEnd {
+    /// It came to the last s asked for.
+    #[default]
+    Arrived,
+    /// s fell below the lowest one asked for.
+    TurnedBack,
+    /// It lost its stability, and was to end there.
+    Unstable,
+    /// It has as many points as asked for.
+    Full,
+    /// The next point was not found even with the smallest step.
+    Lost,
+    /// [`Continuation::trace`](super::Continuation::trace)'s watch said stop.
+    Stopped,
+}
+
+/// A traced path.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Traced {
+    /// Its points; folds and bifurcations are among them.
+    pub points: Vec<PathPoint>,
+    /// What happened, with the index of its point.
+    pub events: Vec<(Event, usize)>,
+    /// Why it ends.
+    pub end: PathEnd,
+    /// Newton iterations, each with one factorization.
+    pub iterations: usize,
+}

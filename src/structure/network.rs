@@ -1,0 +1,41 @@
+//! The electrical network that drives the mechanism: resistors, sources, and ports.
+
+use super::node::NodeId;
+use serde::{Deserialize, Serialize};
+
+/// A linear resistor between two electrical nodes.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Resistor {
+    /// Full element name.
+    pub name: String,
+    /// First node.
+    pub a: NodeId,
+    /// Second node.
+    pub b: NodeId,
+    /// Resistance [Ω], positive.
+    pub resistance: f64,
+}
+
+/// An ideal voltage source drawn in the netlist (SUGAR's `Vsrc`): potential of `plus` over `minus`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct VoltageSource {
+    /// Full element name.
+    pub name: String,
+    /// Positive node.
+    pub plus: NodeId,
+    /// Negative node.
+    pub minus: NodeId,
+    /// Voltage [V].
+    pub voltage: f64,
+}
+
+/// An electrical port: a pair of nodes that a circuit drives.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Port {
+    /// Port name: the full name of its netlist element.
+    pub name: String,
+    /// Positive node.
+    pub plus: NodeId,
+    /// Negative node; none: the structure's electrical ground.
+    pub minus: Option<NodeId>,
+}
