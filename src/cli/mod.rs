@@ -4,6 +4,7 @@
 //! only then prints to standard output, so that a failure leaves standard output empty and no file behind.
 
 mod ac;
+mod ac_report;
 mod chance;
 mod chart;
 mod check;
@@ -33,6 +34,7 @@ mod solver;
 mod statics;
 mod sweep;
 mod tran;
+mod tran_report;
 mod value;
 
 use clap::{Parser, Subcommand};

@@ -1,10 +1,11 @@
 //! `bimorph tran`: motion in time.
 
 use super::failure::Failure;
-use super::model::{Context, ModelArgs, Named, warn_of, warn_of_mesh};
+use super::model::{ModelArgs, Named, warn_of, warn_of_mesh};
 use super::output::OutputArgs;
 use super::solver::SolverChoice;
-use super::{draw_motion, progress, report, value};
+use super::tran_report::{Document, picture, table, text};
+use super::{draw_motion, progress, value};
 use bimorph::analysis::Watch;
 use bimorph::analysis::chart::released;
 use bimorph::analysis::frame::{frame, frame_transient};
@@ -12,18 +13,12 @@ use bimorph::analysis::integrator::Integrator;
 use bimorph::analysis::joint_transient::{JointReport, joint_transient};
 use bimorph::analysis::mesh::fitted_in_time;
 use bimorph::analysis::step_error::with_step_error;
-use bimorph::analysis::transient::{Counters, Event, TransientOptions, TransientResult, transient};
+use bimorph::analysis::transient::{TransientOptions, TransientResult, transient};
 use bimorph::compile::{Compiled, Formulation};
 use bimorph::multibody::relative::Unfit;
 use bimorph::options::Value;
 use bimorph::options::analysis::{TRAN_POINTS, TRAN_RHO, TRAN_STEP, TRAN_STOP};
-use bimorph::results::plot::axis::quantity;
-use bimorph::results::plot::chart::{self, Chart, Panel, Series};
-use bimorph::results::plot::svg::Picture;
-use bimorph::results::table::Table;
-use bimorph::solve::time::event::Direction;
 use clap::Args;
-use serde::Serialize;
 use std::path::PathBuf;
 
 /// Motion in time, from rest or from a released equilibrium.
@@ -109,39 +104,9 @@ pub(crate) struct Tran {
     output: OutputArgs,
 }
 
-#[derive(Debug, Serialize)]
-struct Document<'a> {
-    t: &'a [f64],
-    signals: Named<'a, Vec<f64>>,
-    units: Named<'a, String>,
-    method: &'a str,
-    counters: Counters,
-    events: &'a [Event],
-    joint_coordinates: Option<JointReport>,
-    /// What formulation auto took, and why.
-    formulation_taken: Option<String>,
-    unknowns: usize,
-    step_error: Option<f64>,
-    solver: SolverChoice,
-    release: Option<&'a str>,
-    port_voltages_v: Named<'a, f64>,
-    #[serde(flatten)]
-    context: Context<'a>,
-}
-
 impl Tran {
     pub(crate) fn run(&self) -> Result<(), Failure> {
-        self.output.check()?;
-        if let Some(path) = &self.draw {
-            draw_motion::check(path)?;
-            if self.solver == SolverChoice::Frame {
-                return Err(Failure::bad("--draw", "--solver recursion or another of its equations", "--solver frame"));
-            }
-        }
-        TRAN_STOP.check(&Value::Number(self.stop))?;
-        TRAN_POINTS.check(&Value::Count(self.points))?;
-        TRAN_STEP.check(&self.step.map_or(Value::Unset, Value::Number))?;
-        TRAN_RHO.check(&Value::Number(self.rho.unwrap_or(TRAN_RHO.number())))?;
+        self.check()?;
         let formulation = self.model.options()?.formulation;
         let initial = match self.solver {
             SolverChoice::Frame => self.model.compile_frame()?,
@@ -153,20 +118,7 @@ impl Tran {
         };
         let drawn = released.as_ref().unwrap_or(&initial);
         let method = self.integrator(drawn)?;
-        let run = TransientOptions {
-            stop: self.stop,
-            voltages: self.ports.clone(),
-            release: released.as_ref().map(|_| &initial),
-            method,
-            ..TransientOptions::default()
-        };
-        let busy = progress::spinner("mesh");
-        let fitted = match self.solver {
-            SolverChoice::Frame => Ok((drawn.clone(), run.release.cloned())),
-            _ => fitted_in_time(drawn, &run),
-        };
-        busy.finish_and_clear();
-        let (fitted, start) = fitted?;
+        let (fitted, start) = self.fitted(drawn, released.as_ref().map(|_| &initial), method)?;
         warn_of_mesh(drawn, &fitted);
         let (compiled, start) = (&fitted, start.as_ref());
         let mut signals = if self.signals.is_empty() { free_nodes(compiled) } else { value::names(&self.signals) };
@@ -193,27 +145,7 @@ impl Tran {
             Some((suited, method)) => (suited.formulation, *method),
             None => (formulation, method),
         };
-        let options = TransientOptions { method, ..options };
-        let bar = progress::bar("transient");
-        let watch = &mut progress::watch(&bar);
-        let result = match (self.solver, formulation) {
-            (SolverChoice::Frame, _) => {
-                frame(compiled).and_then(|frame| frame_transient(compiled, &frame, &options, watch)).map(|r| (r, None))
-            }
-            _ => {
-                let mut run =
-                    |options: &TransientOptions<'_>, sample: &mut dyn FnMut(f64, &[f64]), watch: Watch<'_>| {
-                        if matches!(formulation, Formulation::Rcr | Formulation::RcrElastic) {
-                            joint_transient(compiled, formulation, options, sample, watch).map(|(r, j)| (r, Some(j)))
-                        } else {
-                            transient(compiled, options, sample, watch).map(|r| (r, None))
-                        }
-                    };
-                with_step_error(&options, compiled, &mut run, &mut |_, _| (), watch)
-            }
-        };
-        bar.finish_and_clear();
-        let (mut result, joints) = result?;
+        let (mut result, joints) = self.moved(compiled, formulation, &TransientOptions { method, ..options })?;
         warn_of(&result.warnings);
         let drawn = result.signals.split_off(wanted);
         if let Some(path) = &self.draw {
@@ -248,6 +180,74 @@ impl Tran {
             text += &format!("formulation auto took {taken}\n");
         }
         self.output.finish(|| table(&title, &result), || Ok(picture(&title, &result)), &document, &text)
+    }
+
+    /// Each option within its range, before anything is compiled.
+    fn check(&self) -> Result<(), Failure> {
+        self.output.check()?;
+        if let Some(path) = &self.draw {
+            draw_motion::check(path)?;
+            if self.solver == SolverChoice::Frame {
+                return Err(Failure::bad("--draw", "--solver recursion or another of its equations", "--solver frame"));
+            }
+        }
+        TRAN_STOP.check(&Value::Number(self.stop))?;
+        TRAN_POINTS.check(&Value::Count(self.points))?;
+        TRAN_STEP.check(&self.step.map_or(Value::Unset, Value::Number))?;
+        TRAN_RHO.check(&Value::Number(self.rho.unwrap_or(TRAN_RHO.number())))?;
+        Ok(())
+    }
+
+    /// What moves, and what it is released from, on the mesh for the run.
+    fn fitted(
+        &self,
+        drawn: &Compiled,
+        release: Option<&Compiled>,
+        method: Integrator,
+    ) -> Result<(Compiled, Option<Compiled>), Failure> {
+        let run = TransientOptions {
+            stop: self.stop,
+            voltages: self.ports.clone(),
+            release,
+            method,
+            ..TransientOptions::default()
+        };
+        let busy = progress::spinner("mesh");
+        let fitted = match self.solver {
+            SolverChoice::Frame => Ok((drawn.clone(), release.cloned())),
+            _ => fitted_in_time(drawn, &run),
+        };
+        busy.finish_and_clear();
+        Ok(fitted?)
+    }
+
+    /// The motion, by the equations that were chosen.
+    fn moved(
+        &self,
+        compiled: &Compiled,
+        formulation: Formulation,
+        options: &TransientOptions<'_>,
+    ) -> Result<(TransientResult, Option<JointReport>), Failure> {
+        let bar = progress::bar("transient");
+        let watch = &mut progress::watch(&bar);
+        let result = match self.solver {
+            SolverChoice::Frame => {
+                frame(compiled).and_then(|frame| frame_transient(compiled, &frame, options, watch)).map(|r| (r, None))
+            }
+            _ => {
+                let mut run =
+                    |options: &TransientOptions<'_>, sample: &mut dyn FnMut(f64, &[f64]), watch: Watch<'_>| {
+                        if matches!(formulation, Formulation::Rcr | Formulation::RcrElastic) {
+                            joint_transient(compiled, formulation, options, sample, watch).map(|(r, j)| (r, Some(j)))
+                        } else {
+                            transient(compiled, options, sample, watch).map(|r| (r, None))
+                        }
+                    };
+                with_step_error(options, compiled, &mut run, &mut |_, _| (), watch)
+            }
+        };
+        bar.finish_and_clear();
+        Ok(result?)
     }
 
     fn integrator(&self, compiled: &Compiled) -> Result<Integrator, Failure> {
@@ -287,76 +287,4 @@ fn free_nodes(compiled: &Compiled) -> Vec<String> {
     let held = |id: usize| structure.supports.iter().any(|s| s.node.0 == id && s.held == [true; 3]);
     let free = structure.nodes.iter().enumerate().filter(|(id, node)| node.mechanical && !held(*id));
     free.flat_map(|(_, node)| [format!("{}.x", node.name), format!("{}.y", node.name)]).collect()
-}
-
-fn table(title: &str, result: &TransientResult) -> Result<Table, Failure> {
-    let mut table = Table::new(title, "Transient Analysis");
-    table.push_real("time", "s", result.t.clone())?;
-    for (name, unit, values) in &result.signals {
-        table.push_real(name, unit, values.clone())?;
-    }
-    Ok(table)
-}
-
-/// One panel for each unit.
-fn picture(title: &str, result: &TransientResult) -> Picture {
-    let mut panels: Vec<Panel> = Vec::new();
-    for (name, unit, values) in &result.signals {
-        let series = Series { name: name.clone(), values: values.clone() };
-        match panels.iter_mut().find(|p| p.unit == *unit) {
-            Some(panel) => panel.series.push(series),
-            None => {
-                panels.push(Panel { title: chart::word(unit).to_owned(), unit: unit.clone(), series: vec![series] })
-            }
-        }
-    }
-    chart::draw(&Chart {
-        title: title.to_owned(),
-        x_name: "time".to_owned(),
-        x_unit: "s".to_owned(),
-        x: result.t.clone(),
-        panels,
-    })
-}
-
-fn text(compiled: &Compiled, result: &TransientResult, joints: Option<&JointReport>) -> String {
-    let rows: Vec<Vec<String>> = result
-        .signals
-        .iter()
-        .map(|(name, unit, values)| {
-            let low = values.iter().copied().fold(f64::INFINITY, f64::min);
-            let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-            let last = values.last().copied().unwrap_or_default();
-            [low, high, last].iter().fold(vec![name.clone()], |mut row, v| {
-                row.push(quantity(*v, unit));
-                row
-            })
-        })
-        .collect();
-    let c = result.counters;
-    let events: String = result
-        .events
-        .iter()
-        .map(|e| {
-            let what = if e.contact { " (contact)" } else { "" };
-            let way = if e.direction == Direction::Up { "up" } else { "down" };
-            format!("{} crosses {:e} {way} at {}{what}\n", e.signal, e.level, quantity(e.t, "s"))
-        })
-        .collect();
-    let work = match joints {
-        None => format!("{} factorizations, {} solves", c.factorizations, c.solves),
-        Some(j) => format!(
-            "{} accelerations ({} near singular), n = {}, m = {}, largest gap of a loop {:.1e} m",
-            j.accelerations, j.singular_evaluations, j.coordinates, j.constraints, j.largest_gap_m
-        ),
-    };
-    let off = result.step_error.map_or_else(|| ", not compared".to_owned(), |e| format!(", off by {e:.1e} at most"));
-    format!(
-        "{}\n{events}{} samples, {} steps ({} rejected){off}, {work}; {}",
-        report::columns(&["signal", "lowest", "highest", "at the end"], &rows),
-        result.t.len(),
-        c.steps,
-        c.rejected,
-        report::footing(compiled, result.unknowns)
-    )
 }

@@ -15,6 +15,7 @@
 //! voltages and currents here holds for what is given and answered.
 
 pub mod agitation;
+mod answer;
 pub mod local;
 pub mod look;
 mod noise;

@@ -69,29 +69,7 @@ pub struct Frame {
 pub fn assemble(structure: &Structure, options: &FrameOptions) -> Result<Frame, DiscretizeError> {
     let undamped = options.undamped;
     let mut rigid = Assembly::new(structure, &[]);
-    let mut pieces: Vec<Piece<'_>> = Vec::new();
-    let mut beams: Vec<Vec<Point>> = Vec::with_capacity(structure.beams.len());
-    for (index, beam) in structure.beams.iter().enumerate() {
-        order::check(beam)?;
-        let count = match &options.elements {
-            Elements::Each(n) => (*n).max(1),
-            Elements::Band(band, tol) => order::segments(beam, Some(*band), *tol),
-            Elements::Beams(counts) => counts[index],
-        };
-        let (start, end) = (rigid.position(beam.a.0), rigid.position(beam.b.0));
-        let mut from = rigid.point(beam.a.0);
-        let mut points = vec![from];
-        let name = Arc::from(beam.name.as_str());
-        for k in 1..=count {
-            let at = start + (end - start) * (k as f64 / count as f64);
-            let to =
-                if k == count { rigid.point(beam.b.0) } else { rigid.add_segment(BodyName::segment(&name, k), at) };
-            pieces.push(Piece { beam, from, to, length: beam.length / count as f64 });
-            points.push(to);
-            from = to;
-        }
-        beams.push(points);
-    }
+    let (pieces, beams) = cut(structure, &options.elements, &mut rigid)?;
     if rigid.bodies.is_empty() {
         return Err(DiscretizeError::NothingMoves);
     }
@@ -171,6 +149,38 @@ pub fn assemble(structure: &Structure, options: &FrameOptions) -> Result<Frame, 
         (0..structure.nodes.len()).map(|n| structure.nodes[n].mechanical.then(|| placed(rigid.point(n)))).collect();
     let beams = beams.into_iter().map(|points| points.into_iter().map(placed).collect()).collect();
     Ok(Frame { system, load, expansion, nodes, beams })
+}
+
+/// The elements of every beam, and the points between them along its centreline, ends included.
+fn cut<'a>(
+    structure: &'a Structure,
+    elements: &Elements,
+    rigid: &mut Assembly,
+) -> Result<(Vec<Piece<'a>>, Vec<Vec<Point>>), DiscretizeError> {
+    let mut pieces: Vec<Piece<'_>> = Vec::new();
+    let mut beams: Vec<Vec<Point>> = Vec::with_capacity(structure.beams.len());
+    for (index, beam) in structure.beams.iter().enumerate() {
+        order::check(beam)?;
+        let count = match elements {
+            Elements::Each(n) => (*n).max(1),
+            Elements::Band(band, tol) => order::segments(beam, Some(*band), *tol),
+            Elements::Beams(counts) => counts[index],
+        };
+        let (start, end) = (rigid.position(beam.a.0), rigid.position(beam.b.0));
+        let mut from = rigid.point(beam.a.0);
+        let mut points = vec![from];
+        let name = Arc::from(beam.name.as_str());
+        for k in 1..=count {
+            let at = start + (end - start) * (k as f64 / count as f64);
+            let to =
+                if k == count { rigid.point(beam.b.0) } else { rigid.add_segment(BodyName::segment(&name, k), at) };
+            pieces.push(Piece { beam, from, to, length: beam.length / count as f64 });
+            points.push(to);
+            from = to;
+        }
+        beams.push(points);
+    }
+    Ok((pieces, beams))
 }
 
 /// One element.

@@ -16,9 +16,11 @@ mod mesh;
 mod motion;
 mod paths;
 mod relative;
+mod relative_motion;
 mod scenes;
 mod schemes;
 mod told;
+mod vm236;
 
 use bimorph::analysis::statics::{NodeMotion, StaticResult, static_equilibrium};
 use bimorph::compile::{CompileOptions, Compiled, Junctions, compile};

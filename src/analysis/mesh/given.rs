@@ -9,11 +9,12 @@ use super::super::modes::{ModesResult, modes};
 use super::super::pull_in::{PullInResult, pull_in};
 use super::super::statics::{StaticResult, operating_point, result_at};
 use super::super::{AnalysisError, PortVoltages};
+use super::equilibrium::{self, told_of_static};
+use super::frequencies::{frequency_outputs, loaded, worst};
+use super::meshed::meshed;
+use super::pull_in::{points_of_pull_in, pull_in_outputs};
 use super::warnings::of_pieces;
-use super::{
-    Request, equilibrium, fitted, frequency_outputs, loaded, meshed, points_of_pull_in, pull_in_outputs,
-    told_of_static, worst,
-};
+use super::{Request, fitted};
 use crate::compile::Compiled;
 use crate::netlist::Diagnostic;
 use crate::refine::counted;

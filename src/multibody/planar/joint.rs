@@ -243,6 +243,7 @@ impl JointKinematics {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::multibody::planar::swing;
 
     fn sample() -> (JointFrame, [f64; 3], Pose, Pose) {
         let frame = JointFrame {

@@ -11,12 +11,11 @@
 //! the acceleration when q̈ = 0 and the parent's is zero.
 
 use super::mechanism::Mechanism;
+use super::pair::{Pair, minus, plus, times, turn};
+use super::placed::{Hanging, Placed};
 use super::scalar::Real;
 use super::tree::{Link, Parent};
 use std::ops::Range;
-
-/// Two components.
-pub(super) type Pair<T> = [T; 2];
 
 /// Inertia of one body over lanes.
 #[derive(Debug, Clone, Copy)]
@@ -80,115 +79,6 @@ impl<T: Real> Arms<T> {
             arm: [lane(&|l| l.frame.arm_b.x), lane(&|l| l.frame.arm_b.y)],
         }
     }
-}
-
-/// Where a body is and how it moves: what its children and the closures need of it.
-#[derive(Debug, Clone, Copy)]
-pub struct Placed<T> {
-    /// Displacement and rotation from the drawn place.
-    pub(super) pose: [T; 3],
-    /// Rate.
-    pub(super) rate: [T; 3],
-    /// Sine and cosine of half the rotation.
-    half: Pair<T>,
-}
-
-/// How a placed body hangs on its parent: what the reduction needs of it, inward and outward.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Hanging<T> {
-    /// From the parent's centre of mass to the pin, R_p·arm_p; where there is no pin, to this body's centre of mass [m].
-    pub lever_parent: Pair<T>,
-    /// From this body's centre of mass to the pin, R·arm; zero where there is none [m].
-    lever: Pair<T>,
-    /// Velocity part c of the acceleration [m/s²].
-    pub bias: Pair<T>,
-}
-
-/// Cosine less one and sine of an angle, from the sine and cosine of its half: nothing cancels.
-#[inline(always)]
-fn turned<T: Real>(half: Pair<T>) -> Pair<T> {
-    let twice = half[0] + half[0];
-    [-(twice * half[0]), twice * half[1]]
-}
-
-impl<T: Real> Placed<T> {
-    pub(super) const REST: Self = Self { pose: [T::ZERO; 3], rate: [T::ZERO; 3], half: [T::ZERO, T::ONE] };
-
-    /// Takes `from` as one of the lanes.
-    #[inline(always)]
-    pub(super) fn set_lane(&mut self, lane: usize, from: &Placed<f64>) {
-        let set = |to: &mut [T], from: &[f64]| to.iter_mut().zip(from).for_each(|(t, f)| t.set_lane(lane, *f));
-        set(&mut self.pose, &from.pose);
-        set(&mut self.rate, &from.rate);
-        set(&mut self.half, &from.half);
-    }
-
-    /// One of the lanes.
-    pub(super) fn lane(&self, lane: usize) -> Placed<f64> {
-        Placed {
-            pose: self.pose.map(|x| x.lane(lane)),
-            rate: self.rate.map(|x| x.lane(lane)),
-            half: self.half.map(|x| x.lane(lane)),
-        }
-    }
-
-    /// (R − 1)·v without cancellation at small angles.
-    #[inline(always)]
-    pub(super) fn swing(&self, v: Pair<T>) -> Pair<T> {
-        let [less, s] = turned(self.half);
-        [less * v[0] - s * v[1], s * v[0] + less * v[1]]
-    }
-
-    /// R((θ + θ_other)/2)·v.
-    #[inline(always)]
-    pub(super) fn mean(&self, other: &Self, v: Pair<T>) -> Pair<T> {
-        let c = self.half[1] * other.half[1] - self.half[0] * other.half[0];
-        let s = self.half[0] * other.half[1] + self.half[1] * other.half[0];
-        [c * v[0] - s * v[1], s * v[0] + c * v[1]]
-    }
-}
-
-impl<T: Real> Hanging<T> {
-    /// One of the lanes.
-    pub(super) fn lane(&self, lane: usize) -> Hanging<f64> {
-        let pair = |x: Pair<T>| x.map(|x| x.lane(lane));
-        Hanging { lever_parent: pair(self.lever_parent), lever: pair(self.lever), bias: pair(self.bias) }
-    }
-
-    pub(super) const REST: Self = Self { lever_parent: [T::ZERO; 2], lever: [T::ZERO; 2], bias: [T::ZERO; 2] };
-
-    /// From the parent's centre of mass to this one, d [m].
-    #[inline(always)]
-    pub(super) fn shift(&self) -> Pair<T> {
-        minus(self.lever_parent, self.lever)
-    }
-
-    /// Joint axis of a pin, whose one column of S it is.
-    #[inline(always)]
-    pub(super) fn pin_axis(&self, sign: T) -> [T; 3] {
-        [sign * self.lever[1], -(sign * self.lever[0]), sign]
-    }
-}
-
-#[inline(always)]
-pub(super) fn plus<T: Real>(a: Pair<T>, b: Pair<T>) -> Pair<T> {
-    [a[0] + b[0], a[1] + b[1]]
-}
-
-#[inline(always)]
-pub(super) fn minus<T: Real>(a: Pair<T>, b: Pair<T>) -> Pair<T> {
-    [a[0] - b[0], a[1] - b[1]]
-}
-
-#[inline(always)]
-pub(super) fn times<T: Real>(k: T, v: Pair<T>) -> Pair<T> {
-    [k * v[0], k * v[1]]
-}
-
-/// Rotation by a right angle.
-#[inline(always)]
-pub(super) fn turn<T: Real>(v: Pair<T>) -> Pair<T> {
-    [-v[1], v[0]]
 }
 
 /// A body that nothing holds: its coordinates are its pose, its axes the directions themselves.

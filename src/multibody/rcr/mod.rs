@@ -10,6 +10,7 @@
 //! | `mechanism` | what the recursion reads of a linkage: geometry and inertia over lanes, and the schedule; immutable |
 //! | `schedule` | who meets whom: fronts, rows passing through, places in the arenas |
 //! | `data` | what changes: loads, poses, rows and fronts on the way, accelerations |
+//! | `pair`, `placed` | vectors of the plane; where a body is and how it hangs |
 //! | `kinematics` | outward: poses, rates, joint axes, velocity parts |
 //! | `closures` | the rows of loop closures and their velocity parts |
 //! | [`reduction`] | the recursion inward and outward |
@@ -35,7 +36,9 @@ mod front;
 mod general;
 mod kinematics;
 mod mechanism;
+mod pair;
 mod pin;
+mod placed;
 mod projection;
 pub mod reduction;
 pub mod rotary;

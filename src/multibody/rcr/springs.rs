@@ -4,7 +4,7 @@
 //! direction of a closure acts on its two bodies through its rows.
 
 use super::data::Reduction;
-use super::kinematics::Placed;
+use super::placed::Placed;
 use super::stages::AddedInertia;
 use super::traversal::Traversal;
 use super::tree::{Closure, Linkage};

@@ -64,6 +64,22 @@ struct Running<'a> {
     steps: u64,
 }
 
+impl<'a> Running<'a> {
+    fn start(number: usize, system: &System, (h, tol): (f64, f64), watcher: &'a mut dyn Watcher) -> Self {
+        Self {
+            number,
+            tol,
+            watcher,
+            mass: system.model.bodies.iter().map(|b| b.mass).sum(),
+            contacts: (0..system.gaps.len()).any(|g| system.touching(g).is_some()),
+            s: 0.0,
+            h,
+            rejected: 0,
+            steps: 0,
+        }
+    }
+}
+
 /// Counted work of the lanes.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct LaneWork {
@@ -104,18 +120,8 @@ pub fn advance<'a>(
                 }
                 method.put(k, variant.system, &variant.ramp, &variant.motion);
                 lanes[k] = Some(Lane { system: variant.system, ramp: variant.ramp });
-                let system = variant.system;
-                running[k] = Some(Running {
-                    number,
-                    tol: variant.tol,
-                    watcher: variant.watcher,
-                    mass: system.model.bodies.iter().map(|b| b.mass).sum(),
-                    contacts: (0..system.gaps.len()).any(|g| system.touching(g).is_some()),
-                    s: 0.0,
-                    h: variant.h,
-                    rejected: 0,
-                    steps: 0,
-                });
+                let pace = (variant.h, variant.tol);
+                running[k] = Some(Running::start(number, variant.system, pace, variant.watcher));
             }
         }
         if running.iter().all(Option::is_none) {

@@ -9,6 +9,48 @@ use crate::multibody::{BodyId, Pattern};
 impl Schedule {
     /// The schedule of a linkage.
     pub(in crate::multibody::rcr) fn new(linkage: &Linkage, plan: Plan) -> Self {
+        let mut sweep = Sweep::new(linkage, plan);
+        for body in 0..linkage.links.len() {
+            sweep.lay(body);
+        }
+        let mut schedule = sweep.schedule;
+        (schedule.node_count, schedule.block_count) = (sweep.nodes.count(), sweep.blocks.count());
+        schedule.mark_runs(&linkage.pattern);
+        schedule
+    }
+
+    /// Marks what goes from pin to pin within a run, and who receives anything else.
+    fn mark_runs(&mut self, pattern: &Pattern) {
+        for body in 0..self.steps.len() {
+            let pin = |k: usize| self.steps.get(k).is_some_and(|s| s.kind == Kind::Pin);
+            let hands_on = self.steps[body].parent() == Some(body + 1) && pin(body) && pin(body + 1);
+            self.steps[body].hands_on = hands_on;
+            for k in pattern.column(body).filter(|_| !hands_on) {
+                self.steps[pattern.row(k)].gathers = true;
+            }
+        }
+    }
+}
+
+/// The sweep on its way.
+struct Sweep<'a> {
+    linkage: &'a Linkage,
+    /// Which blocks of the pattern couple.
+    coupled: Vec<bool>,
+    /// Rows that have come to each body.
+    incoming: Vec<usize>,
+    /// Bodies that the rows at each body touch beside it.
+    support: Vec<Vec<usize>>,
+    nodes: Slots,
+    blocks: Slots,
+    /// Joints laid so far that are no pins.
+    joint: u32,
+    schedule: Schedule,
+}
+
+impl<'a> Sweep<'a> {
+    /// Before the first body: closures stand at the bodies where their rows begin.
+    fn new(linkage: &'a Linkage, plan: Plan) -> Self {
         let pattern = &linkage.pattern;
         let count = linkage.links.len();
         let mut incoming = vec![0usize; count];
@@ -34,7 +76,7 @@ impl Schedule {
                 support[body].extend(other);
             }
         }
-        let mut schedule = Self {
+        let schedule = Schedule {
             plan,
             turns: Vec::with_capacity(count),
             steps: Vec::with_capacity(count),
@@ -51,112 +93,116 @@ impl Schedule {
             redundant: 0,
             multiplications: 0,
         };
-        let (mut nodes, mut blocks) = (Slots::new(count), Slots::new(pattern.off_blocks()));
-        let mut joint = 0;
-        for body in 0..count {
-            let link = &linkage.links[body];
-            let freedom = link.freedom();
-            let front = pattern.column(body).len();
-            let rows = incoming[body];
-            let left = rows.saturating_sub(freedom);
-            let mut bodies = std::mem::take(&mut support[body]);
-            let mut parent = NONE;
-            if let Parent::Body(p) = link.parent {
-                parent = slot_of(pattern, body, p);
-                if rows > 0 {
-                    bodies.push(p);
-                }
-            }
-            bodies.sort_unstable();
-            bodies.dedup();
-            let coupled = pattern.column(body).any(|k| coupled[k]);
-            let mut turn = Packed {
-                front: narrow(front),
-                rows: narrow(rows),
-                parent: narrow(parent),
-                targets: narrow(schedule.targets.len()),
-                row_start: narrow(schedule.row_entries),
-                next: u32::MAX,
-                next_row: 0,
-                map_start: narrow(schedule.maps.len()),
-            };
-            schedule.row_entries += rows * (3 + 3 * front + 1);
-            schedule.multiplications += multiplications(freedom, front, rows, parent != NONE);
-            if left > 0 {
-                match bodies.first() {
-                    None => schedule.redundant += left,
-                    Some(&next) => {
-                        turn.next = narrow(next);
-                        turn.next_row = narrow(incoming[next]);
-                        incoming[next] += left;
-                        support[next].extend(bodies.iter().skip(1));
-                        for k in pattern.column(body) {
-                            let b = pattern.row(k);
-                            schedule.maps.push(match b.cmp(&next) {
-                                std::cmp::Ordering::Equal => 0,
-                                std::cmp::Ordering::Greater => narrow(1 + slot_of(pattern, next, b)),
-                                // not touched by these rows: its entries are zero
-                                std::cmp::Ordering::Less => u32::MAX,
-                            });
-                        }
-                    }
-                }
-            }
-            // what has gathered for this body is taken before it hands anything on
-            let node = nodes.hold(body);
-            nodes.release(body);
-            let column = pattern.column(body);
-            schedule.blocks.extend(column.clone().map(|k| blocks.hold(k)));
-            column.clone().for_each(|k| blocks.release(k));
-            schedule.fronts.extend(column.clone().map(|k| pattern.row(k) as u32));
-            schedule.nodes.extend(column.clone().map(|k| nodes.hold(pattern.row(k))));
-            schedule.targets.extend(pattern.targets(body).iter().map(|&k| blocks.hold(k as usize)));
-            let alone = rows == 0 && !coupled && !plan.coupled;
-            let pin = link.pin && alone && (front == 0 || front == 1 && parent != NONE);
-            let small = Small::of(freedom, front, rows).filter(|_| plan.fast);
-            let kind = if pin { Kind::Pin } else { small.map_or(Kind::Any, Kind::Small) };
-            let step = Step {
-                kind,
-                pin: link.pin,
-                gathers: false,
-                hands_on: false,
-                parent: match link.parent {
-                    Parent::Body(p) => narrow(p),
-                    Parent::Ground | Parent::Free => u32::MAX,
-                },
-                turns: link.moving[2],
-                coupled,
-                freedom: freedom as u8,
-                first: narrow(link.first),
-                joint,
-                node,
-                column: narrow(column.start),
-                coefficient_start: narrow(schedule.coefficient_entries),
-            };
-            schedule.coefficient_entries += match kind {
-                Kind::Pin => 2,
-                Kind::Small(_) => 3 * front,
-                Kind::Any => freedom * (freedom + 3 * front),
-            };
-            joint += u32::from(!link.pin);
-            schedule.steps.push(step);
-            schedule.turns.push(turn);
-        }
-        (schedule.node_count, schedule.block_count) = (nodes.count(), blocks.count());
-        schedule.mark_runs(pattern);
-        schedule
+        let (nodes, blocks) = (Slots::new(count), Slots::new(pattern.off_blocks()));
+        Self { linkage, coupled, incoming, support, nodes, blocks, joint: 0, schedule }
     }
 
-    /// Marks what goes from pin to pin within a run, and who receives anything else.
-    fn mark_runs(&mut self, pattern: &Pattern) {
-        for body in 0..self.steps.len() {
-            let pin = |k: usize| self.steps.get(k).is_some_and(|s| s.kind == Kind::Pin);
-            let hands_on = self.steps[body].parent() == Some(body + 1) && pin(body) && pin(body + 1);
-            self.steps[body].hands_on = hands_on;
-            for k in pattern.column(body).filter(|_| !hands_on) {
-                self.steps[pattern.row(k)].gathers = true;
+    /// The turn and the step of a body.
+    fn lay(&mut self, body: usize) {
+        let linkage = self.linkage;
+        let (link, pattern) = (&linkage.links[body], &linkage.pattern);
+        let (freedom, front, rows) = (link.freedom(), pattern.column(body).len(), self.incoming[body]);
+        let (parent, bodies) = self.touched(body);
+        let coupled = pattern.column(body).any(|k| self.coupled[k]);
+        let schedule = &mut self.schedule;
+        let mut turn = Packed {
+            front: narrow(front),
+            rows: narrow(rows),
+            parent: narrow(parent),
+            targets: narrow(schedule.targets.len()),
+            row_start: narrow(schedule.row_entries),
+            next: u32::MAX,
+            next_row: 0,
+            map_start: narrow(schedule.maps.len()),
+        };
+        schedule.row_entries += rows * (3 + 3 * front + 1);
+        schedule.multiplications += multiplications(freedom, front, rows, parent != NONE);
+        let left = rows.saturating_sub(freedom);
+        if left > 0 {
+            match bodies.split_first() {
+                None => schedule.redundant += left,
+                Some((&next, others)) => {
+                    (turn.next, turn.next_row) = (narrow(next), narrow(self.incoming[next]));
+                    self.hand_on(body, left, next, others);
+                }
             }
         }
+        let node = self.place(body);
+        let schedule = &mut self.schedule;
+        let alone = rows == 0 && !coupled && !schedule.plan.coupled;
+        let pin = link.pin && alone && (front == 0 || front == 1 && parent != NONE);
+        let small = Small::of(freedom, front, rows).filter(|_| schedule.plan.fast);
+        let kind = if pin { Kind::Pin } else { small.map_or(Kind::Any, Kind::Small) };
+        schedule.steps.push(Step {
+            kind,
+            pin: link.pin,
+            gathers: false,
+            hands_on: false,
+            parent: match link.parent {
+                Parent::Body(p) => narrow(p),
+                Parent::Ground | Parent::Free => u32::MAX,
+            },
+            turns: link.moving[2],
+            coupled,
+            freedom: freedom as u8,
+            first: narrow(link.first),
+            joint: self.joint,
+            node,
+            column: narrow(pattern.column(body).start),
+            coefficient_start: narrow(schedule.coefficient_entries),
+        });
+        schedule.coefficient_entries += match kind {
+            Kind::Pin => 2,
+            Kind::Small(_) => 3 * front,
+            Kind::Any => freedom * (freedom + 3 * front),
+        };
+        self.joint += u32::from(!link.pin);
+        schedule.turns.push(turn);
+    }
+
+    /// The parent's place in the front of a body, and the bodies that its rows touch, ascending.
+    fn touched(&mut self, body: usize) -> (usize, Vec<usize>) {
+        let mut bodies = std::mem::take(&mut self.support[body]);
+        let mut parent = NONE;
+        if let Parent::Body(p) = self.linkage.links[body].parent {
+            parent = slot_of(&self.linkage.pattern, body, p);
+            if self.incoming[body] > 0 {
+                bodies.push(p);
+            }
+        }
+        bodies.sort_unstable();
+        bodies.dedup();
+        (parent, bodies)
+    }
+
+    /// Gives the rows that are left at a body to the next one that they touch.
+    fn hand_on(&mut self, body: usize, left: usize, next: usize, others: &[usize]) {
+        let pattern = &self.linkage.pattern;
+        self.incoming[next] += left;
+        self.support[next].extend(others);
+        for k in pattern.column(body) {
+            let b = pattern.row(k);
+            self.schedule.maps.push(match b.cmp(&next) {
+                std::cmp::Ordering::Equal => 0,
+                std::cmp::Ordering::Greater => narrow(1 + slot_of(pattern, next, b)),
+                // not touched by these rows: its entries are zero
+                std::cmp::Ordering::Less => u32::MAX,
+            });
+        }
+    }
+
+    /// Storage of a body and of the blocks of its column; what has gathered for it is taken before it hands anything on.
+    fn place(&mut self, body: usize) -> u32 {
+        let (pattern, schedule) = (&self.linkage.pattern, &mut self.schedule);
+        let node = self.nodes.hold(body);
+        self.nodes.release(body);
+        let column = pattern.column(body);
+        schedule.blocks.extend(column.clone().map(|k| self.blocks.hold(k)));
+        column.clone().for_each(|k| self.blocks.release(k));
+        schedule.fronts.extend(column.clone().map(|k| pattern.row(k) as u32));
+        schedule.nodes.extend(column.map(|k| self.nodes.hold(pattern.row(k))));
+        schedule.targets.extend(pattern.targets(body).iter().map(|&k| self.blocks.hold(k as usize)));
+        node
     }
 }
 

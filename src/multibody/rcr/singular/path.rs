@@ -1,6 +1,7 @@
 //! The path itself: rows enter with the closures, each body's coordinates are taken out, and accelerations come back.
 
-use super::{LIGHT, Room, Singularity};
+use super::room::Room;
+use super::{LIGHT, Singularity};
 use crate::multibody::rcr::data::Reduction;
 use crate::multibody::rcr::reduction::{Given, Task, Workspace};
 use crate::multibody::rcr::schedule::NONE;
@@ -56,8 +57,6 @@ impl Room {
         self.shorten(&mut hard, 3 + 3 * w, (length, task.zero()), report);
         self.shorten(&mut soft, 3 + 3 * w, (length, 0.0), report);
         report.heavy = report.heavy.max(soft.len());
-        let hanging = placement.hanging[body];
-        let bias = if task == Task::Accelerations { hanging.bias } else { [0.0; 2] };
         // coordinates in units of length
         let (mut axes, mut torque) = ([[0.0; 3]; 3], [0.0; 3]);
         for q in 0..nd {
@@ -65,44 +64,12 @@ impl Room {
             axes[q] = placement.axis(mechanism, body, at).map(|x| x / unit);
             torque[q] = given.torque[at] / unit;
         }
-        let [dx, dy] = hanging.shift();
-        for &row in hard.iter().chain(&soft) {
-            let entries = self.row_mut(row);
-            let (own, value) = ([entries[0], entries[1], entries[2]], entries[3 + 3 * w]);
-            entries.copy_within(3..3 + 3 * w, nd);
-            for q in 0..nd {
-                entries[q] = own[0] * axes[q][0] + own[1] * axes[q][1] + own[2] * axes[q][2];
-            }
-            if turn.parent != NONE {
-                let p = nd + 3 * turn.parent;
-                entries[p] += own[0];
-                entries[p + 1] += own[1];
-                entries[p + 2] += own[2] + (own[1] * dx - own[0] * dy);
-            }
-            entries[k] = value - (own[0] * bias[0] + own[1] * bias[1]);
-        }
+        self.over_coordinates(given, body, &hard, &axes);
+        self.over_coordinates(given, body, &soft, &axes);
         let (mut m, mut g) = (std::mem::take(&mut work.front.m), std::mem::take(&mut work.front.g));
         work.assemble(given, body, (&axes, &torque), &mut m, &mut g);
         work.add_joint_inertia(mechanism, body, true, &mut m);
-        // the articulated-body step, whose coordinates' own rows √D·(x + …) join the heavy ones
-        for e in 0..nd {
-            let root = m[e * k + e].sqrt();
-            let row = self.take(root);
-            let entries = self.row_mut(row);
-            entries[..e].fill(0.0);
-            entries[e] = root;
-            for j in e + 1..k {
-                entries[j] = m[j * k + e] / root;
-            }
-            entries[k] = g[e] / root;
-            for j in e + 1..k {
-                g[j] -= entries[j] * entries[k];
-                for l in e + 1..=j {
-                    m[j * k + l] -= entries[j] * entries[l];
-                }
-            }
-            soft.push(row);
-        }
+        self.own_rows((nd, k), &mut m, &mut g, &mut soft);
         self.left.clear();
         self.left.extend(0..nd);
         for at in 0..nd {
@@ -153,6 +120,53 @@ impl Room {
         work.hand_on(mechanism, turn, &m, &g);
         (work.front.m, work.front.g) = (m, g);
         (self.hard, self.soft) = (hard, soft);
+    }
+
+    /// Rows over the motion of a body and its front become rows over its coordinates and its front.
+    fn over_coordinates(&mut self, given: Given<'_, f64>, body: usize, rows: &[u32], axes: &[[f64; 3]; 3]) {
+        let Given { task, mechanism, placement, .. } = given;
+        let turn = mechanism.schedule.turn(body);
+        let (nd, w) = (turn.freedom, turn.front);
+        let hanging = placement.hanging[body];
+        let bias = if task == Task::Accelerations { hanging.bias } else { [0.0; 2] };
+        let [dx, dy] = hanging.shift();
+        for &row in rows {
+            let entries = self.row_mut(row);
+            let (own, value) = ([entries[0], entries[1], entries[2]], entries[3 + 3 * w]);
+            entries.copy_within(3..3 + 3 * w, nd);
+            for q in 0..nd {
+                entries[q] = own[0] * axes[q][0] + own[1] * axes[q][1] + own[2] * axes[q][2];
+            }
+            if turn.parent != NONE {
+                let p = nd + 3 * turn.parent;
+                entries[p] += own[0];
+                entries[p + 1] += own[1];
+                entries[p + 2] += own[2] + (own[1] * dx - own[0] * dy);
+            }
+            entries[nd + 3 * w] = value - (own[0] * bias[0] + own[1] * bias[1]);
+        }
+    }
+
+    /// The articulated-body step, whose coordinates' own rows √D·(x + …) join the heavy ones.
+    fn own_rows(&mut self, (nd, k): (usize, usize), m: &mut [f64], g: &mut [f64], soft: &mut Vec<u32>) {
+        for e in 0..nd {
+            let root = m[e * k + e].sqrt();
+            let row = self.take(root);
+            let entries = self.row_mut(row);
+            entries[..e].fill(0.0);
+            entries[e] = root;
+            for j in e + 1..k {
+                entries[j] = m[j * k + e] / root;
+            }
+            entries[k] = g[e] / root;
+            for j in e + 1..k {
+                g[j] -= entries[j] * entries[k];
+                for l in e + 1..=j {
+                    m[j * k + l] -= entries[j] * entries[l];
+                }
+            }
+            soft.push(row);
+        }
     }
 
     fn outward(&self, given: Given<'_, f64>, body: usize, accelerations: &mut [[f64; 3]], out: &mut [f64]) {

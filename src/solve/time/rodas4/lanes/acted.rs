@@ -1,7 +1,8 @@
 //! What acts on few bodies of a variant and has branches of its own: gaps and dead loads, variant by variant.
 
-use super::{IN_PLACE, Lane, LaneRodas4};
-use crate::multibody::lanes::{LANES, LanePose, Real};
+use super::storage::{IN_PLACE, Lane, LaneRodas4};
+use crate::multibody::lanes::Real;
+use crate::multibody::lanes::{LANES, LanePose};
 use crate::multibody::planar::Pose;
 
 impl LaneRodas4 {

@@ -1,6 +1,9 @@
 //! Ports that are not electrical: forces, moments, heat and the motion of the frame keep the contract of a device, in both
 //! formulations, and mean what they say.
 
+mod frame;
+mod meaning;
+
 use bimorph::compile::{CompileOptions, Compiled, Formulation, Junctions, compile};
 use bimorph::device::local::LocalDevice;
 use bimorph::device::{
@@ -10,7 +13,7 @@ use bimorph::netlist::Bundle;
 use std::sync::Arc;
 
 /// A heated chevron that pushes a shuttle with a comb ahead of it and a plate beside it.
-const SHUTTLE: &str = include_str!("netlists/shuttle.net");
+const SHUTTLE: &str = include_str!("../netlists/shuttle.net");
 
 /// Every kind of port, in an order of their own, and a size of each that does something.
 const PORTS: [(&str, PortKind, f64); 10] = [
@@ -221,80 +224,6 @@ fn ports_are_reciprocal() {
     }
 }
 
-/// A lumped mass m on a spring k with a damper c.
-const OSCILLATOR: &str = "
-anchor * [f] [l=1u w=1u h=1u]
-mass2d * [m] [m=1e-10]
-guide2d * [m] []
-spring2d * [f m] [kx=2]
-damper2d * [f m] [bx=1e-7]
-";
-
-/// Static: x = F/k and x = −m·a/k to rounding. In time: after a step of the acceleration the closed form of the damped
-/// oscillator to the tolerance of 1e-3 and better, with internal steps of its own.
-#[test]
-fn forces_and_accelerations_move_a_mass() {
-    let (m, k, c): (f64, f64, f64) = (1e-10, 2.0, 1e-7);
-    for formulation in [Formulation::Compliant] {
-        let mut device = opened(&compiled(OSCILLATOR, formulation), &["m.x", "frame.ax"], &["m.vx"]);
-        let still = ask(&mut device, Mode::Static, None, 0.0, &[3e-6, 500.0]);
-        let exact = (3e-6 - m * 500.0) / k;
-        assert!((still.currents[0] / exact - 1.0).abs() < 1e-12, "{:e}", still.currents[0]);
-        assert!((still.di_dv[0] * k - 1.0).abs() < 1e-12 && (still.di_dv[1] / (-m / k) - 1.0).abs() < 1e-12);
-        assert_eq!(still.currents[1], 0.0, "a frame's port draws nothing");
-        // from rest at a = 1e4 m/s², held
-        let (omega, zeta) = ((k / m).sqrt(), c / (2.0 * (k * m).sqrt()));
-        let mut at = ask(&mut device, Mode::Static, None, 0.0, &[0.0, 0.0]);
-        let (a, sag) = (1e4, -m * 1e4 / k);
-        at = ask(&mut device, Mode::Transient, at.token, 1e-12, &[0.0, a]);
-        let mut t: f64 = 0.0;
-        for _ in 0..200 {
-            at = ask(&mut device, Mode::Transient, at.token, 2e-7, &[0.0, a]);
-            t += 2e-7;
-            let turn = omega * (1.0 - zeta * zeta).sqrt();
-            let swing = (turn * t).cos() + zeta / (1.0 - zeta * zeta).sqrt() * (turn * t).sin();
-            let exact = sag * (1.0 - (-zeta * omega * t).exp() * swing);
-            assert!((at.currents[0] - exact).abs() < 1e-4 * sag.abs(), "{t:e}: {:e} {exact:e}", at.currents[0]);
-        }
-    }
-}
-
-/// A watt given to a beam acts as a watt of its own current: V²/R through the port's heat and V at its ends leave the same
-/// rise, that of V²/(12ρk) (Carslaw & Jaeger §4.9), steady and with its lag.
-#[test]
-fn heat_given_is_heat_of_a_current() {
-    const HEATER: &str = "
-    process p = [ Youngsmodulus=165e9 density=2300 h=2u thermalexpansion=2.7e-6 thermcond=34 ambienttemperature=300 ]
-    anchor p [a] []
-    hot beam2det p [a b] [l=200u w=2u R=1k tau=30u]
-    anchor p [b] []
-    mass2d * [m] [m=1e-12]
-    spring2d * [a m] [kx=1 ky=1 krz=1e-12]
-    eground * [b] []
-    heat port * [a] []
-    ";
-    for formulation in FORMULATIONS {
-        if formulation == Formulation::Rcr {
-            continue;
-        }
-        let model = compiled(HEATER, formulation);
-        let mut device = opened(&model, &["heat", "hot.T"], &["hot.T"]);
-        let watts = 1.5f64 * 1.5 / 1e3;
-        let by_current = ask(&mut device, Mode::Static, None, 0.0, &[1.5, 0.0]);
-        let by_heat = ask(&mut device, Mode::Static, None, 0.0, &[0.0, watts]);
-        let exact = watts * 200e-6 / (12.0 * 34.0 * 4e-12);
-        for reply in [&by_current, &by_heat] {
-            assert!((reply.currents[1] / exact - 1.0).abs() < 1e-12, "{}", reply.currents[1]);
-            assert!((reply.outputs[0] - 300.0 - exact).abs() < 1e-9);
-        }
-        let cold = ask(&mut device, Mode::Static, None, 0.0, &[0.0, 0.0]);
-        let on = ask(&mut device, Mode::Transient, cold.token, 1e-15, &[0.0, watts]);
-        let later = ask(&mut device, Mode::Transient, on.token, 30e-6, &[0.0, watts]);
-        let lag = exact * (1.0 - (-1.0f64).exp());
-        assert!((later.currents[1] / lag - 1.0).abs() < 1e-9, "{}", later.currents[1]);
-    }
-}
-
 /// What cannot be a port is refused with the reason.
 #[test]
 fn impossible_ports_are_refused() {
@@ -311,121 +240,5 @@ fn impossible_ports_are_refused() {
     match device.open(&OpenRequest { ports: vec!["frame.wz".into()], signals: vec![], noise: None }) {
         Err(DeviceError::BadRequest { expected, .. }) => assert!(expected.contains("compliant"), "{expected}"),
         other => panic!("{other:?}"),
-    }
-}
-
-/// A mass of 1e-9 kg, drawn 30 µm along x, on springs along x and y and about z.
-const GYROSCOPE: &str = "
-anchor * [f] [l=1u w=1u h=1u]
-mass2d * [m] [m=1e-9 J=1e-18]
-spring2d * [f m] [kx=4 ky=4.2 krz=1e-8 l=30u]
-damper2d * [f m] [bx=8e-8 by=8e-8 brz=1e-15 l=30u]
-";
-const MASS: f64 = 1e-9;
-const STIFF: [f64; 2] = [4.0, 4.2];
-const DAMPING: f64 = 8e-8;
-
-/// Small displacements only: springs and dampers whose frame does not turn with the mass.
-fn gyroscope(ports: &[&str], signals: &[&str]) -> LocalDevice {
-    let options = CompileOptions { linear: true, tol: 1e-5, ..CompileOptions::default() };
-    let model = compile(&Bundle::from_text("gyro.net", GYROSCOPE), &options).unwrap_or_else(|e| panic!("{e}"));
-    opened(&Arc::new(model), ports, signals)
-}
-
-/// At a steady rate the mass moves outwards, x = mΩ²·r/(k − mΩ²).
-#[test]
-fn a_turning_frame_pushes_outwards() {
-    let mut device = gyroscope(&["frame.wz"], &["m.x", "m.y"]);
-    for rate in [1e3, -1e4] {
-        let still = ask(&mut device, Mode::Static, None, 0.0, &[rate]);
-        let push = MASS * rate * rate;
-        let exact = push * 30e-6 / (STIFF[0] - push);
-        assert!((still.outputs[0] / exact - 1.0).abs() < 1e-11, "{:e} {exact:e}", still.outputs[0]);
-        let slope = 2.0 * MASS * rate * 30e-6 * STIFF[0] / (STIFF[0] - push).powi(2);
-        assert!((still.doutputs_dv[0] / slope - 1.0).abs() < 1e-9, "{:e} {slope:e}", still.doutputs_dv[0]);
-        assert!(still.outputs[1].abs() < 1e-12 * exact);
-    }
-}
-
-/// While the rate of the frame goes up and down again and a force pushes, the mass follows
-/// m·(q̈ + 2Ω e×q̇ + Ω̇ e×r − Ω²r) + c·q̇ + k·q = F and J·(θ̈ + Ω̇) + … = 0: to 1e-5 of its reach against the classical Runge-Kutta
-/// method with steps of 20 ns.
-#[test]
-fn coriolis_and_euler_push_a_mass() {
-    let mut device = gyroscope(&["m.x", "frame.wz"], &["m.y", "m.rz", "m.vx"]);
-    let rate = |t: f64| if t < 1e-4 { 2e3 * t / 1e-4 } else { 2e3 - 1e3 * (t - 1e-4) / 1e-4 };
-    let turning = |t: f64| if t < 1e-4 { 2e7 } else { -1e7 };
-    let force = |t: f64| 2e-6 * t / 2e-4;
-    // x, y, θ and their rates
-    let slope = |t: f64, z: [f64; 6], turning: f64| {
-        let [x, y, angle, vx, vy, spin] = z;
-        let (w, rx) = (rate(t), 30e-6 + x);
-        let ax = (force(t) - STIFF[0] * x - DAMPING * vx) / MASS + 2.0 * w * vy + turning * y + w * w * rx;
-        let ay = (-STIFF[1] * y - DAMPING * vy) / MASS - 2.0 * w * vx - turning * rx + w * w * y;
-        let spun = (-1e-8 * angle - 1e-15 * spin) / 1e-18 - turning;
-        [vx, vy, spin, ax, ay, spun]
-    };
-    let mut z = [0.0; 6];
-    let mut at = ask(&mut device, Mode::Static, None, 0.0, &[0.0, 0.0]);
-    let (mut reach, mut worst) = ([0.0f64; 3], [0.0f64; 3]);
-    for k in 0..400 {
-        let t = f64::from(k) * 5e-7;
-        let w = turning(t + 1e-9);
-        for n in 0..25 {
-            let (t, h) = (t + f64::from(n) * 2e-8, 2e-8);
-            let add = |k: [f64; 6], h: f64| std::array::from_fn(|i| z[i] + h * k[i]);
-            let k1 = slope(t, z, w);
-            let k2 = slope(t + h / 2.0, add(k1, h / 2.0), w);
-            let k3 = slope(t + h / 2.0, add(k2, h / 2.0), w);
-            let k4 = slope(t + h, add(k3, h), w);
-            z = std::array::from_fn(|i| z[i] + h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]));
-        }
-        let end = t + 5e-7;
-        at = ask(&mut device, Mode::Transient, at.token, 5e-7, &[force(end), rate(end)]);
-        for (i, (got, want)) in
-            [(at.currents[0], z[0]), (at.outputs[0], z[1]), (at.outputs[1], z[2])].into_iter().enumerate()
-        {
-            reach[i] = reach[i].max(want.abs());
-            worst[i] = worst[i].max((got - want).abs());
-        }
-    }
-    for i in 0..3 {
-        assert!(worst[i] < 1e-5 * reach[i], "{i}: {:e} of {:e}", worst[i], reach[i]);
-    }
-}
-
-/// In small signals about a steady rate the two modes are coupled: the exact answer of two degrees of freedom, 1e-9, far from
-/// the resonances, between them and on them, at rates at which Coriolis' force is many times that of the dampers.
-#[test]
-fn small_signals_of_a_gyroscope() {
-    let mut device = gyroscope(&["m.x", "m.y", "frame.wz"], &[]);
-    for rate in [1.0, 300.0, 2e3] {
-        let still = ask(&mut device, Mode::Static, None, 0.0, &[0.0, 0.0, rate]);
-        let mut small = SmallSignal::default();
-        for omega in [1e3, (STIFF[0] / MASS).sqrt(), 6.4e4, (STIFF[1] / MASS).sqrt(), 3e5] {
-            device.linearize(still.token.unwrap(), omega, &mut small).unwrap();
-            // [a −b; b d]·q = f with b = iω·2mΩ, as pairs of real and imaginary parts
-            let a = STIFF.map(|k| [k - MASS * (rate * rate + omega * omega), omega * DAMPING]);
-            let b = 2.0 * MASS * rate * omega;
-            let product = |p: [f64; 2], q: [f64; 2]| [p[0] * q[0] - p[1] * q[1], p[0] * q[1] + p[1] * q[0]];
-            let over = |p: [f64; 2], q: [f64; 2]| {
-                let size = q[0] * q[0] + q[1] * q[1];
-                product(p, [q[0] / size, -q[1] / size])
-            };
-            let both = product(a[0], a[1]);
-            let determinant = [both[0] - b * b, both[1]];
-            let exact = [
-                over(a[1], determinant),
-                over([0.0, b], determinant),
-                over([0.0, -b], determinant),
-                over(a[0], determinant),
-            ];
-            let size = exact.iter().fold(0.0f64, |m, z| m.max(z[0].hypot(z[1])));
-            for (place, want) in [0, 1, 3, 4].into_iter().zip(exact) {
-                let got = small.admittance[place];
-                let error = (got[0] - want[0]).hypot(got[1] - want[1]);
-                assert!(error < 1e-9 * size, "Ω {rate} ω {omega:e} [{place}]: {got:?} {want:?}");
-            }
-        }
     }
 }

@@ -1,0 +1,122 @@
+//! The mesh for modes: the highest one asked for decides, and about a loaded state that state and its frequencies too.
+
+use super::super::modes::{ModesResult, modes, modes_with_curves};
+use super::super::{AnalysisError, BeamMotions, PortVoltages};
+use super::equilibrium;
+use super::meshed::{chosen, meshed, on};
+use crate::compile::Compiled;
+use crate::discretize::DiscretizeError;
+use crate::refine::counted;
+use crate::refine::doubling::{self, Output};
+use crate::refine::model_order::ModelOrder;
+
+/// Modes beyond which none are compared with those of a finer mesh: their own estimates stand.
+const MOST_COMPARED: usize = 64;
+
+/// The modes on the mesh for them: [`fitted`], and what was found on the way.
+///
+/// # Errors
+/// See [`fitted`].
+pub(crate) fn modes_fitted(
+    compiled: &Compiled,
+    count: usize,
+    voltages: &PortVoltages,
+) -> Result<(Compiled, Shaped), AnalysisError> {
+    let (order, found) = for_modes(compiled, count, voltages)?;
+    let found = found.filter(|(segments, _)| *segments == order.segments);
+    let fitted = on(compiled, order)?;
+    let found = match found {
+        Some((_, found)) => found,
+        None => modes_with_curves(&fitted, count, voltages)?,
+    };
+    Ok((fitted, found))
+}
+
+/// Modes with the shapes of their beams.
+pub(crate) type Shaped = (ModesResult, Vec<BeamMotions>);
+
+/// Those of a mesh.
+pub(super) type OfMesh = Option<(Vec<usize>, Shaped)>;
+
+/// The mesh for modes, and those of a mesh that was looked at, which may be another one.
+pub(super) fn for_modes(
+    compiled: &Compiled,
+    count: usize,
+    voltages: &PortVoltages,
+) -> Result<(ModelOrder, OfMesh), AnalysisError> {
+    let loaded = loaded(compiled, voltages);
+    let given = chosen(compiled) || compiled.options.band.is_some();
+    let order = if given {
+        compiled.order.clone()
+    } else {
+        let detail = |error: DiscretizeError| AnalysisError::NotConverged { detail: error.to_string() };
+        counted::choose(&compiled.structure, &compiled.options, count).map_err(detail)?
+    };
+    let mut analyse = |segments: &[usize]| {
+        let model = meshed(compiled, segments)?;
+        Ok::<_, AnalysisError>(frequency_outputs(&modes(&model, count, voltages)?, count))
+    };
+    if !loaded {
+        // modes about the drawing know their errors, where the scheme lets them
+        let (order, found) = own_estimate(compiled, order, count, &[])?;
+        if order.estimated_error.is_some() || count > MOST_COMPARED {
+            return Ok((order, found));
+        }
+        let order = match given {
+            true => doubling::estimate(&compiled.options, order.segments, &mut analyse),
+            false => doubling::fit(&compiled.structure, &compiled.options, order.segments, &mut analyse),
+        };
+        return Ok((order?, found));
+    }
+    if chosen(compiled) {
+        return Ok((doubling::estimate(&compiled.options, order.segments, &mut analyse)?, None));
+    }
+    let (still, _) = equilibrium::order(compiled, voltages, order.segments)?;
+    let (own, found) = own_estimate(compiled, still.clone(), count, voltages)?;
+    let worst = |a: Option<f64>, b: Option<f64>| Some(a?.max(b?));
+    let enough = own.estimated_error.is_some_and(|error| error <= counted::SAFETY * compiled.options.tol);
+    if enough || count > MOST_COMPARED {
+        let estimated_error = worst(still.estimated_error, own.estimated_error);
+        return Ok((ModelOrder { estimated_error, ..own }, found));
+    }
+    let moving = doubling::fit(&compiled.structure, &compiled.options, still.segments, &mut analyse)?;
+    Ok((ModelOrder { estimated_error: worst(still.estimated_error, moving.estimated_error), ..moving }, found))
+}
+
+/// Largest of the errors; none where one of them is not known.
+pub(super) fn worst(mut errors: impl Iterator<Item = Option<f64>>) -> Option<f64> {
+    errors.try_fold(0.0, |worst: f64, error| Some(worst.max(error?.abs())))
+}
+
+/// True where modes are about an equilibrium that is not the drawing.
+pub(super) fn loaded(compiled: &Compiled, voltages: &PortVoltages) -> bool {
+    let system = &compiled.parts.system;
+    !voltages.is_empty()
+        || system.electrics.fixed.iter().any(|v| *v != 0.0)
+        || system.loads.iter().any(|l| l.moment != 0.0 || l.force.norm() > 0.0)
+        || system.model.joints.iter().any(|j| j.rest != 0.0)
+}
+
+/// What is compared of modes.
+pub(super) fn frequency_outputs(found: &ModesResult, count: usize) -> Vec<Output> {
+    let highest = found.frequencies_hz.last().copied().unwrap_or(0.0);
+    // rigid motions have no frequency of their own
+    let output = |f: &f64| Output { value: *f, scale: f.max(1e-3 * highest).max(f64::MIN_POSITIVE) };
+    let mut outputs: Vec<Output> = found.frequencies_hz.iter().map(output).collect();
+    outputs.resize(count, Output { value: f64::NAN, scale: 1.0 });
+    outputs
+}
+
+/// The estimate that the modes themselves make of a mesh.
+fn own_estimate(
+    compiled: &Compiled,
+    order: ModelOrder,
+    count: usize,
+    voltages: &PortVoltages,
+) -> Result<(ModelOrder, OfMesh), AnalysisError> {
+    let model = meshed(compiled, &order.segments)?;
+    let found = modes_with_curves(&model, count, voltages)?;
+    let estimated_error = worst(found.0.errors.iter().copied());
+    let found = Some((order.segments.clone(), found));
+    Ok((ModelOrder { estimated_error, ..order }, found))
+}

@@ -1,0 +1,38 @@
+//! A model with other numbers of segments.
+
+use super::super::AnalysisError;
+use super::warnings::{WARNING, beyond, warning};
+use crate::compile::Compiled;
+use crate::discretize::DiscretizeError;
+use crate::refine::model_order::ModelOrder;
+use std::borrow::Cow;
+
+/// True where the number of segments is the user's.
+pub(super) fn chosen(compiled: &Compiled) -> bool {
+    compiled.options.segments.is_some()
+}
+
+/// The model on another mesh, with a warning where that does not hold the tolerance.
+pub(super) fn on(compiled: &Compiled, order: ModelOrder) -> Result<Compiled, AnalysisError> {
+    let mut fitted = if order.segments == compiled.order.segments {
+        Compiled { order, ..compiled.clone() }
+    } else {
+        let detail = |error: DiscretizeError| AnalysisError::NotConverged { detail: error.to_string() };
+        compiled.with_order(order).map_err(detail)?
+    };
+    let Some(message) = beyond(fitted.options.tol, fitted.order.estimated_error) else { return Ok(fitted) };
+    let help =
+        if chosen(&fitted) { "leave --segments away, or take more" } else { "compare with --segments of your own" };
+    fitted.warnings.items.push(warning(WARNING, message, help));
+    Ok(fitted)
+}
+
+/// The model with so many segments.
+pub(super) fn meshed<'a>(compiled: &'a Compiled, segments: &[usize]) -> Result<Cow<'a, Compiled>, AnalysisError> {
+    if segments == compiled.order.segments {
+        return Ok(Cow::Borrowed(compiled));
+    }
+    let order = ModelOrder { segments: segments.to_vec(), ..compiled.order.clone() };
+    let refused = |error: DiscretizeError| AnalysisError::NotConverged { detail: error.to_string() };
+    compiled.with_order(order).map(Cow::Owned).map_err(refused)
+}

@@ -1,0 +1,80 @@
+//! The mesh for pull-in: both voltages, compared with those of twice the segments.
+
+use super::super::AnalysisError;
+use super::super::pull_in::{PullInResult, pull_in};
+use super::super::statics::{OperatingPoint, operating_point};
+use super::equilibrium::OF_DEFLECTION;
+use super::meshed::{chosen, meshed, on};
+use super::warnings::warn_of_pieces;
+use crate::compile::Compiled;
+use crate::refine::doubling::{self, Output};
+use crate::refine::model_order::ModelOrder;
+
+/// Error of a pull-in voltage for that share: a third of it, found as [`OF_DEFLECTION`].
+const OF_PULL_IN: f64 = 1.0 / 3.0;
+
+/// What is compared of pull-in.
+pub(super) fn pull_in_outputs(found: &PullInResult) -> Vec<Output> {
+    let output = |volts: f64| Output { value: volts, scale: volts.abs().max(f64::MIN_POSITIVE) };
+    vec![output(found.pull_in_v), found.release_v.map_or(Output { value: f64::NAN, scale: 1.0 }, output)]
+}
+
+/// Pull-in on the mesh for it: [`fitted`], and what was found on the way.
+///
+/// # Errors
+/// See [`fitted`].
+pub(crate) fn pull_in_fitted(
+    compiled: &Compiled,
+    port: Option<&str>,
+    max: f64,
+) -> Result<(Compiled, PullInResult), AnalysisError> {
+    let (order, found) = for_pull_in(compiled, port, max)?;
+    let mut fitted = on(compiled, order)?;
+    let known = found.into_iter().find(|(segments, _)| *segments == fitted.order.segments);
+    let result = match known {
+        Some((_, result)) => PullInResult { estimated_error: fitted.order.estimated_error, ..result },
+        None => pull_in(&fitted, port, max)?,
+    };
+    let points = points_of_pull_in(&fitted, &result);
+    warn_of_pieces(&mut fitted, &points);
+    Ok((fitted, result))
+}
+
+/// Where gaps along beams may have too few pieces for a pull-in, and how much that counts: next to the fold; and closed, where as
+/// much is left out as at release, but for V².
+pub(super) fn points_of_pull_in(fitted: &Compiled, result: &PullInResult) -> Vec<(OperatingPoint, f64)> {
+    if fitted.structure.beam_gaps.is_empty() {
+        return Vec::new();
+    }
+    let release = result.release_v.map_or(0.0, |volts| (volts / result.pull_in_v).powi(2));
+    let at = |(volts, times): (f64, f64)| {
+        let point = operating_point(fitted, &[(result.port.clone(), volts * result.pull_in_v)]);
+        point.ok().map(|point| (point, times))
+    };
+    [(0.98, OF_PULL_IN), (1.02, OF_DEFLECTION * release)].into_iter().filter_map(at).collect()
+}
+
+/// The mesh for pull-in, and the results of every mesh that was looked at.
+pub(super) fn for_pull_in(
+    compiled: &Compiled,
+    port: Option<&str>,
+    max: f64,
+) -> Result<(ModelOrder, OfMeshes), AnalysisError> {
+    let mut known = Vec::new();
+    let mut analyse = |segments: &[usize]| {
+        let model = meshed(compiled, segments)?;
+        let found = pull_in(&model, port, max)?;
+        let outputs = pull_in_outputs(&found);
+        known.push((segments.to_vec(), found));
+        Ok::<_, AnalysisError>(outputs)
+    };
+    let segments = compiled.order.segments.clone();
+    let order = match chosen(compiled) {
+        true => doubling::estimate(&compiled.options, segments, &mut analyse)?,
+        false => doubling::fit(&compiled.structure, &compiled.options, segments, &mut analyse)?,
+    };
+    Ok((order, known))
+}
+
+/// Pull-in on some meshes.
+pub(super) type OfMeshes = Vec<(Vec<usize>, PullInResult)>;

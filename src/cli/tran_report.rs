@@ -1,0 +1,107 @@
+//! What `bimorph tran` says of a motion: document, table, picture and text.
+
+use super::failure::Failure;
+use super::model::{Context, Named};
+use super::report;
+use super::solver::SolverChoice;
+use bimorph::analysis::joint_transient::JointReport;
+use bimorph::analysis::transient::{Counters, Event, TransientResult};
+use bimorph::compile::Compiled;
+use bimorph::results::plot::axis::quantity;
+use bimorph::results::plot::chart::{self, Chart, Panel, Series};
+use bimorph::results::plot::svg::Picture;
+use bimorph::results::table::Table;
+use bimorph::solve::time::event::Direction;
+use serde::Serialize;
+
+#[derive(Debug, Serialize)]
+pub(super) struct Document<'a> {
+    pub(super) t: &'a [f64],
+    pub(super) signals: Named<'a, Vec<f64>>,
+    pub(super) units: Named<'a, String>,
+    pub(super) method: &'a str,
+    pub(super) counters: Counters,
+    pub(super) events: &'a [Event],
+    pub(super) joint_coordinates: Option<JointReport>,
+    /// What formulation auto took, and why.
+    pub(super) formulation_taken: Option<String>,
+    pub(super) unknowns: usize,
+    pub(super) step_error: Option<f64>,
+    pub(super) solver: SolverChoice,
+    pub(super) release: Option<&'a str>,
+    pub(super) port_voltages_v: Named<'a, f64>,
+    #[serde(flatten)]
+    pub(super) context: Context<'a>,
+}
+
+pub(super) fn table(title: &str, result: &TransientResult) -> Result<Table, Failure> {
+    let mut table = Table::new(title, "Transient Analysis");
+    table.push_real("time", "s", result.t.clone())?;
+    for (name, unit, values) in &result.signals {
+        table.push_real(name, unit, values.clone())?;
+    }
+    Ok(table)
+}
+
+/// One panel for each unit.
+pub(super) fn picture(title: &str, result: &TransientResult) -> Picture {
+    let mut panels: Vec<Panel> = Vec::new();
+    for (name, unit, values) in &result.signals {
+        let series = Series { name: name.clone(), values: values.clone() };
+        match panels.iter_mut().find(|p| p.unit == *unit) {
+            Some(panel) => panel.series.push(series),
+            None => {
+                panels.push(Panel { title: chart::word(unit).to_owned(), unit: unit.clone(), series: vec![series] })
+            }
+        }
+    }
+    chart::draw(&Chart {
+        title: title.to_owned(),
+        x_name: "time".to_owned(),
+        x_unit: "s".to_owned(),
+        x: result.t.clone(),
+        panels,
+    })
+}
+
+pub(super) fn text(compiled: &Compiled, result: &TransientResult, joints: Option<&JointReport>) -> String {
+    let rows: Vec<Vec<String>> = result
+        .signals
+        .iter()
+        .map(|(name, unit, values)| {
+            let low = values.iter().copied().fold(f64::INFINITY, f64::min);
+            let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            let last = values.last().copied().unwrap_or_default();
+            [low, high, last].iter().fold(vec![name.clone()], |mut row, v| {
+                row.push(quantity(*v, unit));
+                row
+            })
+        })
+        .collect();
+    let c = result.counters;
+    let events: String = result
+        .events
+        .iter()
+        .map(|e| {
+            let what = if e.contact { " (contact)" } else { "" };
+            let way = if e.direction == Direction::Up { "up" } else { "down" };
+            format!("{} crosses {:e} {way} at {}{what}\n", e.signal, e.level, quantity(e.t, "s"))
+        })
+        .collect();
+    let work = match joints {
+        None => format!("{} factorizations, {} solves", c.factorizations, c.solves),
+        Some(j) => format!(
+            "{} accelerations ({} near singular), n = {}, m = {}, largest gap of a loop {:.1e} m",
+            j.accelerations, j.singular_evaluations, j.coordinates, j.constraints, j.largest_gap_m
+        ),
+    };
+    let off = result.step_error.map_or_else(|| ", not compared".to_owned(), |e| format!(", off by {e:.1e} at most"));
+    format!(
+        "{}\n{events}{} samples, {} steps ({} rejected){off}, {work}; {}",
+        report::columns(&["signal", "lowest", "highest", "at the end"], &rows),
+        result.t.len(),
+        c.steps,
+        c.rejected,
+        report::footing(compiled, result.unknowns)
+    )
+}

@@ -1,0 +1,178 @@
+//! What a trial answers: currents, charges, outputs and their partials from the state that it came to, and how long a step the
+//! circuit may take next.
+
+use super::local::Session;
+use super::ports::Answer;
+use super::shown::Shown;
+use super::states::Snapshot;
+use super::{Trial, TrialReply};
+use crate::analysis::signal::{Signal, View};
+use crate::compile::Compiled;
+use crate::gaps::System;
+
+/// Share of the compilation's tolerance that one internal step may use.
+pub(super) const STEP_SHARE: f64 = 1e-2;
+/// Share of the length scale that the integrator takes for nothing, in units of its tolerance [1].
+const FLOOR: f64 = 1e-4;
+/// A temperature that no circuit tells from another [K].
+const SAME_TEMPERATURE: f64 = 1e-6;
+/// A voltage that no circuit tells from another, and its share of the voltage at the port: what ngspice iterates to [V, 1].
+const SAME_VOLTAGE: [f64; 2] = [1e-6, 1e-6];
+
+impl Session {
+    /// Fills in the reply from `motion`, `rise`, `sources` and `sensitivity`, and stores the state. `from` holds the
+    /// sources at the start of a transient step, and what was seen up to there; `dt_next` becomes what is seen now.
+    pub(super) fn answer(
+        &mut self,
+        compiled: &Compiled,
+        request: &Trial<'_>,
+        from: Option<(&[f64], &Snapshot)>,
+        next_step: f64,
+        reply: &mut TrialReply,
+    ) {
+        let own = self.ports.system.clone();
+        let system = Self::system(&own, compiled);
+        self.values(compiled, system, reply);
+        self.partials(compiled, system, from.map(|(from, _)| (from, request.dt)), reply);
+        let (shown, bound) = self.seen(compiled, system, request, from.map(|(_, before)| before), reply);
+        reply.dt_next = bound;
+        let snapshot = Snapshot {
+            shown,
+            q: self.motion.q.clone(),
+            v: self.motion.v.clone(),
+            rise: self.rise.clone(),
+            sources: self.sources.clone(),
+            next_step,
+            elapsed: from.map_or(0.0, |(_, before)| before.elapsed + request.dt),
+            carried: if from.is_some() { self.stepper.method.state().to_vec() } else { Vec::new() },
+        };
+        reply.token = Some(self.states.insert(request, snapshot));
+    }
+
+    fn view(&self) -> View<'_> {
+        View { q: &self.motion.q, v: &self.motion.v, rise: &self.rise, volts: &self.drive.volts }
+    }
+
+    /// Currents, charges and outputs; of the partials of currents those that the circuit alone makes.
+    fn values(&self, compiled: &Compiled, system: &System, reply: &mut TrialReply) {
+        let electrics = &system.electrics;
+        let (ports, gaps) = (self.ports.len(), self.drive.volts.len());
+        let view = self.view();
+        reply.currents.clear();
+        reply.charges.clear();
+        reply.di_dv.clear();
+        reply.outputs.clear();
+        for (&port, answer) in self.ports.sources.iter().zip(&self.ports.answers) {
+            let (mut current, mut charge) = (0.0, 0.0);
+            match answer {
+                Answer::Current => {
+                    let row = electrics.conductance.row(port);
+                    current = row.iter().zip(&self.sources).map(|(g, u)| g * u).sum();
+                    reply.di_dv.extend(self.ports.sources.iter().map(|&other| row[other]));
+                    let of = |g: usize| electrics.gap_rows[(g, port)] * system.capacitance(g, view.q) * view.volts[g];
+                    charge = (0..gaps).map(of).sum();
+                }
+                Answer::Motion(signal) => current = signal.value(compiled, &view),
+                Answer::Rise(heater) => current = view.rise[*heater],
+                Answer::Nothing => {}
+            }
+            reply.currents.push(current);
+            reply.charges.push(charge);
+            // what is not electrical is filled in with the sensitivities
+            reply.di_dv.resize(reply.currents.len() * ports, 0.0);
+        }
+        reply.outputs.extend(self.signals.iter().map(|s| s.value(compiled, &view)));
+    }
+
+    /// Partials of charges, outputs and what is not electrical, from the sensitivities. `step` holds the sources at the start of
+    /// a transient step and its length [s].
+    fn partials(&mut self, compiled: &Compiled, system: &System, step: Option<(&[f64], f64)>, reply: &mut TrialReply) {
+        let electrics = &system.electrics;
+        let (ports, gaps) = (self.ports.len(), self.drive.volts.len());
+        let view = View { q: &self.motion.q, v: &self.motion.v, rise: &self.rise, volts: &self.drive.volts };
+        reply.dq_dv.clear();
+        reply.dq_dv.resize(ports * ports, 0.0);
+        reply.doutputs_dv.clear();
+        reply.doutputs_dv.resize(self.signals.len() * ports, 0.0);
+        for (p, &port) in self.ports.sources.iter().enumerate() {
+            let s = &self.stepper.method.sensitivity()[p];
+            let gap_row: Vec<f64> = (0..gaps).map(|g| electrics.gap_rows[(g, port)]).collect();
+            match step {
+                None => {
+                    self.unit.fill(0.0);
+                    self.unit[port] = 1.0;
+                    for (k, slope) in self.rise_slope.iter_mut().enumerate() {
+                        *slope = electrics.heating.slope(k, &self.sources, &self.unit);
+                    }
+                }
+                Some((from, dt)) => {
+                    let slopes = &mut self.rise_slope;
+                    electrics.rise_sensitivities((from, &self.sources), dt, dt, port, |k, slope| slopes[k] = slope);
+                }
+            }
+            for (g, volts) in gap_row.iter().enumerate() {
+                let dq =
+                    system.capacitance(g, view.q) * volts + system.capacitance_slope(g, view.q, &s.q) * view.volts[g];
+                for (row, &other) in self.ports.sources.iter().enumerate() {
+                    if self.ports.answers[row] == Answer::Current {
+                        reply.dq_dv[row * ports + p] += electrics.gap_rows[(g, other)] * dq;
+                    }
+                }
+            }
+            let change = View { q: &s.q, v: &s.v, rise: &self.rise_slope, volts: &gap_row };
+            for (row, signal) in self.signals.iter().enumerate() {
+                reply.doutputs_dv[row * ports + p] = signal.slope(compiled, &view, &change);
+            }
+            for (row, answer) in self.ports.answers.iter().enumerate() {
+                match answer {
+                    Answer::Motion(signal) => reply.di_dv[row * ports + p] = signal.slope(compiled, &view, &change),
+                    Answer::Rise(heater) => reply.di_dv[row * ports + p] = change.rise[*heater],
+                    Answer::Current | Answer::Nothing => {}
+                }
+            }
+        }
+    }
+
+    /// What the circuit sees of a state, and how long a step it may take from there [s].
+    fn seen(
+        &self,
+        compiled: &Compiled,
+        system: &System,
+        request: &Trial<'_>,
+        before: Option<&Snapshot>,
+        reply: &TrialReply,
+    ) -> (Shown, f64) {
+        let (ports, view) = (self.ports.len(), self.view());
+        let electrical = |row: usize| self.ports.answers[row] == Answer::Current;
+        let shown = (0..ports).map(|row| if electrical(row) { reply.charges[row] } else { reply.currents[row] });
+        let seen = reply.outputs.iter().copied().chain(shown).collect();
+        match before {
+            None => (Shown::start(seen), f64::INFINITY),
+            Some(before) => {
+                let (tol, signals) = (compiled.options.tol, self.signals.len());
+                let nothing = STEP_SHARE * tol * FLOOR;
+                let charge = |capacitance: f64, volts: f64| {
+                    capacitance.abs() * (SAME_VOLTAGE[0] + SAME_VOLTAGE[1] * volts.abs())
+                };
+                let of_signal = |signal: &Signal| match signal {
+                    Signal::Displacement(_, 2) => nothing,
+                    Signal::Displacement(..) | Signal::Distance(_) => nothing * system.length_scale,
+                    Signal::Rate(_, 2) => nothing / self.first_step,
+                    Signal::Rate(..) => nothing * system.length_scale / self.first_step,
+                    Signal::Temperature(_) | Signal::Prescribed(_) => SAME_TEMPERATURE,
+                    Signal::Capacitance(g) => nothing * system.capacitance(*g, view.q).abs(),
+                    Signal::Pull(g) => nothing * system.pull(*g, view.q, view.volts[*g]).abs(),
+                    Signal::Charge(g) => charge(system.capacitance(*g, view.q), view.volts[*g]),
+                };
+                before.shown.step(request.dt, seen, tol, |n| match n.checked_sub(signals) {
+                    None => of_signal(&self.signals[n]),
+                    Some(port) => match &self.ports.answers[port] {
+                        Answer::Current => charge(reply.dq_dv[port * (ports + 1)], request.voltages[port]),
+                        Answer::Motion(signal) => of_signal(signal),
+                        Answer::Rise(_) | Answer::Nothing => SAME_TEMPERATURE,
+                    },
+                })
+            }
+        }
+    }
+}

@@ -1,0 +1,34 @@
+//! Vectors of the plane over lanes.
+
+use super::scalar::Real;
+
+/// Two components.
+pub(super) type Pair<T> = [T; 2];
+
+/// Cosine less one and sine of an angle, from the sine and cosine of its half: nothing cancels.
+#[inline(always)]
+pub(super) fn turned<T: Real>(half: Pair<T>) -> Pair<T> {
+    let twice = half[0] + half[0];
+    [-(twice * half[0]), twice * half[1]]
+}
+
+#[inline(always)]
+pub(super) fn plus<T: Real>(a: Pair<T>, b: Pair<T>) -> Pair<T> {
+    [a[0] + b[0], a[1] + b[1]]
+}
+
+#[inline(always)]
+pub(super) fn minus<T: Real>(a: Pair<T>, b: Pair<T>) -> Pair<T> {
+    [a[0] - b[0], a[1] - b[1]]
+}
+
+#[inline(always)]
+pub(super) fn times<T: Real>(k: T, v: Pair<T>) -> Pair<T> {
+    [k * v[0], k * v[1]]
+}
+
+/// Rotation by a right angle.
+#[inline(always)]
+pub(super) fn turn<T: Real>(v: Pair<T>) -> Pair<T> {
+    [-v[1], v[0]]
+}

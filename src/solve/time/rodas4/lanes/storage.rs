@@ -1,0 +1,110 @@
+//! What a step of variants side by side works on.
+
+use super::motion::{LaneMotion, Norms};
+use crate::gaps::{Drive, Ramp, System};
+use crate::multibody::lanes::joint::LanePlaced;
+use crate::multibody::lanes::{Eight, LANES, LaneMatrix, LaneModel, LanePose, STILL, Wide, load};
+use crate::multibody::planar::Pose;
+use crate::multibody::rcr::has_lanes;
+use crate::multibody::{BlockMatrix, Pattern};
+
+/// From this stage on the motion itself carries the argument.
+pub(super) const IN_PLACE: usize = 4;
+
+/// What a lane runs.
+#[derive(Debug, Clone)]
+pub struct Lane<'a> {
+    /// The variant.
+    pub system: &'a System,
+    /// Its sources and heat.
+    pub ramp: Ramp<'a>,
+}
+
+/// Change of the displacement and rate of one body.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Change<T = Eight> {
+    pub(super) q: LanePose<T>,
+    pub(super) v: LanePose<T>,
+}
+
+impl Change {
+    #[inline(always)]
+    pub(super) fn load<W: Wide>(&self, simd: W::Simd) -> Change<W> {
+        Change { q: load(simd, &self.q), v: load(simd, &self.v) }
+    }
+}
+
+/// The method with its storage.
+#[derive(Debug, Clone)]
+pub struct LaneRodas4 {
+    pub(super) model: LaneModel,
+    pub(super) w: LaneMatrix,
+    /// The motion; each lane begins its next step from here.
+    pub motion: LaneMotion,
+    /// Where the last step began.
+    pub before: LaneMotion,
+    /// Its estimated error.
+    pub error: LaneMotion,
+    /// Norms in the mass of the displacements before and after it and of both parts of its error.
+    pub norms: Norms,
+    pub(super) force: Vec<LanePose>,
+    pub(super) forcing: Vec<LanePose>,
+    pub(super) at: Vec<LanePose>,
+    pub(super) r1: Vec<LanePose>,
+    pub(super) increments: Vec<[Change; 5]>,
+    /// Rates by which dampers lag, for each body; empty without dampers.
+    pub(super) lags: Vec<LanePose>,
+    pub(super) placed: Vec<LanePlaced>,
+    pub(super) expansion: Vec<Eight>,
+    pub(super) rate: Vec<Eight>,
+    pub(super) vanished: [bool; LANES],
+    pub(super) h: Eight,
+    pub(super) acted: Vec<usize>,
+    pub(super) acted_blocks: Vec<usize>,
+    pub(super) drives: Vec<Drive>,
+    pub(super) q: Vec<Pose>,
+    pub(super) r: Vec<Pose>,
+    pub(super) tangent: BlockMatrix<f64, 3>,
+}
+
+fn block(pattern: &Pattern, row: usize, column: usize) -> Option<usize> {
+    if row > column { pattern.block(row, column) } else { None }
+}
+
+impl LaneRodas4 {
+    /// Storage for a mechanism, with its numbers in every lane; none for a linear model, for one with inputs beside voltages,
+    /// and on a processor without vectors.
+    pub fn new(system: &System) -> Option<Self> {
+        let model = LaneModel::new(&system.model).filter(|_| has_lanes() && system.electrics.inputs.is_empty())?;
+        let (n, pattern) = (system.bodies(), &system.model.pattern);
+        let acted = system.acted_on();
+        let between = |&row: &usize| acted.iter().filter_map(move |&column| block(pattern, row, column));
+        let none = Change { q: STILL, v: STILL };
+        let heaters = system.electrics.heating.heaters.len();
+        Some(Self {
+            w: LaneMatrix::new(pattern),
+            motion: LaneMotion::zeros(n),
+            before: LaneMotion::zeros(n),
+            error: LaneMotion::zeros(n),
+            norms: Norms::default(),
+            force: vec![STILL; n],
+            forcing: vec![STILL; n],
+            at: vec![STILL; n],
+            r1: vec![STILL; n],
+            increments: vec![[none; 5]; n],
+            lags: vec![STILL; if model.dampers.is_empty() { 0 } else { n }],
+            placed: vec![LanePlaced::GROUND; n + 1],
+            expansion: vec![Eight::NONE; heaters],
+            rate: vec![Eight::NONE; heaters],
+            vanished: [false; LANES],
+            h: Eight::of(1.0),
+            acted_blocks: acted.iter().flat_map(between).collect(),
+            acted,
+            drives: vec![system.electrics.drive(); LANES],
+            q: vec![Pose::zeros(); n],
+            r: vec![Pose::zeros(); n],
+            tangent: BlockMatrix::new(pattern),
+            model,
+        })
+    }
+}
