@@ -1,5 +1,5 @@
 # Every target does its own set-up on a fresh Debian or Ubuntu with a Rust toolchain, and says what it does.
-.PHONY: help demo test soak fuzz bench pictures charts clean
+.PHONY: help demo test soak fuzz bench pictures charts wheel clean
 
 help:
 	@echo "make demo    build, run the bank in ngspice here and through a server, compare, draw (out/demo)"
@@ -9,6 +9,7 @@ help:
 	@echo "make bench   measure (criterion)"
 	@echo "make pictures draw the scenes and the figures of docs/paper.md (docs/pictures)"
 	@echo "make charts  draw the charts of the README from counted work (docs/pictures); scripts/charts --time measures"
+	@echo "make wheel   the Python package with the command and the plug-in in it, tried in a fresh environment (out/wheel)"
 	@echo "make clean   remove everything that was built"
 
 demo:
@@ -38,6 +39,11 @@ pictures:
 charts:
 	@scripts/setup build
 	@scripts/charts
+
+# The Python package with the command and the plug-in of this machine (out/wheel).
+wheel:
+	@scripts/setup build
+	@scripts/wheel
 
 clean:
 	rm -rf target out .venv

@@ -2,11 +2,16 @@
 
 Nothing generated is kept in the repository. A source distribution carries the generated files instead of the .proto
 files, and then there is nothing left to do.
+
+With BIMORPH_PROGRAMS, the folder of a release build, a wheel brings the command and the ngspice plug-in of this machine's platform:
+``make wheel``.
 """
 
 from __future__ import annotations
 
+import os
 import sys
+import sysconfig
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
@@ -46,8 +51,19 @@ else:
         """Runs before a wheel or source distribution is put together."""
 
         def initialize(self, version: str, build_data: dict) -> None:
-            """Generates the code."""
+            """Generates the code, and takes the programs along."""
             generate()
+            folder = os.environ.get("BIMORPH_PROGRAMS")
+            if folder and self.target_name == "wheel" and version != "editable":
+                command, plugin = (Path(folder).resolve() / name for name in ("bimorph", "libbimorph_ngspice.so"))
+                for program in (command, plugin):
+                    if not program.is_file():
+                        raise RuntimeError(f"{program} is missing: cargo build --release --workspace")
+                build_data["shared_scripts"][str(command)] = command.name
+                # Where the command looks for it.
+                build_data["shared_data"][str(plugin)] = f"lib/bimorph/{plugin.name}"
+                platform = sysconfig.get_platform().replace("-", "_").replace(".", "_")
+                build_data.update(pure_python=False, tag=f"py3-none-{platform}")
 
 
 if __name__ == "__main__":

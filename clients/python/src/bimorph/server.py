@@ -7,6 +7,7 @@ import contextlib
 import os
 import shutil
 import subprocess
+import sysconfig
 import tempfile
 import threading
 from collections.abc import Iterator
@@ -60,8 +61,10 @@ def _folder() -> Iterator[str]:
 
 
 def program() -> str | None:
-    """Path of the ``bimorph`` program: the environment variable ``BIMORPH_BIN``, else from ``PATH``."""
-    return os.environ.get("BIMORPH_BIN") or shutil.which("bimorph")
+    """Path of the ``bimorph`` program: the environment variable ``BIMORPH_BIN``, else what was installed with this package, else from
+    ``PATH``."""
+    own = os.path.join(sysconfig.get_path("scripts"), "bimorph")
+    return os.environ.get("BIMORPH_BIN") or shutil.which(own) or shutil.which("bimorph")
 
 
 @contextlib.contextmanager
