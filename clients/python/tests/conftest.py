@@ -35,7 +35,7 @@ def program() -> str:
     found = os.environ.get("BIMORPH_BIN") or next((str(b) for b in BUILDS if b.is_file()), shutil.which("bimorph"))
     if not found:
         pytest.skip("the program bimorph is not built: cargo build, or set BIMORPH_BIN")
-    return found
+    return str(Path(found).resolve())
 
 
 @pytest.fixture(scope="session")
