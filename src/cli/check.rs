@@ -127,6 +127,7 @@ fn contents(s: &Structure) -> String {
         (s.plate_gaps.len() + s.beam_gaps.len(), "gap"),
         (s.stops.len(), "stop"),
         (s.resistors.len(), "resistor"),
+        (s.wires.len(), "wire"),
         (s.voltage_sources.len(), "source"),
         (s.loads.len(), "load"),
     ];

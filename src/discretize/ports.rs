@@ -8,6 +8,7 @@ use super::rigid::Assembly;
 use crate::gaps::drive::Electrics;
 use crate::gaps::network::Circuit;
 use crate::gaps::thermal::{Heater, Heating};
+use crate::sets::Sets;
 use crate::structure::{GapVoltage, Structure};
 use nalgebra::{DMatrix, RowDVector};
 
@@ -21,13 +22,14 @@ pub fn lay(structure: &Structure, heated: &[usize], rigid: &Assembly) -> Result<
     names.extend(structure.voltage_sources.iter().map(|s| s.name.clone()));
     let mut fixed: Vec<f64> = structure.voltage_sources.iter().map(|s| s.voltage).collect();
 
+    let net = nets(structure);
     let mut heaters = Vec::with_capacity(heated.len());
     for &index in heated {
         let beam = &structure.beams[index];
         if let Some(h) = &beam.heater {
             heaters.push(Heater {
-                a: beam.a.0,
-                b: beam.b.0,
+                a: net[beam.a.0],
+                b: net[beam.b.0],
                 resistance: h.resistance,
                 conductance: h.conductance,
                 expansion: beam.material.thermal_expansion,
@@ -38,13 +40,13 @@ pub fn lay(structure: &Structure, heated: &[usize], rigid: &Assembly) -> Result<
     }
     let circuit = Circuit {
         nodes: structure.nodes.len(),
-        resistors: (structure.resistors.iter().map(|r| (r.a.0, r.b.0, r.resistance)))
+        resistors: (structure.resistors.iter().map(|r| (net[r.a.0], net[r.b.0], r.resistance)))
             .chain(heaters.iter().map(|h| (h.a, h.b, h.resistance)))
             .collect(),
-        sources: (structure.ports.iter().map(|p| (p.plus.0, p.minus.map(|n| n.0))))
-            .chain(structure.voltage_sources.iter().map(|s| (s.plus.0, Some(s.minus.0))))
+        sources: (structure.ports.iter().map(|p| (net[p.plus.0], p.minus.map(|n| net[n.0]))))
+            .chain(structure.voltage_sources.iter().map(|s| (net[s.plus.0], Some(net[s.minus.0]))))
             .collect(),
-        grounds: structure.electrical_grounds.iter().map(|n| n.0).collect(),
+        grounds: structure.electrical_grounds.iter().map(|n| net[n.0]).collect(),
     };
     let potentials =
         circuit.solve().map_err(|e| DiscretizeError::SourceLoop { source_name: names[e.source_index].clone() })?;
@@ -59,7 +61,7 @@ pub fn lay(structure: &Structure, heated: &[usize], rigid: &Assembly) -> Result<
     let mut rows: Vec<Result<Vec<f64>, usize>> = Vec::new();
     for (name, voltage) in voltages {
         rows.push(match voltage {
-            GapVoltage::Nodes(a, b) => Ok(potentials.difference(a.0, b.0).iter().copied().collect()),
+            GapVoltage::Nodes(a, b) => Ok(potentials.difference(net[a.0], net[b.0]).iter().copied().collect()),
             GapVoltage::Fixed(v) => {
                 fixed.push(*v);
                 names.push(name.clone());
@@ -76,11 +78,24 @@ pub fn lay(structure: &Structure, heated: &[usize], rigid: &Assembly) -> Result<
             Err(own) => gap_rows[(g, own)] = 1.0,
         }
     }
-    let sink: Vec<bool> =
-        (0..structure.nodes.len()).map(|n| structure.nodes[n].mechanical && rigid.grounded(n)).collect();
+    let mut sink = vec![false; structure.nodes.len()];
+    for n in (0..structure.nodes.len()).filter(|n| structure.nodes[*n].mechanical && rigid.grounded(*n)) {
+        sink[net[n]] = true;
+    }
     let heating = Heating::new(heaters, &potentials, sources, &sink)
         .map_err(|e| DiscretizeError::NoHeatSink { beam: structure.beams[heated[e.heater]].name.clone() })?;
     let mut conductance = DMatrix::zeros(ports, sources);
     conductance.view_mut((0, 0), (ports, driven)).copy_from(&potentials.conductance.rows(0, ports));
     Ok(Electrics { ports, fixed, names, gap_rows, conductance, heating, inputs: Vec::new() })
+}
+
+/// For each node the one that stands for its conductor: nodes on a wire have one potential and one temperature.
+fn nets(structure: &Structure) -> Vec<usize> {
+    let mut nets = Sets::new(structure.nodes.len());
+    for wire in &structure.wires {
+        wire.nodes.iter().for_each(|node| {
+            nets.join(wire.nodes[0].0, node.0);
+        });
+    }
+    (0..structure.nodes.len()).map(|n| nets.first(n)).collect()
 }

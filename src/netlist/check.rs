@@ -280,6 +280,11 @@ fn floating_potentials(drawing: &Drawing, sink: &mut Sink) {
     for beam in structure.beams.iter().filter(|b| b.heater.is_some()) {
         nets.join(beam.a.0, beam.b.0);
     }
+    for wire in &structure.wires {
+        wire.nodes.iter().for_each(|node| {
+            nets.join(wire.nodes[0].0, node.0);
+        });
+    }
     for source in &structure.voltage_sources {
         nets.join(source.plus.0, source.minus.0);
     }

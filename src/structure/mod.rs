@@ -18,7 +18,7 @@ pub use circuit::{CircuitElement, CircuitKind};
 pub use gap::{BeamGap, Comb, GapVoltage, PlateGap, Stop};
 pub use index::NodeIndex;
 pub use mechanical::{Beam, Heater, Link, Load, Mass, Material, Pad, SpringDamper, Support, Yield};
-pub use network::{Port, Resistor, VoltageSource};
+pub use network::{Port, Resistor, VoltageSource, Wire};
 pub use node::{Node, NodeId};
 
 use serde::{Deserialize, Serialize};
@@ -54,6 +54,9 @@ pub struct Structure {
     pub stops: Vec<Stop>,
     /// Resistors.
     pub resistors: Vec<Resistor>,
+    /// Conductors without resistance.
+    #[serde(default)]
+    pub wires: Vec<Wire>,
     /// Voltage sources of the netlist.
     pub voltage_sources: Vec<VoltageSource>,
     /// Nodes at electrical ground (SUGAR's `eground`).

@@ -1,4 +1,4 @@
-//! The electrical network that drives the mechanism: resistors, sources, and ports.
+//! The electrical network that drives the mechanism: resistors, wires, sources, and ports.
 
 use super::node::NodeId;
 use serde::{Deserialize, Serialize};
@@ -14,6 +14,15 @@ pub struct Resistor {
     pub b: NodeId,
     /// Resistance [Ω], positive.
     pub resistance: f64,
+}
+
+/// Nodes on one conductor without resistance: they have one potential and one temperature.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Wire {
+    /// Full element name.
+    pub name: String,
+    /// Its nodes, at least two.
+    pub nodes: Vec<NodeId>,
 }
 
 /// An ideal voltage source drawn in the netlist (SUGAR's `Vsrc`): potential of `plus` over `minus`.

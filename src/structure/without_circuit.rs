@@ -8,16 +8,17 @@ use super::node::NodeId;
 use std::collections::{BTreeSet, HashSet};
 
 impl Structure {
-    /// Nodes whose potential acts on the mechanism: of beams that carry current, of resistors along beams, and of gaps.
+    /// Nodes whose potential acts on the mechanism: of beams that carry current, of resistors along beams, of wires, and of gaps.
     fn electromechanical(&self) -> BTreeSet<NodeId> {
         let beams = self.beams.iter().filter(|b| b.heater.is_some()).flat_map(|b| [b.a, b.b]);
         let along = self.resistors.iter().flat_map(|r| [r.a, r.b]);
+        let wires = self.wires.iter().flat_map(|w| w.nodes.iter().copied());
         let gaps = (self.combs.iter().map(|c| &c.voltage))
             .chain(self.plate_gaps.iter().map(|g| &g.voltage))
             .chain(self.beam_gaps.iter().map(|g| &g.voltage));
         let between =
             gaps.filter_map(|v| if let GapVoltage::Nodes(a, b) = v { Some([*a, *b]) } else { None }).flatten();
-        beams.chain(along).chain(between).collect()
+        beams.chain(along).chain(wires).chain(between).collect()
     }
 
     /// The mechanism alone: without the circuit, and in the place of its ports one for each node that the circuit or a port touches and

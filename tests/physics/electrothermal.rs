@@ -20,6 +20,25 @@ fn clamped_heater() {
     }
 }
 
+/// A bar of 50 and 150 µm on both sides of a rigid block, whose sides a wire makes one conductor, is one bar of 200 µm: the rise
+/// at 3 V, averaged by length, is V²/(12ρk), and the current V/R. Without the wire no current would flow.
+#[test]
+fn a_wire_leads_current_and_heat_through_a_rigid_body() {
+    let text = "
+        anchor p1 [a] []
+        left beam2det p1 [a b] [l=50u w=2u resistivity=2e-5 thermalexpansion=0]
+        link2d * [b c] [l=20u]
+        wire * [b c] []
+        right beam2det p1 [c d] [l=150u w=2u resistivity=2e-5 thermalexpansion=0]
+        anchor p1 [d] []
+        eground * [d] []
+        heat port * [a] []";
+    let result = balance(&model(text, &CompileOptions::default()), &[("heat", 3.0)]);
+    let rise = |k: usize| result.temperatures_k[k].1 - 293.0;
+    close(0.25 * rise(0) + 0.75 * rise(1), 9.0 / (12.0 * 2e-5 * 41.0), 1e-9);
+    close(result.currents_a[0].1, 3.0 * 4e-12 / (2e-5 * 200e-6), 1e-12);
+}
+
 /// SUGAR's heatuator1 (hot 150 × 2, bridge 4 × 2, cold 112.5 × 20, flexure 37.5 × 2 µm) with k = 41, ρ = 4e-5 and
 /// α = 2.33e-6: the tip moves −0.1157, −0.4623, −1.0379 µm at 1, 2, 3 V (independent frame solver), within 0.1 %.
 #[test]

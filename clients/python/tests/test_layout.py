@@ -77,6 +77,33 @@ def test_a_gdsfactory_netlist_becomes_subnets(client: bimorph.Client) -> None:
         layout.from_gdsfactory(foreign)
 
 
+def test_arrays_and_mirrors_are_told_in_a_netlist(client: bimorph.Client) -> None:
+    """`get_netlist()` of gdsfactory 9.45 gives an array once, with pitches that are turned with the cell but not mirrored, and names
+    its ports by `<column.row>`; what no port joins stands where it is placed."""
+    netlist = {
+        "instances": {
+            "arm": {
+                "component": "thermal_bimorph",
+                "settings": {"tau": 230.0, "layer": [45, 0]},
+                "array": {"columns": 2, "rows": 1, "column_pitch": 400, "row_pitch": 0},
+            },
+            "bar": {"component": "plain_beam", "settings": {"length": 50}},
+        },
+        "placements": {
+            "arm": {"x": 0, "y": 0, "rotation": 90, "mirror": True},
+            "bar": {"x": 23, "y": 230, "rotation": 0, "mirror": False},
+        },
+        "nets": ({"p1": "arm<0.0>,o", "p2": "bar,a"},),
+        "ports": {},
+    }
+    text = layout.from_gdsfactory(netlist).netlist().files["mechanism.net"]
+    assert "tau=0.00023" in text and f"oz={math.pi / 2!r} ox=pi" in text
+    assert "pos * [arm_0_0_a arm_1_0_a]" in text and "y=0.0004" in text
+    o = next(line for line in text.splitlines() if line.startswith("arm_0_0 ")).split("[")[1].split("]")[0].split()[2]
+    assert f"bar plain_beam p1 [{o} " in text
+    assert client.compile(bimorph.Netlist.text(text)).unknowns > 0
+
+
 def test_a_gdsfactory_component_becomes_subnets(client: bimorph.Client) -> None:
     """The same from a component that gdsfactory itself put together."""
     gf = pytest.importorskip("gdsfactory")

@@ -346,6 +346,9 @@ impl<'a> OfStructure<'a> {
                 self.push(&r.name, "R", "*", &[r.a, r.b], &[("R", r.resistance)]);
             }
         }
+        for wire in &structure.wires {
+            self.push(&wire.name, "wire", "*", &wire.nodes, &[]);
+        }
         for source in structure.voltage_sources.iter().filter(|s| !drawn.contains(s.name.as_str())) {
             self.push(&source.name, "Vsrc", "*", &[source.plus, source.minus], &[("V", source.voltage)]);
         }

@@ -7,7 +7,7 @@ use super::super::drawing::Fact;
 use super::super::sink::Reported;
 use super::super::value::Value;
 use super::arguments::Site;
-use crate::structure::{CircuitElement, CircuitKind, Port, Resistor, VoltageSource};
+use crate::structure::{CircuitElement, CircuitKind, Port, Resistor, VoltageSource, Wire};
 
 pub(super) fn resistor(site: &mut Site<'_, '_>) -> Result<(), Reported> {
     let resistance = match (site.positive_if_any("R")?, site.positive_if_any("G")?) {
@@ -39,6 +39,14 @@ pub(super) fn voltage_source(site: &mut Site<'_, '_>) -> Result<(), Reported> {
         element.small_signal = Some([small[0].unwrap_or(1.0), small[1].unwrap_or(0.0)]);
     }
     source(site, voltage)
+}
+
+/// Nodes on one conductor without resistance.
+pub(super) fn wire(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+    let nodes = site.instance.nodes.clone();
+    site.drawing.electrical(&nodes);
+    site.drawing.structure.wires.push(Wire { name: site.name(), nodes });
+    Ok(())
 }
 
 /// The elements of Clark's circuits for SUGAR are drawn too: between arms, `len` long, without being members.

@@ -80,6 +80,8 @@ const DRAWN: &[&str] = &[
     "sv",
     "sph",
 ];
+/// Nodes that one wire may join.
+const WIRED: &[usize] = &[2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16];
 /// Nodes that one anchor may hold.
 const PADS: &[usize] = &[1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16];
 const SIZE: &[&str] = &["l", "w", "h"];
@@ -216,6 +218,7 @@ pub(crate) const MODELS: &[Model] = &[
     own("damper2d", &[2], "[a b]", &["bx", "by", "brz", "l"], lumped::damper2d),
     own("guide2d", &[1], "[n]", &[], support::guide2d),
     own("plategap2d", &[2], "[a b]", &["A", "gap", "permittivity", "touch"], gap::plategap2d),
+    own("wire", WIRED, "[a b …]", &[], circuit::wire),
     own("stop2d", &[1, 2], "[a] or [a b]", &["gap", "back", "k", "A"], stop::stop2d),
     own("comb2de", &[2], "[a b]", &["N", "gap", "l", "L", "w", "h", "Cp", "permittivity"], comb::comb2de),
     own(

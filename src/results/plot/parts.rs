@@ -147,12 +147,13 @@ pub(super) fn draw_ports(picture: &mut Picture, structure: &Structure, view: &Vi
     }
 }
 
-/// Where a port touches the mechanism: its own node, or the far ends of the resistors (wires) that start at it.
+/// Where a port touches the mechanism: its own node, or the far ends of the resistors and wires that start at it.
 fn places(structure: &Structure, node: NodeId) -> Vec<NodeId> {
     let drawn = |id: &NodeId| structure.nodes[id.0].mechanical;
     if drawn(&node) {
         return vec![node];
     }
     let other_end = |a: NodeId, b: NodeId| if a == node { Some(b) } else { (b == node).then_some(a) };
-    structure.resistors.iter().filter_map(|r| other_end(r.a, r.b)).filter(drawn).collect()
+    let wired = structure.wires.iter().filter(|w| w.nodes.contains(&node)).flat_map(|w| w.nodes.iter().copied());
+    structure.resistors.iter().filter_map(|r| other_end(r.a, r.b)).chain(wired).filter(drawn).collect()
 }

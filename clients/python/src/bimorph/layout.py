@@ -10,9 +10,9 @@ recognised. :class:`Cell` objects are put together in a :class:`Mechanism`, whos
     m.add("pad_anchor", layout.anchor(), a="pad")
     model = client.compile(m.netlist())
 
-With gdsfactory installed, :func:`from_gdsfactory` makes the same of a component: instances of cells that this library has, by name,
-with their settings as parameters, joined where the component's netlist joins their ports. gdsfactory's lengths are in micrometres,
-those of this module in metres.
+With gdsfactory installed, :mod:`bimorph.pcells` has the same cells as gdsfactory's, with outlines and ports, and :func:`from_gdsfactory`
+makes a mechanism of a component: instances of cells that this library has, by name, with their settings as parameters, joined where
+their ports lie in one place. gdsfactory's lengths are in micrometres, those of this module in metres.
 """
 
 from __future__ import annotations
@@ -46,6 +46,8 @@ class Kind:
     """Default and unit of each parameter; lengths in metres."""
     body: str = field(repr=False)
     """Elements of the subnet; the layer is ``parent``."""
+    optional: tuple[str, ...] = ()
+    """Nodes that need not be joined to anything."""
 
     def subnet(self) -> str:
         """The definition in SUGAR's language."""
@@ -84,7 +86,7 @@ anchor = Kind(
 
 folded_flexure = Kind(
     "folded_flexure",
-    ("c",),
+    ("c", "left", "right"),
     {
         "length": (200e-6, "m"),
         "width": (2e-6, "m"),
@@ -94,6 +96,9 @@ folded_flexure = Kind(
         "truss": (10e-6, "m"),
     },
     """  plate2d parent [c] [l=2*half w=2*foot]
+  link2d * [c left] [l=half oz=pi]
+  link2d * [c right] [l=half]
+  wire * [c left right] []
   for s=0:1
   [
     up = cond(s, -1, 1)
@@ -104,13 +109,14 @@ folded_flexure = Kind(
       inner(s,k) beam2d parent [foot(s,k) top(s,k)] [l=length w=width oz=up*pi/2]
       end(s,k) beam2d parent [top(s,k) corner(s,k)] [l=pitch w=truss oz=cond(k, pi, 0)]
       outer(s,k) beam2d parent [corner(s,k) pad(s,k)] [l=length w=width oz=-up*pi/2]
-      anchor parent [pad(s,k)] [l=10u w=10u oz=cond(k, pi, 0)]
+      anchor parent [pad(s,k)] [l=10u w=10u oz=-up*pi/2]
     ]
     trusses(s) beam2d parent [top(s,1) top(s,0)] [l=2*half w=truss]
   ]
 """,
+    optional=("left", "right"),
 )
-"""A shuttle on a flexure folded over two trusses: it moves along x. ``c`` is its centre."""
+"""A shuttle on a flexure folded over two trusses: it moves along x. ``c`` is its centre, ``left`` and ``right`` are its edges there."""
 
 comb = Kind(
     "comb_drive",
@@ -120,11 +126,26 @@ comb = Kind(
         "gap": (2e-6, "m"),
         "overlap": (20e-6, "m"),
         "length": (40e-6, "m"),
-        "angle": (0.0, "rad"),
+        "finger": (2e-6, "m"),
+        "spine": (8e-6, "m"),
     },
-    "  comb2de parent [a b] [N=2*fingers gap=gap l=overlap L=length oz=angle]\n",
+    """  pitch = finger + gap
+  tall = 2*fingers*pitch + finger
+  turn = length*length + finger*finger
+  more = fingers + 1
+  link2d * [a ma] [l=spine/2]
+  back plate2d parent [ma] [l=spine w=tall]
+  link2d * [a fa] [l=spine+length/2]
+  rotor body2d parent [fa] [A=more*length*finger Ip=more*length*finger*(turn/12 + pitch^2*(more^2-1)/3)]
+  drive comb2de parent [a b] [N=2*fingers gap=gap l=overlap L=length+spine w=finger]
+  link2d * [b mb] [l=spine/2 oz=pi]
+  front plate2d parent [mb] [l=spine w=tall]
+  link2d * [b fb] [l=spine+length/2 oz=pi]
+  stator body2d parent [fb] [A=fingers*length*finger Ip=fingers*length*finger*(turn/12 + pitch^2*(fingers^2-1)/3)]
+""",
 )
-"""A comb drive: ``fingers`` of the rotor ``a`` between those of the stator ``b``, two gaps each."""
+"""A comb drive: ``fingers`` of the side of ``b`` between one more of the side of ``a``, so that there are twice as many gaps, each side on
+a spine. ``b`` lies on local x ahead of ``a``; both are on the outer edges of their spines."""
 
 bimorph = Kind(
     "thermal_bimorph",
@@ -159,16 +180,24 @@ serpentine = Kind(
   for k=1:turns
   [
     across(2*k-1) beam2d parent [up(k-1) down(k)] [l=pitch w=width]
-    down beam2d parent [down(k) low(k)] [l=length w=width oz=-pi/2]
+    fall(k) beam2d parent [down(k) low(k)] [l=length w=width oz=-pi/2]
     across(2*k) beam2d parent [low(k) rise(k)] [l=pitch w=width]
-    rise beam2d parent [rise(k) up(k)] [l=length w=width oz=pi/2]
+    if k < turns [ climb(k) beam2d parent [rise(k) up(k)] [l=length w=width oz=pi/2] ]
   ]
-  last beam2d parent [up(turns) b] [l=length/2 w=width oz=-pi/2]
+  last beam2d parent [rise(turns) b] [l=length/2 w=width oz=pi/2]
 """,
 )
 """A meander along x with long beams along y, from ``a`` to ``b``."""
 
-KINDS: dict[str, Kind] = {kind.name: kind for kind in (anchor, folded_flexure, comb, bimorph, serpentine)}
+plain_beam = Kind(
+    "plain_beam",
+    ("a", "b"),
+    {"length": (100e-6, "m"), "width": (2e-6, "m")},
+    "  bar beam2d parent [a b] [l=length w=width]\n",
+)
+"""A straight beam along x, from ``a`` to ``b``."""
+
+KINDS: dict[str, Kind] = {kind.name: kind for kind in (anchor, plain_beam, folded_flexure, comb, bimorph, serpentine)}
 """Cells of this library by the name of their subnet."""
 
 
@@ -182,12 +211,16 @@ class Mechanism:
         self._lines: list[str] = []
         self._names: set[str] = set()
 
-    def add(self, name: str, cell: Cell, *, angle: float = 0.0, **nodes: str) -> None:
-        """Adds an instance turned by ``angle`` [rad]; ``nodes`` says where each node of the cell is joined."""
+    def add(self, name: str, cell: Cell, *, angle: float = 0.0, mirrored: bool = False, **nodes: str) -> None:
+        """Adds an instance, mirrored about its x axis if so told and then turned by ``angle`` [rad].
+
+        ``nodes`` says where each node of the cell is joined; optional ones may be left out.
+        """
         _check_name(name)
         if name in self._names:
             raise ValueError(f"there is an instance {name!r} already")
         kind = cell.kind
+        nodes = {node: f"{name}_{node}" for node in kind.optional} | nodes
         missing = [node for node in kind.nodes if node not in nodes]
         unknown = sorted(set(nodes) - set(kind.nodes))
         if missing or unknown:
@@ -200,8 +233,16 @@ class Mechanism:
         given = [f"{key}={value!r}" for key, value in cell.settings.items()]
         if angle:
             given.append(f"oz={float(angle)!r}")
+        if mirrored:
+            given.append("ox=pi")
         joined = " ".join(nodes[node] for node in kind.nodes)
         self._lines.append(f"{name} {kind.name} p1 [{joined}] [{' '.join(given)}]")
+
+    def place(self, origin: str, node: str, x: float, y: float) -> None:
+        """Places ``node`` at (x, y) [m] from ``origin``, for parts that nothing joins."""
+        for name in (origin, node):
+            _check_name(name)
+        self._lines.append(f"pos * [{origin} {node}] [x={float(x)!r} y={float(y)!r}]")
 
     def line(self, text: str) -> None:
         """Adds a line of netlist: a port, a load, a ground."""
@@ -216,58 +257,15 @@ class Mechanism:
 def from_gdsfactory(component: Any, *, kinds: Mapping[str, Kind] | None = None, process: str = POLY) -> Mechanism:
     """A mechanism from a gdsfactory component made of cells whose names are those of :data:`KINDS` (or ``kinds``).
 
-    The component's ``get_netlist()`` gives instances with settings, and which ports are joined. Lengths among the settings are in
-    micrometres there. An instance of any other cell is an error that names it; so are settings that its cell has not.
+    ``component`` is a component, or what its ``get_netlist()`` gives. Instances have settings, which are parameters of the subnet
+    (lengths in micrometres, times in microseconds), and ports, which are its nodes: those that lie in one place are one node. Arrays become
+    instances, components between the top and the library are gone through, mirrors and turns are kept, and parts that no port joins are
+    placed by the origins of their cells, where the first node of each is. An instance of any other cell is an error that names it; so
+    are settings that its cell has not.
     """
-    known = dict(KINDS if kinds is None else kinds)
-    read = component if isinstance(component, Mapping) else component.get_netlist()
-    instances: Mapping[str, Any] = read["instances"]
-    joined = _joined(read)
-    placements: Mapping[str, Any] = read.get("placements", {})
-    mechanism = Mechanism(process)
-    for name, instance in instances.items():
-        cell = str(instance["component"])
-        if cell not in known:
-            raise ValueError(f"instance {name!r} is a {cell!r}, which is no cell of the library: {', '.join(sorted(known))}")
-        kind = known[cell]
-        settings = {key: value for key, value in dict(instance.get("settings") or {}).items() if value is not None}
-        unknown = sorted(set(settings) - set(kind.parameters))
-        if unknown:
-            raise ValueError(f"instance {name!r}: {cell} has no parameter {unknown[0]!r}; there are {', '.join(kind.parameters)}")
-        scaled = {key: value * 1e-6 if kind.parameters[key][1] == "m" else value for key, value in settings.items()}
-        placement = placements.get(name) or {}
-        if placement.get("mirror"):
-            raise ValueError(f"instance {name!r} is mirrored: subnets are only turned")
-        angle = math.radians(float(placement.get("rotation") or 0))
-        word = _word(name)
-        nodes = {node: joined.get(f"{name},{node}", f"{word}_{node}") for node in kind.nodes}
-        mechanism.add(word, kind(**scaled), angle=angle, **nodes)
-    return mechanism
+    from .component import mechanism
 
-
-def _joined(read: Mapping[str, Any]) -> dict[str, str]:
-    """The node of each port "instance,port": those that are joined have one."""
-    parent: dict[str, str] = {}
-
-    def root(port: str) -> str:
-        while parent.setdefault(port, port) != port:
-            port = parent[port]
-        return port
-
-    pairs = [(net["p1"], net["p2"]) for net in read.get("nets", [])]
-    pairs += list(dict(read.get("connections", {})).items())
-    for first, second in pairs:
-        a, b = sorted((root(first), root(second)))
-        parent[b] = a
-    outer = {root(port): name for name, port in dict(read.get("ports", {})).items()}
-    return {port: _word(outer.get(root(port), root(port))) for port in list(parent)} | {
-        port: _word(name) for name, port in dict(read.get("ports", {})).items()
-    }
-
-
-def _word(name: str) -> str:
-    word = re.sub(r"[^A-Za-z0-9_]", "_", name)
-    return word if word[:1].isalpha() else f"n{word}"
+    return mechanism(component, KINDS if kinds is None else kinds, process)
 
 
 def _check_name(name: str) -> None:
