@@ -69,7 +69,7 @@ pub fn convert(drawing: &Drawing, process: Option<&Process>) -> Result<Converted
 /// Limbs, bodies and anchors as they are drawn, with what labels on the layer of notes add.
 fn by_geometry(drawing: &Drawing, process: &Process) -> Result<Converted, ConvertError> {
     let extraction = extract::extract(drawing, process, &ExtractOptions::default())?;
-    let mut netlist = extract::netlist(&extraction);
+    let extract::Written { text: mut netlist, names } = extract::written(&extraction);
     let mut report = report(&extraction, drawing.unit_m);
     for label in drawing.labels.iter().filter(|l| mask::on_notes(&l.layer)) {
         match Line::parse(&label.text) {
@@ -82,7 +82,7 @@ fn by_geometry(drawing: &Drawing, process: &Process) -> Result<Converted, Conver
             }
         }
     }
-    let landmark = extraction.nodes.first().map(|n| (n.name.clone(), n.at));
+    let landmark = names.into_iter().zip(&extraction.nodes).map(|(name, n)| (name, n.at)).next();
     Ok(Converted { netlist, report, process: process.name.clone(), landmark })
 }
 
@@ -100,6 +100,14 @@ fn report(extraction: &Extraction, unit_m: f64) -> Report {
         ("links", extraction.links.len()),
         ("anchors", extraction.anchors.len()),
     ];
+    let more = [
+        ("arcs", extraction.arcs.len()),
+        ("combs", extraction.combs.len()),
+        ("facing plates", extraction.plates.len()),
+        ("pieces of facing beams", extraction.facing.len()),
+        ("nets", extraction.nets.len()),
+    ];
+    let counts = counts.into_iter().chain(more.into_iter().filter(|(_, n)| *n > 0));
     let pieces = extraction.unrecognised.iter().map(|lost| {
         let metres = |p: &[i32; 2]| p.map(|x| f64::from(x) * unit_m);
         let boxes = lost.polygons.iter().filter_map(super::Polygon::extent);
@@ -118,7 +126,7 @@ fn report(extraction: &Extraction, unit_m: f64) -> Report {
     });
     Report {
         by: "geometry".to_owned(),
-        counts: counts.into_iter().map(|(what, n)| (what.to_owned(), n)).collect(),
+        counts: counts.map(|(what, n)| (what.to_owned(), n)).collect(),
         areas,
         unrecognised: pieces.collect(),
         notes: extraction.notes.clone(),

@@ -2,6 +2,8 @@
 //! here; frequencies are compared without junctions (`centreline`), so that only the geometry counts.
 
 mod draw;
+mod nets;
+mod repeats;
 
 use bimorph::analysis::modes::modes;
 use bimorph::compile::{CompileOptions, Junctions, compile};

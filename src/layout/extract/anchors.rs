@@ -124,7 +124,7 @@ pub(super) fn inside(contours: &[Vec<[f64; 2]>], p: [f64; 2]) -> bool {
 }
 
 /// Whether a polygon and a cell share some area.
-fn overlap(polygon: &[Vec<[f64; 2]>], cell: &[[f64; 2]]) -> bool {
+pub(super) fn overlap(polygon: &[Vec<[f64; 2]>], cell: &[[f64; 2]]) -> bool {
     let middle = |points: &[[f64; 2]]| {
         let n = points.len() as f64;
         [points.iter().map(|p| p[0]).sum::<f64>() / n, points.iter().map(|p| p[1]).sum::<f64>() / n]

@@ -97,6 +97,8 @@ fn chains(result: &Extraction) -> Vec<Vec<Link>> {
     let others = others.chain(result.bodies.iter().map(|b| b.node)).chain(result.combs.iter().flat_map(|c| c.nodes));
     let plates = result.plates.iter().flat_map(|p| p.nodes).chain(result.facing.iter().flat_map(|f| f.nodes));
     others.chain(plates).for_each(|n| through[n] = false);
+    // an arc carries no current
+    (0..through.len()).filter(|n| result.carries(*n)).for_each(|n| through[n] = false);
     let mut done = vec![false; result.beams.len()];
     let mut chains = Vec::new();
     for rings in [false, true] {

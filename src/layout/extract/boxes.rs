@@ -54,16 +54,21 @@ impl Boxes {
     /// Numbers of all boxes that overlap this one, sorted.
     pub(super) fn overlapping(&self, window: &Extent) -> Vec<u32> {
         let mut found = Vec::new();
-        let mut open = if self.levels.is_empty() { Vec::new() } else { vec![(self.levels.len() - 1, 0usize)] };
+        let Some(root) = self.levels.last().filter(|root| overlap(&root[0], window)) else { return found };
+        if root.len() == self.order.len() {
+            return self.order.clone();
+        }
+        let mut open = Vec::with_capacity(FAN * self.levels.len());
+        open.push((self.levels.len() - 1, 0usize));
         while let Some((level, k)) = open.pop() {
-            if !overlap(&self.levels[level][k], window) {
-                continue;
-            }
-            if level == 0 {
-                found.push(self.order[k]);
+            let below = &self.levels[level - 1];
+            let first = k * FAN;
+            let children = below[first..below.len().min(first + FAN)].iter().enumerate();
+            let near = children.filter(|(_, child)| overlap(child, window)).map(|(child, _)| first + child);
+            if level == 1 {
+                found.extend(near.map(|child| self.order[child]));
             } else {
-                let end = ((k + 1) * FAN).min(self.levels[level - 1].len());
-                open.extend((k * FAN..end).map(|child| (level - 1, child)));
+                open.extend(near.map(|child| (level - 1, child)));
             }
         }
         found.sort_unstable();

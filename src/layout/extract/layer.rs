@@ -11,7 +11,9 @@ use super::model::Model;
 use super::moments::Moments;
 use super::skeleton::Skeleton;
 use super::snap;
-use super::{Beam, Body, Comb, ExtractError, Extraction, Facing, LayerResult, MOST_POINTS, Node, Plates, Unrecognised};
+use super::{
+    Beam, Body, Comb, ExtractError, Extraction, Facing, LayerResult, MOST_POINTS, Node, Pad, Plates, Unrecognised,
+};
 use crate::budget;
 use crate::layout::crossings::bounded;
 use crate::layout::drawing::{Drawing, Polygon};
@@ -146,15 +148,17 @@ pub(super) fn extract(
         Model::of(axis, origin, found, &rule, taps, &carrier.holes)
     };
     let bare: Vec<Vec<([f64; 2], bool)>> = vec![Vec::new(); parts.len()];
-    let moves: Vec<bool> =
-        carriers.iter().zip(&bare).map(model).map(|m| !(m.beams.is_empty() && m.bodies.is_empty())).collect();
+    let models: Vec<Model> = carriers.iter().zip(&bare).map(model).collect();
+    let moves: Vec<bool> = models.iter().map(|m| !(m.beams.is_empty() && m.bodies.is_empty())).collect();
     let gaps = gaps::gaps(&carriers, &moves, &combs, gaps::WIDEST / unit);
     gaps.iter().flat_map(gaps::Gap::pulls).for_each(|pull| taps[pull.part].push((pull.at, pull.on_axis)));
     let first = result.layers.iter().map(|layer| layer.parts).sum();
     let mut sink = Sink { layer: result.layers.len(), result, first, unit };
     // for each part, the nodes where combs pull
     let mut pulled: Vec<Option<std::vec::IntoIter<usize>>> = Vec::new();
-    let models: Vec<Model> = carriers.iter().zip(&taps).map(model).collect();
+    // those at which something pulls once more, with nodes there
+    let pulled_at = models.into_iter().zip(carriers.iter().zip(&taps));
+    let models: Vec<Model> = pulled_at.map(|(bare, of)| if of.1.is_empty() { bare } else { model(of) }).collect();
     let mut loose = vec![false; parts.len()];
     combs.iter().flat_map(|comb| &comb.loose).for_each(|k| loose[*k] = true);
     let held = models.iter().filter(|model| !model.anchors.is_empty()).count();
@@ -275,12 +279,18 @@ impl Sink<'_> {
         }));
         result.bodies.extend(model.bodies.iter().map(|b| body(layer, number[b.node], &b.moments, unit)));
         result.links.extend(model.links.iter().map(|l| l.map(|n| number[n])));
+        result.pads.extend(model.pads.iter().map(|pad| Pad {
+            nodes: pad.nodes.iter().map(|n| number[*n]).filter(|n| *n != usize::MAX).collect(),
+            layer,
+            part: self.first + part,
+            outlines: pad.outlines.clone(),
+        }));
         result.anchors.extend(model.anchors.iter().filter(|n| used[**n]).map(|n| number[*n]));
         model.taps.iter().map(|n| number[*n]).collect::<Vec<_>>().into_iter()
     }
 
     fn node(&mut self, at: [f64; 2], reach: f64, part: usize) -> usize {
-        self.result.nodes.push(Node { name: String::new(), at, reach, part });
+        self.result.nodes.push(Node { name: String::new(), at, reach, labelled: false, part });
         self.result.nodes.len() - 1
     }
 

@@ -12,23 +12,28 @@ mod anchors;
 mod arcs;
 mod boxes;
 mod combs;
+mod conductors;
 mod gaps;
 mod holes;
 mod joints;
 mod layer;
 mod limbs;
+mod live;
 pub mod medial;
 mod model;
 pub mod moments;
 mod names;
 mod netlist;
+mod nets;
+mod repeats;
+mod rows;
 mod skeleton;
 mod snap;
 
-pub use netlist::netlist;
+pub use netlist::{Written, netlist, written};
 
 use super::crossings::{Tangled, bounded};
-use super::drawing::{Drawing, Polygon};
+use super::drawing::{Drawing, Placement, Polygon};
 use super::process::{self, Process};
 use super::regions;
 use thiserror::Error;
@@ -101,6 +106,16 @@ pub struct Extraction {
     pub links: Vec<[usize; 2]>,
     /// Nodes that are held.
     pub anchors: Vec<usize>,
+    /// Areas that are held, with the nodes on them.
+    pub pads: Vec<Pad>,
+    /// Nets that labels name.
+    pub nets: Vec<Net>,
+    /// Parts between nets, whose beams carry current: [`Node::part`], in order.
+    pub live: Vec<usize>,
+    /// Where cells stand in the drawing.
+    pub cells: Vec<Placement>,
+    /// Size of a database unit [m].
+    pub unit: f64,
     /// Comb drives.
     pub combs: Vec<Comb>,
     /// Lumped plates that face each other.
@@ -148,8 +163,34 @@ pub struct Node {
     pub at: [f64; 2],
     /// How far from it a label may stand that names it [m].
     pub reach: f64,
+    /// A label of the drawing names it.
+    pub labelled: bool,
     /// Number of the part that it is on: what hangs together is one conductor.
     pub part: usize,
+}
+
+/// An area that is held.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Pad {
+    /// Nodes on it; it may have none.
+    pub nodes: Vec<usize>,
+    /// Index of its layer.
+    pub layer: usize,
+    /// Number of the part that it belongs to.
+    pub part: usize,
+    /// Outlines of what it consists of [database units].
+    pub outlines: Vec<Vec<[f64; 2]>>,
+}
+
+/// Pads that one conductor joins, with the name that a label gives them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Net {
+    /// Its name.
+    pub name: String,
+    /// Electrical ground.
+    pub ground: bool,
+    /// Indices of its pads, in order.
+    pub pads: Vec<usize>,
 }
 
 /// A straight beam.
@@ -262,6 +303,8 @@ pub fn extract(drawing: &Drawing, process: &Process, options: &ExtractOptions) -
         top: drawing.top.clone(),
         process: process.name.clone(),
         notes: drawing.notes.clone(),
+        cells: drawing.cells.clone(),
+        unit: drawing.unit_m,
         ..Extraction::default()
     };
     unknown_layers(drawing, process, &mut result)?;
@@ -287,9 +330,11 @@ pub fn extract(drawing: &Drawing, process: &Process, options: &ExtractOptions) -
         });
     }
     arcs::same_widths(&mut result, drawing.unit_m);
+    let labels = nets::find(&mut result, drawing, process)?;
+    live::divide_tapers(&mut result);
     arcs::arcs(&mut result, drawing.unit_m);
     result.drop_unused_nodes();
-    names::name(&mut result, drawing);
+    names::name(&mut result, drawing, &labels);
     Ok(result)
 }
 
@@ -337,8 +382,12 @@ impl Extraction {
             *number = count;
             count += usize::from(*used);
         }
-        let mut kept = used.into_iter();
+        let mut kept = used.iter().copied();
         self.nodes.retain(|_| kept.next().unwrap_or(false));
+        for pad in &mut self.pads {
+            pad.nodes.retain(|n| used[*n]);
+            pad.nodes.iter_mut().for_each(|n| *n = number[*n]);
+        }
         self.named().for_each(|n| *n = number[*n]);
     }
 }

@@ -27,12 +27,22 @@ pub(super) struct Model {
     pub(super) links: Vec<[usize; 2]>,
     /// Nodes that are held.
     pub(super) anchors: Vec<usize>,
+    /// Areas that are held, with their nodes.
+    pub(super) pads: Vec<Pad>,
     /// For each tap its node, and whether it is held.
     pub(super) taps: Vec<usize>,
     /// Area that is held, of the whole part.
     pub(super) held: f64,
     /// Area of beams, bodies and what is held.
     pub(super) area: f64,
+}
+
+/// An area that is held.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Pad {
+    pub(super) nodes: Vec<usize>,
+    /// Outlines of what it consists of.
+    pub(super) outlines: Vec<Vec<[f64; 2]>>,
 }
 
 /// A straight beam, perhaps with a width that changes along it.
@@ -73,6 +83,8 @@ impl Model {
             rule,
             anchored: Vec::new(),
             bodies: vec![None; parts.joints.len()],
+            pad_of: vec![None; parts.joints.len()],
+            adjoining: Vec::new(),
             taps: Vec::new(),
             cells: Cells::default(),
             limb_holes: vec![0.0; parts.limbs.len()],
@@ -105,6 +117,7 @@ impl Model {
                 build.tap_joint(k, j);
             }
         }
+        build.join_pads();
         let Builder { mut model, anchored, .. } = build;
         model.anchors = (0..anchored.len()).filter(|n| anchored[*n]).collect();
         model
@@ -174,6 +187,10 @@ struct Builder<'a> {
     anchored: Vec<bool>,
     /// For each joint, the node that stands for it.
     bodies: Vec<Option<usize>>,
+    /// For each joint, the pad that it is part of.
+    pad_of: Vec<Option<usize>>,
+    /// Joints and pads that adjoin them.
+    adjoining: Vec<(usize, usize)>,
     taps: Vec<Tap>,
     cells: Cells,
     /// Area of the holes in each limb, and holes in each joint.
@@ -216,6 +233,9 @@ impl Builder<'_> {
             self.model.links.push([body, node]);
         }
         self.model.taps[k] = node;
+        if held && let Some(pad) = self.model.pads.iter_mut().find(|pad| pad.nodes.contains(&body)) {
+            pad.nodes.push(node);
+        }
     }
 
     /// Makes the nodes of a joint and returns those of its ports.
@@ -263,6 +283,16 @@ impl Builder<'_> {
         };
         // of a free body its own node, made last; else the first made
         let made = self.model.nodes.len();
+        let held: Vec<usize> = (first..made).filter(|n| self.anchored[*n]).collect();
+        if !held.is_empty() {
+            let (axis, origin) = (self.axis, self.origin);
+            let cells = joint.edges.iter().map(|e| {
+                let edge = &axis.edges[*e as usize];
+                axis.outline(edge.ends, edge.sites).map(|p| [p[0] + origin[0], p[1] + origin[1]]).to_vec()
+            });
+            self.pad_of[j] = Some(self.model.pads.len());
+            self.model.pads.push(Pad { nodes: held, outlines: cells.collect() });
+        }
         let own = self.model.bodies.last().filter(|b| b.node >= first).map(|b| b.node);
         self.bodies[j] = own.or((made > first).then_some(first));
         ends
@@ -332,6 +362,31 @@ impl Builder<'_> {
         self.model.taps[k] = tap;
     }
 
+    /// Makes one pad of those that adjoin or share a node.
+    fn join_pads(&mut self) {
+        let mut sets = crate::sets::Sets::new(self.model.pads.len());
+        for (joint, pad) in &self.adjoining {
+            sets.join(*self.pad_of[*joint].get_or_insert(*pad), *pad);
+        }
+        let mut of_node = vec![None; self.model.nodes.len()];
+        for (k, pad) in self.model.pads.iter().enumerate() {
+            pad.nodes.iter().for_each(|n| {
+                sets.join(*of_node[*n].get_or_insert(k), k);
+            });
+        }
+        let mut joined: std::collections::BTreeMap<usize, Pad> = std::collections::BTreeMap::new();
+        for (k, pad) in std::mem::take(&mut self.model.pads).into_iter().enumerate() {
+            let whole = joined.entry(sets.first(k)).or_default();
+            whole.nodes.extend(pad.nodes);
+            whole.outlines.extend(pad.outlines);
+        }
+        self.model.pads = joined.into_values().collect();
+        for pad in &mut self.model.pads {
+            pad.nodes.sort_unstable();
+            pad.nodes.dedup();
+        }
+    }
+
     /// A limb between two nodes, less what lies over anchors.
     fn limb(&mut self, k: usize, a: usize, b: usize) {
         let limb = &self.parts.limbs[k];
@@ -347,6 +402,14 @@ impl Builder<'_> {
             Rule::Pads if self.parts.limbs.len() == 1 && loose(0) && loose(1) => vec![[0.0, 1.0]],
             _ => Vec::new(),
         };
+        // what is held of it, with the nodes at its ends
+        let mut held: Vec<([f64; 2], Vec<usize>)> = covered
+            .iter()
+            .map(|t| {
+                let ends = [(t[0] == 0.0, a), (t[1] == 1.0, b)];
+                (*t, ends.into_iter().filter(|(there, n)| *there && self.anchored[*n]).map(|(_, n)| n).collect())
+            })
+            .collect();
         let mut free = Vec::new();
         let mut from = 0.0;
         for [t0, t1] in covered.into_iter().chain([[1.0, 1.0]]) {
@@ -385,6 +448,10 @@ impl Builder<'_> {
             kept += t1 - t0;
             let start = if t0 == 0.0 { a } else { self.node(local(t0), widest, true) };
             let end = if t1 == 1.0 { b } else { self.node(local(t1), widest, true) };
+            for (stretch, nodes) in &mut held {
+                nodes.extend((stretch[1] == t0).then_some(start));
+                nodes.extend((stretch[0] == t1).then_some(end));
+            }
             // nodes along it: (share, node)
             let mut along = vec![(t0, start)];
             for (t, tap) in taps.iter().filter(|(t, _)| *t >= t0 && *t <= t1) {
@@ -408,9 +475,21 @@ impl Builder<'_> {
         }
         for (t, tap) in taps {
             if self.model.taps[tap] == usize::MAX {
-                let _ = t;
-                self.model.taps[tap] = self.node(self.taps[tap].at, 0.0, true);
+                let node = self.node(self.taps[tap].at, 0.0, true);
+                self.model.taps[tap] = node;
+                let over = held.iter_mut().find(|(stretch, _)| stretch[0] <= t && t <= stretch[1]);
+                over.into_iter().for_each(|(_, nodes)| nodes.push(node));
             }
+        }
+        let n = [-(q[1] - p[1]) / long, (q[0] - p[0]) / long];
+        let joints = self.parts.at[k];
+        for ([t0, t1], nodes) in held {
+            let corner = |t: f64, s: f64| [at(t)[0] + s * width(t) * n[0], at(t)[1] + s * width(t) * n[1]];
+            let outline = vec![corner(t0, -0.5), corner(t1, -0.5), corner(t1, 0.5), corner(t0, 0.5)];
+            let reached = [(t0 == 0.0, joints[0]), (t1 == 1.0, joints[1])];
+            let pad = self.model.pads.len();
+            self.adjoining.extend(reached.into_iter().filter(|(there, _)| *there).map(|(_, joint)| (joint, pad)));
+            self.model.pads.push(Pad { nodes, outlines: vec![outline] });
         }
         let area = limb.cell.area - self.limb_holes[k];
         self.model.area += area;
@@ -419,7 +498,7 @@ impl Builder<'_> {
 }
 
 /// How far a point lies outside a convex or nearly convex outline; 0 inside.
-fn distance(outline: &[[f64; 2]], p: [f64; 2]) -> f64 {
+pub(super) fn distance(outline: &[[f64; 2]], p: [f64; 2]) -> f64 {
     if super::anchors::inside(&[outline.to_vec()], p) {
         return 0.0;
     }

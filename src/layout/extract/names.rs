@@ -2,39 +2,54 @@
 
 use super::Extraction;
 use super::boxes::Boxes;
+use super::nets::OnNet;
 use crate::layout::drawing::Drawing;
 use std::collections::HashSet;
 
 /// Names that mean something else in a netlist.
 const RESERVED: [&str; 9] = ["subnet", "param", "process", "for", "if", "else", "call", "uses", "pi"];
 
-/// Names all nodes.
-pub(super) fn name(result: &mut Extraction, drawing: &Drawing) {
+/// Names all nodes; `nets` says for each label what conductor it stands on.
+pub(super) fn name(result: &mut Extraction, drawing: &Drawing, nets: &[Option<OnNet>]) {
     let boxes: Vec<_> = result.nodes.iter().map(|n| [n.at.map(|x| x - n.reach), n.at.map(|x| x + n.reach)]).collect();
     let tree = Boxes::of(&boxes);
     let mut taken: HashSet<String> = result.layers.iter().map(|layer| layer.name.clone()).collect();
-    for label in &drawing.labels {
+    for (label, on) in drawing.labels.iter().zip(nets) {
         let at = label.at.map(|x| f64::from(x) * drawing.unit_m);
         let away = |n: &u32| {
             let p = result.nodes[*n as usize].at;
             (p[0] - at[0]).hypot(p[1] - at[1])
         };
-        let near = tree.overlapping(&[at, at]).into_iter();
-        let nearest = near.min_by(|a, b| away(a).total_cmp(&away(b)).then(a.cmp(b)));
+        let nearest = |near: Vec<u32>| near.into_iter().min_by(|a, b| away(a).total_cmp(&away(b)).then(a.cmp(b)));
+        let pad = on.and_then(|on| on.pad).map(|pad| result.pads[pad].nodes.iter().map(|n| *n as u32).collect());
+        let found = pad.and_then(nearest).or_else(|| nearest(tree.overlapping(&[at, at])));
         let told = format!("label `{}` at {}", label.text, drawing.place(label.at.map(f64::from)));
-        match (nearest, identifier(&label.text)) {
-            (None, _) => result.notes.push(format!("{told} stands at no node: it names nothing")),
+        let net = on.and_then(|on| on.net);
+        match (found, identifier(&label.text)) {
             (_, None) => result.notes.push(format!("{told} has no letter or digit that a netlist's name may have")),
+            (None, _) if on.is_some() => {}
+            (None, _) => result.notes.push(format!("{told} stands at no node: it names nothing")),
             (Some(n), Some(name)) => {
                 let node = &mut result.nodes[n as usize];
-                if !node.name.is_empty() {
+                if !node.name.is_empty() && (node.name != name || net.is_none()) {
                     result.notes.push(format!("{told} stands at node `{}`, which has a name already", node.name));
                 } else if taken.insert(name.clone()) {
                     node.name = name;
-                } else {
+                    node.labelled = true;
+                } else if net.is_none() {
                     result.notes.push(format!("{told}: another node is called `{name}`, this one gets a number"));
                 }
             }
+        }
+    }
+    // a net that is labelled on its wiring
+    for net in &result.nets {
+        let mut nodes = net.pads.iter().flat_map(|pad| &result.pads[*pad].nodes).copied();
+        if let Some(n) = nodes.find(|n| result.nodes[*n].name.is_empty())
+            && taken.insert(net.name.clone())
+        {
+            result.nodes[n].name = net.name.clone();
+            result.nodes[n].labelled = true;
         }
     }
     let mut kind = vec!["n"; result.nodes.len()];
@@ -55,7 +70,7 @@ pub(super) fn name(result: &mut Extraction, drawing: &Drawing) {
 }
 
 /// A text as a name of the netlist language: other characters than letters and digits become `_`; none where nothing is left.
-fn identifier(text: &str) -> Option<String> {
+pub(super) fn identifier(text: &str) -> Option<String> {
     let mut name: String =
         text.trim().chars().take(64).map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
     if !name.bytes().any(|b| b.is_ascii_alphanumeric()) {

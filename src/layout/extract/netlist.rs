@@ -1,112 +1,69 @@
 //! An extraction as a netlist in SUGAR's language.
 //!
-//! Widths and lengths that several beams share are parameters, so that the model can be swept. The same drawing gives the same bytes.
+//! Widths and lengths that several beams share are parameters, so that the model can be swept; cells that repeat are subnets
+//! ([`super::repeats`]). The same drawing gives the same bytes.
 
-use super::{Beam, Extraction, LayerResult, holes};
+use super::Extraction;
+use super::conductors;
+use super::repeats::{self, Instance, Scope, Subnet};
+use super::rows::{Frame, Item, Row, Rows, Value};
 use crate::sets::Sets;
-use std::collections::HashMap;
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fmt::Write as _;
 
 /// So many beams must share a width, or a length, for it to become a parameter.
 const SHARED: [usize; 2] = [2, 3];
-/// Relative change of the width below which a beam has one width [1]: what rounding to the grid does.
-const UNIFORM: f64 = 5e-3;
+
+/// A netlist with the names of its nodes.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Written {
+    /// The netlist.
+    pub text: String,
+    /// Full name of each node of the extraction in it.
+    pub names: Vec<String>,
+}
 
 /// The netlist of an extraction.
 pub fn netlist(extraction: &Extraction) -> String {
-    let mut out = String::new();
-    head(extraction, &mut out);
-    let members = members(extraction);
-    let names: Vec<&str> = extraction.nodes.iter().map(|n| n.name.as_str()).collect();
-    let arc_widths = extraction.arcs.iter().map(|a| a.width);
-    let widths = members.iter().flat_map(|m| if m.taper { m.beam.width.to_vec() } else { vec![m.beam.width[0]] });
-    let widths = Shared::new("w", SHARED[0], widths.chain(arc_widths).map(micro));
-    let lengths = Shared::new("l", SHARED[1], members.iter().map(|m| micro(m.length)));
-    for (shared, what) in [(&widths, "width"), (&lengths, "length")] {
-        for (name, value, count) in &shared.parameters {
-            let _ = writeln!(out, "param {name} = {value}  % {what} of {count} beams");
-        }
+    written(extraction).text
+}
+
+/// The netlist of an extraction, and what its nodes are called there.
+pub fn written(extraction: &Extraction) -> Written {
+    let rows = Rows::new(extraction);
+    let items = items(extraction);
+    let mut text = String::new();
+    head(extraction, &mut text);
+    let flat: Vec<Row> = items.iter().map(|item| rows.row(item, &Frame::DRAWING)).collect();
+    let words = Words::new(&flat, &mut text);
+    let (scope, subnets) = repeats::scope(extraction, &rows, items);
+    let writer = Writer { extraction, words, rows, subnets: &subnets };
+    let locals: Vec<HashMap<usize, String>> = subnets.iter().map(|subnet| writer.locals(subnet)).collect();
+    for (subnet, local) in subnets.iter().zip(&locals) {
+        let formals: Vec<&str> = subnet.terminals.iter().map(|n| local[n].as_str()).collect();
+        let _ = writeln!(text, "subnet {} [{}] [] [", subnet.name, formals.join(" "));
+        writer.scope(&subnet.scope, &|n| local[&n].clone(), "  ", &mut text);
+        text.push_str("]\n");
     }
-    places(extraction, &mut out);
-    let layers = layers(extraction);
-    for node in &extraction.anchors {
-        let layer = layers[*node];
-        let _ = writeln!(out, "anchor {layer} [{}] []", names[*node]);
-    }
-    for body in &extraction.bodies {
-        let layer = &extraction.layers[body.layer].name;
-        let (area, polar) = (number(body.area), number(body.polar));
-        let _ = writeln!(out, "body2d {layer} [{}] [A={area} Ip={polar}]", names[body.node]);
-    }
-    for [a, b] in &extraction.links {
-        let d = difference(extraction, *a, *b);
-        let (l, oz) = (micro(d[0].hypot(d[1])), angle(d));
-        let _ = writeln!(out, "link2d * [{} {}] [l={l}{oz}]", names[*a], names[*b]);
-    }
-    for Member { beam, along, length, taper } in &members {
-        let layer = &extraction.layers[beam.layer];
-        let [a, b] = beam.nodes.map(|n| names[n]);
-        let (l, oz, holes) = (lengths.word(micro(*length)), angle(*along), perforated(layer, beam.porosity));
-        let [w0, w1] = beam.width.map(|w| widths.word(micro(w)));
-        let name = &layer.name;
-        let _ = if *taper {
-            writeln!(out, "taper2d {name} [{a} {b}] [l={l} w1={w0} w2={w1}{oz}{holes}]")
-        } else {
-            writeln!(out, "beam2d {name} [{a} {b}] [l={l} w={w0}{oz}{holes}]")
-        };
-    }
-    for arc in &extraction.arcs {
-        let layer = &extraction.layers[arc.layer];
-        // an arc of the language turns to its left
-        let [a, b] = if arc.angle > 0.0 { arc.nodes } else { [arc.nodes[1], arc.nodes[0]] };
-        let (d, alpha) = (difference(extraction, a, b), arc.angle.abs());
-        let radius = micro(0.5 * d[0].hypot(d[1]) / (0.5 * alpha).sin());
-        let start = d[1].atan2(d[0]) - 0.5 * alpha;
-        let (w, oz, holes) =
-            (widths.word(micro(arc.width)), angle([start.cos(), start.sin()]), perforated(layer, arc.porosity));
-        let (name, degrees) = (&layer.name, (alpha.to_degrees() * 1e9).round() / 1e9);
-        let _ = writeln!(
-            out,
-            "circbeam {name} [{} {}] [radius={radius} alpha=deg({degrees}) w={w}{oz}{holes}]",
-            names[a], names[b]
-        );
-    }
-    for comb in &extraction.combs {
-        let layer = &extraction.layers[comb.layer].name;
-        let d = difference(extraction, comb.nodes[0], comb.nodes[1]);
-        // the other side lies at 2·L − l
-        let long = 0.5 * (d[0].hypot(d[1]) + comb.overlap);
-        let [a, b] = comb.nodes.map(|n| names[n]);
-        let sizes = [comb.gap, comb.overlap, long].map(micro);
-        let _ = writeln!(
-            out,
-            "comb2de {layer} [{a} {b}] [N={} gap={} l={} L={}{}]  % {} and {} fingers",
-            comb.gaps,
-            sizes[0],
-            sizes[1],
-            sizes[2],
-            angle(d),
-            comb.fingers[0],
-            comb.fingers[1]
-        );
-    }
-    for plates in &extraction.plates {
-        let [a, b] = plates.nodes.map(|n| names[n]);
-        let d = difference(extraction, plates.nodes[0], plates.nodes[1]);
-        let (area, gap) = (number(plates.area), micro(plates.gap));
-        let layer = &extraction.layers[plates.layer].name;
-        let _ = writeln!(out, "plategap2d {layer} [{a} {b}] [A={area} gap={gap}{}]", angle(d));
-    }
-    for facing in &extraction.facing {
-        let [a, b, c, d] = facing.nodes.map(|n| names[n]);
-        let along = difference(extraction, facing.nodes[0], facing.nodes[1]);
-        let [l, w1, w2, gap] = [along[0].hypot(along[1]), facing.width[0], facing.width[1], facing.gap].map(micro);
-        let layer = &extraction.layers[facing.layer].name;
-        let oz = angle(along);
-        let _ = writeln!(out, "gap2dforce {layer} [{a} {b} {c} {d}] [l={l} w1={w1} w2={w2} gap={gap}{oz}]");
-    }
-    conductors(extraction, &mut out);
-    out
+    let mut names: Vec<String> = extraction.nodes.iter().map(|n| n.name.clone()).collect();
+    writer.scope(&scope, &|n| extraction.nodes[n].name.clone(), "", &mut text);
+    let all: HashMap<usize, usize> = (0..names.len()).map(|n| (n, n)).collect();
+    writer.inner(&scope, "", &all, &locals, &mut names);
+    Written { text, names }
+}
+
+/// All elements in the order in which they are written.
+fn items(extraction: &Extraction) -> Vec<Item> {
+    let mut items: Vec<Item> = extraction.anchors.iter().map(|n| Item::Anchor(*n)).collect();
+    items.extend((0..extraction.bodies.len()).map(Item::Body));
+    items.extend((0..extraction.links.len()).map(Item::Link));
+    items.extend((0..extraction.beams.len()).map(Item::Beam));
+    items.extend((0..extraction.arcs.len()).map(Item::Arc));
+    items.extend((0..extraction.combs.len()).map(Item::Comb));
+    items.extend((0..extraction.plates.len()).map(Item::Plates));
+    items.extend((0..extraction.facing.len()).map(Item::Facing));
+    items.extend(conductors::conductors(extraction));
+    items
 }
 
 fn head(extraction: &Extraction, out: &mut String) {
@@ -135,139 +92,164 @@ fn head(extraction: &Extraction, out: &mut String) {
     }
 }
 
-/// Parts that move are at ground; of those that hold still each is a port.
-fn conductors(extraction: &Extraction, out: &mut String) {
-    let mut moves = std::collections::BTreeMap::new();
-    for node in extraction
-        .beams
-        .iter()
-        .flat_map(|b| b.nodes)
-        .chain(extraction.arcs.iter().flat_map(|a| a.nodes))
-        .chain(extraction.bodies.iter().map(|b| b.node))
-    {
-        moves.insert(extraction.nodes[node].part, true);
-    }
-    // nodes with a potential, by part
-    let mut charged: std::collections::BTreeMap<usize, Vec<usize>> = std::collections::BTreeMap::new();
-    let plates = extraction.plates.iter().flat_map(|p| p.nodes);
-    let facing = extraction.facing.iter().flat_map(|f| [f.nodes[0], f.nodes[2]]);
-    for n in extraction.combs.iter().flat_map(|c| c.nodes).chain(plates).chain(facing) {
-        charged.entry(extraction.nodes[n].part).or_default().push(n);
-    }
-    for (part, mut nodes) in charged {
-        nodes.sort_unstable();
-        nodes.dedup();
-        let name = |n: usize| &extraction.nodes[n].name;
-        if moves.contains_key(&part) {
-            nodes.iter().for_each(|n| {
-                let _ = writeln!(out, "eground * [{}] []", name(*n));
-            });
-            continue;
+struct Writer<'a> {
+    extraction: &'a Extraction,
+    words: Words,
+    rows: Rows<'a>,
+    subnets: &'a [Subnet],
+}
+
+impl Writer<'_> {
+    /// The lines of a scope.
+    fn scope(&self, scope: &Scope, name: &dyn Fn(usize) -> String, indent: &str, out: &mut String) {
+        self.places(scope, name, indent, out);
+        for instance in &scope.instances {
+            let seen = instance.frame.within(&scope.frame);
+            let mut turned = Vec::new();
+            if let Some(oz) = direction(seen.angle) {
+                turned.push(format!("oz={oz}"));
+            }
+            if seen.mirrored {
+                turned.push("ox=pi".to_owned());
+            }
+            let nodes: Vec<String> = instance.terminals.iter().map(|n| name(*n)).collect();
+            let subnet = &self.subnets[instance.subnet].name;
+            let _ = writeln!(out, "{indent}{} {subnet} * [{}] [{}]", instance.name, nodes.join(" "), turned.join(" "));
         }
-        let first = nodes[0];
-        nodes[1..].iter().for_each(|n| {
-            let _ = writeln!(out, "R * [{} {}] [R=1]", name(first), name(*n));
+        for item in &scope.items {
+            let _ = writeln!(out, "{indent}{}", self.words.line(&self.rows.row(item, &scope.frame), name));
+        }
+    }
+
+    /// Places what does not hang together with the first node.
+    fn places(&self, scope: &Scope, name: &dyn Fn(usize) -> String, indent: &str, out: &mut String) {
+        let mut shown: BTreeSet<usize> = scope.items.iter().flat_map(|item| self.extraction.nodes_of(item)).collect();
+        shown.extend(scope.instances.iter().flat_map(|i| i.terminals.iter().copied()));
+        let number: BTreeMap<usize, usize> = shown.iter().enumerate().map(|(k, n)| (*n, k)).collect();
+        let mut sets = Sets::new(shown.len());
+        for item in &scope.items {
+            if let Item::Beam(_) | Item::Arc(_) | Item::Link(_) = item {
+                let nodes = self.extraction.nodes_of(item);
+                sets.join(number[&nodes[0]], number[&nodes[1]]);
+            }
+        }
+        for instance in &scope.instances {
+            instance.terminals.iter().for_each(|n| {
+                sets.join(number[&instance.terminals[0]], number[n]);
+            });
+        }
+        let Some(first) = shown.first().copied() else { return };
+        for n in shown.iter().copied().skip(1).filter(|n| sets.first(number[n]) == number[n]) {
+            let [p, q] = [first, n].map(|n| self.extraction.nodes[n].at);
+            let d = scope.frame.direction([q[0] - p[0], q[1] - p[1]]);
+            let _ = writeln!(out, "{indent}pos * [{} {}] [x={} y={}]", name(first), name(n), micro(d[0]), micro(d[1]));
+        }
+    }
+
+    /// What the nodes of a subnet are called in it: those handed in, and its own that no inner instance has for itself.
+    fn locals(&self, subnet: &Subnet) -> HashMap<usize, String> {
+        let mut names: HashMap<usize, String> =
+            subnet.terminals.iter().enumerate().map(|(k, n)| (*n, format!("t{}", k + 1))).collect();
+        let own = subnet.scope.items.iter().flat_map(|item| self.extraction.nodes_of(item));
+        let given = subnet.scope.instances.iter().flat_map(|i| i.terminals.iter().copied());
+        let own: BTreeSet<usize> = own.chain(given).filter(|n| !names.contains_key(n)).collect();
+        let mut count: BTreeMap<&str, usize> = BTreeMap::new();
+        for n in own {
+            // "pad", "plate" or "n" of the name in the drawing
+            let kind = self.extraction.nodes[n].name.trim_end_matches(|c: char| c.is_ascii_digit());
+            let kind = if kind.is_empty() || kind == "t" { "n" } else { kind };
+            let k = count.entry(kind).or_insert(0);
+            *k += 1;
+            names.insert(n, format!("{kind}{k}"));
+        }
+        names
+    }
+
+    /// Names of the nodes that instances have for themselves; `from` leads from the nodes of the scope to those of its place.
+    fn inner(
+        &self,
+        scope: &Scope,
+        path: &str,
+        from: &HashMap<usize, usize>,
+        locals: &[HashMap<usize, String>],
+        names: &mut [String],
+    ) {
+        for Instance { name, subnet, nodes, .. } in &scope.instances {
+            let path = format!("{path}{name}.");
+            let here: HashMap<usize, usize> = nodes.iter().map(|(first, own)| (*first, from[own])).collect();
+            let inside = &self.subnets[*subnet];
+            for (n, local) in locals[*subnet].iter().filter(|(n, _)| !inside.terminals.contains(n)) {
+                names[here[n]] = format!("{path}{local}");
+            }
+            self.inner(&inside.scope, &path, &here, locals, names);
+        }
+    }
+}
+
+/// Values that several beams have, as parameters.
+struct Words {
+    wide: HashMap<String, String>,
+    long: HashMap<String, String>,
+}
+
+impl Words {
+    /// Finds them, and writes them down.
+    fn new(rows: &[Row], out: &mut String) -> Self {
+        let values = || rows.iter().flat_map(|row| &row.values).map(|(_, value)| value);
+        let wide = values().filter_map(|v| if let Value::Wide(x) = v { Some(micro(*x)) } else { None });
+        let long = values().filter_map(|v| if let Value::Long(x) = v { Some(micro(*x)) } else { None });
+        Self { wide: shared("w", "width", SHARED[0], wide, out), long: shared("l", "length", SHARED[1], long, out) }
+    }
+
+    fn value(&self, value: &Value) -> Option<String> {
+        let or = |words: &HashMap<String, String>, x: f64| {
+            let plain = micro(x);
+            words.get(&plain).cloned().unwrap_or(plain)
+        };
+        Some(match value {
+            Value::Long(x) => or(&self.long, *x),
+            Value::Wide(x) => or(&self.wide, *x),
+            Value::Metres(x) => micro(*x),
+            Value::Turn(x) => return direction(*x),
+            Value::Angle(x) => format!("deg({})", degrees(*x)),
+            Value::Plain(x) => number(*x),
+            Value::Count(n) => n.to_string(),
+        })
+    }
+
+    fn line(&self, row: &Row, name: &dyn Fn(usize) -> String) -> String {
+        let nodes: Vec<String> = row.nodes.iter().map(|n| name(*n)).collect();
+        let values = row.values.iter().filter_map(|(key, value)| Some(format!("{key}={}", self.value(value)?)));
+        let values: Vec<String> = values.collect();
+        let blank = if row.name.is_empty() { "" } else { " " };
+        let comment = if row.comment.is_empty() { String::new() } else { format!("  % {}", row.comment) };
+        format!("{}{blank}{} {} [{}] [{}]{comment}", row.name, row.model, row.layer, nodes.join(" "), values.join(" "))
+    }
+}
+
+fn shared(
+    prefix: &str,
+    what: &str,
+    least: usize,
+    values: impl Iterator<Item = String>,
+    out: &mut String,
+) -> HashMap<String, String> {
+    let mut counts: Vec<(String, usize)> = Vec::new();
+    let mut at: HashMap<String, usize> = HashMap::new();
+    for value in values {
+        let k = *at.entry(value.clone()).or_insert_with(|| {
+            counts.push((value, 0));
+            counts.len() - 1
         });
-        let _ = writeln!(out, "{}_v port * [{}] []", name(first), name(first));
+        counts[k].1 += 1;
     }
-}
-
-/// A beam with the words for its width.
-struct Member {
-    beam: Beam,
-    along: [f64; 2],
-    length: f64,
-    taper: bool,
-}
-
-fn members(extraction: &Extraction) -> Vec<Member> {
-    let members = extraction.beams.iter().map(|beam| {
-        let mut beam = forwards(extraction, beam);
-        let along = difference(extraction, beam.nodes[0], beam.nodes[1]);
-        let [w0, w1] = beam.width;
-        let taper = (w1 - w0).abs() > UNIFORM * w0.max(w1);
-        if !taper {
-            beam.width = [0.5 * (w0 + w1); 2];
-        }
-        Member { length: along[0].hypot(along[1]), along, taper, beam }
-    });
-    members.collect()
-}
-
-/// The beam from left to right, or upwards.
-fn forwards(extraction: &Extraction, beam: &Beam) -> Beam {
-    let d = difference(extraction, beam.nodes[0], beam.nodes[1]);
-    let tiny = 1e-9 * d[0].hypot(d[1]);
-    let mut beam = beam.clone();
-    if d[0] < -tiny || (d[0] <= tiny && d[1] < 0.0) {
-        beam.nodes.reverse();
-        beam.width.reverse();
+    let mut words = HashMap::new();
+    for (k, (value, count)) in counts.into_iter().filter(|(_, count)| *count >= least).enumerate() {
+        let name = format!("{prefix}{}", k + 1);
+        let _ = writeln!(out, "param {name} = {value}  % {what} of {count} beams");
+        words.insert(value, name);
     }
-    beam
-}
-
-fn difference(extraction: &Extraction, a: usize, b: usize) -> [f64; 2] {
-    let [p, q] = [a, b].map(|n| extraction.nodes[n].at);
-    [q[0] - p[0], q[1] - p[1]]
-}
-
-/// Places parts that do not hang together with the first.
-fn places(extraction: &Extraction, out: &mut String) {
-    let mut sets = Sets::new(extraction.nodes.len());
-    for [a, b] in extraction
-        .beams
-        .iter()
-        .map(|b| b.nodes)
-        .chain(extraction.arcs.iter().map(|a| a.nodes))
-        .chain(extraction.links.iter().copied())
-    {
-        sets.join(a, b);
-    }
-    for n in 1..extraction.nodes.len() {
-        if sets.first(n) == n {
-            let d = difference(extraction, 0, n);
-            let (from, to) = (&extraction.nodes[0].name, &extraction.nodes[n].name);
-            let _ = writeln!(out, "pos * [{from} {to}] [x={} y={}]", micro(d[0]), micro(d[1]));
-        }
-    }
-}
-
-/// The layer of each node.
-fn layers(extraction: &Extraction) -> Vec<&str> {
-    let mut layers = vec!["*"; extraction.nodes.len()];
-    let arcs = extraction.arcs.iter().map(|a| (a.nodes, a.layer));
-    for (nodes, layer) in extraction.beams.iter().map(|b| (b.nodes, b.layer)).chain(arcs) {
-        nodes.iter().for_each(|n| layers[*n] = &extraction.layers[layer].name);
-    }
-    layers
-}
-
-/// Values that several beams have, with a parameter for each.
-struct Shared {
-    words: HashMap<String, String>,
-    parameters: Vec<(String, String, usize)>,
-}
-
-impl Shared {
-    fn new(prefix: &str, least: usize, values: impl Iterator<Item = String>) -> Self {
-        let mut counts: Vec<(String, usize)> = Vec::new();
-        let mut at: HashMap<String, usize> = HashMap::new();
-        for value in values {
-            let k = *at.entry(value.clone()).or_insert_with(|| {
-                counts.push((value, 0));
-                counts.len() - 1
-            });
-            counts[k].1 += 1;
-        }
-        let shared = counts.into_iter().filter(|(_, count)| *count >= least);
-        let parameters: Vec<_> =
-            shared.enumerate().map(|(k, (value, count))| (format!("{prefix}{}", k + 1), value, count)).collect();
-        Self { words: parameters.iter().map(|(name, value, _)| (value.clone(), name.clone())).collect(), parameters }
-    }
-
-    fn word(&self, value: String) -> String {
-        self.words.get(&value).cloned().unwrap_or(value)
-    }
+    words
 }
 
 /// A length in micrometres with the suffix of the language, to 0.1 pm.
@@ -276,34 +258,25 @@ fn micro(metres: f64) -> String {
     if rounded == 0.0 { "0".to_owned() } else { format!("{rounded}u") }
 }
 
-/// What etch holes leave of a beam's stiffness, mass and film.
-fn perforated(layer: &LayerResult, porosity: f64) -> String {
-    if porosity <= 0.0 {
-        return String::new();
-    }
-    let share = |name: &str, factor: f64| {
-        let value = layer.material.iter().find(|(known, _)| known == name).map(|(_, value)| value * factor);
-        value.map(|value| format!(" {name}={}", number(value))).unwrap_or_default()
-    };
-    share("Youngsmodulus", holes::stiffness(porosity))
-        + &share("density", 1.0 - porosity)
-        + &share("viscosity", 1.0 - porosity)
-}
-
 /// A number of the language.
 fn number(value: f64) -> String {
     let plain = format!("{value}");
     if plain.len() <= 8 { plain } else { format!("{value:e}") }
 }
 
-/// ` oz=…` of a direction; nothing along x.
-fn angle([x, y]: [f64; 2]) -> String {
-    let degrees = (y.atan2(x).to_degrees() * 1e9).round() / 1e9;
-    match degrees {
-        0.0 => String::new(),
-        90.0 => " oz=pi/2".to_owned(),
-        -90.0 => " oz=-pi/2".to_owned(),
-        180.0 | -180.0 => " oz=pi".to_owned(),
-        _ => format!(" oz=deg({degrees})"),
+/// An angle in degrees, to 1e-9.
+fn degrees(radians: f64) -> f64 {
+    (radians.to_degrees() * 1e9).round() / 1e9
+}
+
+/// An angle between −180° and 180°; none along x.
+fn direction(radians: f64) -> Option<String> {
+    let turned = degrees(radians.sin().atan2(radians.cos()));
+    match turned {
+        0.0 => None,
+        90.0 => Some("pi/2".to_owned()),
+        -90.0 => Some("-pi/2".to_owned()),
+        180.0 | -180.0 => Some("pi".to_owned()),
+        _ => Some(format!("deg({turned})")),
     }
 }

@@ -99,6 +99,17 @@ fn within(inner: &str, outer: &str) -> bool {
     inner.strip_prefix(outer).is_some_and(|rest| outer.is_empty() || rest.is_empty() || rest.starts_with('.'))
 }
 
+/// Nodes of all elements in an instance, in order.
+fn all_nodes<'a>(group: &Group<'a>) -> impl Iterator<Item = &'a String> {
+    let mut stack = vec![group];
+    let mut all: Vec<&'a Line> = Vec::new();
+    while let Some(group) = stack.pop() {
+        all.extend(&group.lines);
+        stack.extend(group.inside.values().rev());
+    }
+    all.into_iter().flat_map(|line| &line.nodes)
+}
+
 struct Writer {
     /// Names of subnets by their text.
     subnets: HashMap<String, String>,
@@ -126,10 +137,10 @@ impl Writer {
                 Part::Group(name) => {
                     let inner = if path.is_empty() { name.clone() } else { format!("{path}.{name}") };
                     let given = self.given(&group.inside[name], &inner);
-                    let inside: HashMap<String, String> =
-                        given.iter().enumerate().map(|(k, n)| (n.clone(), format!("n{}", k + 1))).collect();
+                    let words = self.words(&group.inside[name], &inner, &given);
+                    let inside = given.iter().cloned().zip(words.iter().cloned()).collect();
                     let body = self.body(&group.inside[name], &inner, &inside);
-                    let subnet = self.subnet(name, given.len(), &body);
+                    let subnet = self.subnet(name, &words, &body);
                     let nodes: Vec<String> = given.iter().map(|n| self.local(n, path, formals)).collect();
                     let _ = writeln!(text, "{name} {subnet} * [{}] []", nodes.join(" "));
                 }
@@ -141,19 +152,22 @@ impl Writer {
     /// Nodes that an instance is given: those that are not its own, in order of appearance.
     fn given(&self, group: &Group<'_>, path: &str) -> Vec<String> {
         let (mut seen, mut given) = (BTreeSet::new(), Vec::new());
-        let mut stack = vec![group];
-        let mut all: Vec<&Line> = Vec::new();
-        while let Some(group) = stack.pop() {
-            all.extend(&group.lines);
-            stack.extend(group.inside.values().rev());
-        }
-        for node in all.iter().flat_map(|line| &line.nodes) {
+        for node in all_nodes(group) {
             let own = node.strip_prefix(path).is_some_and(|rest| rest.starts_with('.'));
             if (!own || self.outside.contains(node)) && seen.insert(node) {
                 given.push(node.clone());
             }
         }
         given
+    }
+
+    /// What given nodes are called in an instance: n1, n2 …, but for what its own nodes are called.
+    fn words(&self, group: &Group<'_>, path: &str, given: &[String]) -> Vec<String> {
+        let handed: BTreeSet<&String> = given.iter().collect();
+        let own: BTreeSet<String> =
+            all_nodes(group).filter(|n| !handed.contains(n)).map(|n| self.local(n, path, &HashMap::new())).collect();
+        let mut free = (1..).map(|k| format!("n{k}")).filter(|word| !own.contains(word));
+        given.iter().filter_map(|_| free.next()).collect()
     }
 
     /// What a node is called in an instance.
@@ -166,8 +180,8 @@ impl Writer {
     }
 
     /// The subnet of that text: one that is there, or a new one.
-    fn subnet(&mut self, instance: &str, nodes: usize, body: &str) -> String {
-        let key = format!("{nodes}\n{body}");
+    fn subnet(&mut self, instance: &str, formals: &[String], body: &str) -> String {
+        let key = format!("{}\n{body}", formals.join(" "));
         if let Some(name) = self.subnets.get(&key) {
             return name.clone();
         }
@@ -178,7 +192,6 @@ impl Writer {
             k += 1;
             name = format!("{word}_part{k}");
         }
-        let formals: Vec<String> = (1..=nodes).map(|k| format!("n{k}")).collect();
         let _ = write!(self.definitions, "\nsubnet {name} [{}] []\n[\n", formals.join(" "));
         for line in body.lines() {
             let _ = writeln!(self.definitions, "  {line}");
