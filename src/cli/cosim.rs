@@ -1,5 +1,6 @@
 //! `bimorph cosim`: a circuit with mechanisms in it.
 
+use super::access::AccessArgs;
 use super::cosim_netlist::{NetlistArgs, is_netlist};
 use super::failure::Failure;
 use super::output::{check_folder, write};
@@ -30,9 +31,12 @@ pub(crate) struct Cosim {
     /// ngspice deck; or a netlist (.net), which becomes a deck around its device with the circuit that it draws
     deck: PathBuf,
 
-    /// Step every model of the deck on a server: unix:///path or http://host:port [default: as the deck says]
+    /// Step every model of the deck on a server: unix:///path, host:port or https://host:port [default: as the deck says]
     #[arg(long, value_name = "URI")]
     remote: Option<String>,
+
+    #[command(flatten)]
+    access: AccessArgs,
 
     /// Write the waveforms: .raw, .csv, .svg, .png or .html
     #[arg(long, value_name = "FILE")]
@@ -87,6 +91,7 @@ impl Cosim {
         let options = CosimOptions {
             deck: self.deck.clone(),
             remote: self.remote.clone(),
+            environment: self.access.access().to_environment(),
             raw: raw.clone(),
             ngspice: self.ngspice.clone(),
             plugin: self.plugin.clone(),

@@ -9,7 +9,6 @@ use bimorph::netlist::Bundle;
 use bimorph::results::raw;
 use bimorph::service::address::Address;
 use bimorph::service::client::Client;
-use bimorph::service::limits::Limits;
 use bimorph::service::server::{self, ServeOptions};
 use clap::Args;
 use std::path::Path;
@@ -124,10 +123,8 @@ fn server() -> Result<String, String> {
     let tell_failure = tell.clone();
     let options = ServeOptions {
         listen: vec![Address::Unix(path.clone())],
-        insecure: false,
-        while_stdin: false,
-        limits: Limits::default(),
         ready: Box::new(move |_| drop(tell.send(Ok(())))),
+        ..ServeOptions::default()
     };
     let serving = runtime.spawn(async move {
         let ended = server::run(options, async { drop(stopped.await) }).await;

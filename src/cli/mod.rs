@@ -5,6 +5,7 @@
 
 mod ac;
 mod ac_report;
+mod access;
 mod chance;
 mod chart;
 mod check;

@@ -2,15 +2,17 @@
 
 use super::failure::Failure;
 use bimorph::service::address::Address;
+use bimorph::service::guard::GuardFiles;
 use bimorph::service::limits::Limits;
 use bimorph::service::log;
 use bimorph::service::server::{ServeOptions, run_until_signal};
 use clap::Args;
+use std::path::PathBuf;
 
 /// Serve models over gRPC (bimorph.v1), until interrupted.
 ///
 /// Prints one line "listening on ADDRESS" for each address on standard error once it accepts connections. Health and
-/// reflection services are always on. There are no passwords: keep to a Unix socket or to this machine.
+/// reflection services are always on. An address that other machines can reach takes TLS, and tokens or certificates of clients.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  bimorph serve --listen unix:///tmp/bimorph.sock\n  \
                         bimorph serve --listen 127.0.0.1:50051 --listen unix:///run/bimorph.sock\n  \
@@ -20,7 +22,23 @@ pub(crate) struct Serve {
     #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:50051")]
     listen: Vec<String>,
 
-    /// Allow addresses that other machines can reach
+    /// Certificate of this server and those up to its authority, PEM: every TCP address speaks TLS
+    #[arg(long, value_name = "FILE")]
+    tls_cert: Option<PathBuf>,
+
+    /// Key of the certificate, PEM
+    #[arg(long, value_name = "FILE")]
+    tls_key: Option<PathBuf>,
+
+    /// Authorities of clients, PEM: each client must have a certificate of one of them
+    #[arg(long, value_name = "FILE")]
+    tls_client_ca: Option<PathBuf>,
+
+    /// Tokens, a line for each client, TOKEN or NAME TOKEN: every call over TCP must show one
+    #[arg(long, value_name = "FILE")]
+    token_file: Option<PathBuf>,
+
+    /// Allow addresses that other machines can reach, whoever may come and whoever may listen
     #[arg(long)]
     insecure: bool,
 
@@ -51,6 +69,12 @@ impl Serve {
         };
         let options = ServeOptions {
             listen,
+            guard: GuardFiles {
+                certificate: self.tls_cert.clone(),
+                key: self.tls_key.clone(),
+                client_authority: self.tls_client_ca.clone(),
+                token_file: self.token_file.clone(),
+            },
             insecure: self.insecure,
             limits: self.limits()?,
             while_stdin: self.while_stdin,

@@ -1,5 +1,6 @@
 //! `bimorph sweep`: many variants.
 
+use super::access::AccessArgs;
 use super::chance::Chance;
 use super::failure::Failure;
 use super::model::ModelArgs;
@@ -83,9 +84,12 @@ pub(crate) struct Sweep {
     #[arg(long)]
     threads: Option<usize>,
 
-    /// Run on a server: unix:///path or http://host:port
+    /// Run on a server: unix:///path, host:port or https://host:port
     #[arg(long, value_name = "URI")]
     to: Option<String>,
+
+    #[command(flatten)]
+    access: AccessArgs,
 
     /// Longest wait for an answer of the server [s]
     #[arg(long, default_value = "30", value_parser = value::number, allow_negative_numbers = true)]
@@ -126,7 +130,7 @@ impl Sweep {
                     return Err(Failure::bad("--deadline", "a time above 0 s", self.deadline.to_string()));
                 }
                 let deadline = Duration::from_secs_f64(self.deadline);
-                Client::connect(uri, deadline)
+                Client::connect_with(uri, &self.access.access(), deadline)
                     .and_then(|mut client| client.sweep(&spec, &bundle, &options, &mut |p| report(&bar, p)))
                     .map(|table| (table, None))
                     .map_err(|e| if interrupt::asked() { Failure::Interrupted } else { e.into() })

@@ -23,6 +23,8 @@ pub struct CosimOptions {
     pub deck: PathBuf,
     /// Address of a server that steps every model of the deck, whatever its `.model` lines say; none: they decide.
     pub remote: Option<String>,
+    /// Variables of the plug-in's environment, beside those of this process: what it shows a server.
+    pub environment: Vec<(&'static str, PathBuf)>,
     /// Where ngspice's raw file shall go; none: no raw file.
     pub raw: Option<PathBuf>,
     /// The ngspice program; none: [`find_ngspice`].
@@ -102,6 +104,7 @@ pub(super) fn run_whatever(options: &CosimOptions, keep_going: &dyn Fn() -> bool
     if let Some(remote) = &options.remote {
         command.env("BIMORPH_REMOTE", remote);
     }
+    command.envs(options.environment.iter().map(|(name, file)| (name, file)));
     if let Some(path) = &unfinished {
         command.arg("-r").arg(path);
     }

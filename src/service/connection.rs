@@ -6,18 +6,21 @@
 //! The HTTP layer waits for its clients when it shuts down; one that never answers would hold the server for as long as
 //! it likes. So the socket itself listens for the order to cut: reads and writes then fail, and the layer above gives up.
 
+use super::guard::{Guard, Voice};
 use super::limits::Limits;
+use std::fmt;
 use std::future::Future;
 use std::io;
 use std::pin::Pin;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, PoisonError, Weak};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError, Weak};
 use std::task::{Context, Poll};
 use std::time::{Duration, Instant};
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::net::{TcpStream, UnixStream};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::time::Sleep;
+use tokio_rustls::server::TlsStream;
 use tokio_util::sync::{CancellationToken, WaitForCancellationFutureOwned};
 use tonic::transport::server::Connected;
 
@@ -26,7 +29,34 @@ const GREETING: usize = 24 + 9;
 
 enum Socket {
     Tcp(TcpStream),
+    Tls(Box<TlsStream<TcpStream>>),
     Unix(UnixStream),
+}
+
+/// Who is at the other end.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Who {
+    /// The owner of this server, over a Unix socket.
+    Local,
+    /// Anybody.
+    Unknown,
+    /// Somebody who speaks plain HTTP/2 where TLS is spoken.
+    Plain,
+    /// The owner of a certificate, by its SHA-256.
+    Certified([u8; 32]),
+    /// The owner of a token.
+    Named(Arc<str>),
+}
+
+impl fmt::Display for Who {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Local => f.write_str("local"),
+            Self::Unknown | Self::Plain => f.write_str("unknown"),
+            Self::Certified(hash) => hash[..8].iter().try_for_each(|byte| write!(f, "{byte:02x}")),
+            Self::Named(name) => f.write_str(name),
+        }
+    }
 }
 
 static NUMBERS: AtomicU64 = AtomicU64::new(1);
@@ -41,6 +71,8 @@ pub(super) struct Presence {
     /// When the last call ended, after `opened` [ms].
     used_ms: AtomicU64,
     greeted: AtomicBool,
+    /// Once its client has been understood.
+    who: OnceLock<Who>,
     cut: CancellationToken,
 }
 
@@ -52,6 +84,7 @@ impl Presence {
             calls: AtomicUsize::new(0),
             used_ms: AtomicU64::new(0),
             greeted: AtomicBool::new(false),
+            who: OnceLock::new(),
             cut: cut.child_token(),
         })
     }
@@ -59,6 +92,11 @@ impl Presence {
     /// Tells connections apart; never 0.
     pub(super) fn number(&self) -> u64 {
         self.number
+    }
+
+    /// Who is there, as far as the connection itself says.
+    pub(super) fn who(&self) -> Who {
+        self.who.get().cloned().unwrap_or(Who::Unknown)
     }
 
     /// A call begins.
@@ -128,18 +166,41 @@ impl Connections {
         presence
     }
 
-    /// A connection in a place.
-    pub(super) fn tcp(&self, socket: TcpStream, place: OwnedSemaphorePermit) -> Connection {
-        self.connection(Socket::Tcp(socket), place)
-    }
-
-    /// The same over a Unix socket.
-    pub(super) fn unix(&self, socket: UnixStream, place: OwnedSemaphorePermit) -> Connection {
-        self.connection(Socket::Unix(socket), place)
-    }
-
-    fn connection(&self, socket: Socket, place: OwnedSemaphorePermit) -> Connection {
+    /// A connection over TCP in a place, once it is known how its client speaks; none when that fails, or takes longer than
+    /// a handshake may.
+    pub(super) async fn tcp(
+        &self,
+        socket: TcpStream,
+        guard: &Guard,
+        place: OwnedSemaphorePermit,
+    ) -> Option<Connection> {
         let presence = self.welcome();
+        let greeted = tokio::select! {
+            greeted = tokio::time::timeout(self.handshake, guard.greet(socket)) => greeted,
+            () = presence.cut.cancelled() => return None,
+        };
+        let (voice, who) = match greeted {
+            Ok(Ok(greeted)) => greeted,
+            Ok(Err(error)) => {
+                tracing::info!(%error, "handshake refused");
+                return None;
+            }
+            Err(_) => return None,
+        };
+        let socket = match voice {
+            Voice::Plain(socket) => Socket::Tcp(socket),
+            Voice::Secure(stream) => Socket::Tls(stream),
+        };
+        Some(self.connection(socket, presence, who, place))
+    }
+
+    /// A connection over a Unix socket in a place.
+    pub(super) fn unix(&self, socket: UnixStream, place: OwnedSemaphorePermit) -> Connection {
+        self.connection(Socket::Unix(socket), self.welcome(), Who::Local, place)
+    }
+
+    fn connection(&self, socket: Socket, presence: Arc<Presence>, who: Who, place: OwnedSemaphorePermit) -> Connection {
+        let _ = presence.who.set(who);
         let cut = Box::pin(presence.cut.clone().cancelled_owned());
         let greeting = Some(Box::pin(tokio::time::sleep(self.handshake)));
         Connection { socket, cut, presence, greeting, read: 0, _place: place }
@@ -197,6 +258,7 @@ impl AsyncRead for Connection {
         let before = buf.filled().len();
         let read = match &mut self.socket {
             Socket::Tcp(socket) => Pin::new(socket).poll_read(cx, buf),
+            Socket::Tls(socket) => Pin::new(socket).poll_read(cx, buf),
             Socket::Unix(socket) => Pin::new(socket).poll_read(cx, buf),
         };
         self.greet(buf.filled().len() - before, cx)?;
@@ -209,6 +271,7 @@ impl AsyncWrite for Connection {
         self.check(cx)?;
         match &mut self.socket {
             Socket::Tcp(socket) => Pin::new(socket).poll_write(cx, buf),
+            Socket::Tls(socket) => Pin::new(socket).poll_write(cx, buf),
             Socket::Unix(socket) => Pin::new(socket).poll_write(cx, buf),
         }
     }
@@ -221,17 +284,22 @@ impl AsyncWrite for Connection {
         self.check(cx)?;
         match &mut self.socket {
             Socket::Tcp(socket) => Pin::new(socket).poll_write_vectored(cx, bufs),
+            Socket::Tls(socket) => Pin::new(socket).poll_write_vectored(cx, bufs),
             Socket::Unix(socket) => Pin::new(socket).poll_write_vectored(cx, bufs),
         }
     }
 
     fn is_write_vectored(&self) -> bool {
-        true
+        match &self.socket {
+            Socket::Tls(socket) => socket.is_write_vectored(),
+            Socket::Tcp(_) | Socket::Unix(_) => true,
+        }
     }
 
     fn poll_flush(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
         match &mut self.socket {
             Socket::Tcp(socket) => Pin::new(socket).poll_flush(cx),
+            Socket::Tls(socket) => Pin::new(socket).poll_flush(cx),
             Socket::Unix(socket) => Pin::new(socket).poll_flush(cx),
         }
     }
@@ -239,6 +307,7 @@ impl AsyncWrite for Connection {
     fn poll_shutdown(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
         match &mut self.socket {
             Socket::Tcp(socket) => Pin::new(socket).poll_shutdown(cx),
+            Socket::Tls(socket) => Pin::new(socket).poll_shutdown(cx),
             Socket::Unix(socket) => Pin::new(socket).poll_shutdown(cx),
         }
     }

@@ -3,9 +3,11 @@
 //! A client may announce a large message and send little of it, begin many and finish none, or ask for more at once than
 //! the server can hold. So every call enters here: it counts among the calls of the server and of its connection, its
 //! bytes count from the first (those of a stream until each message is whole, those of a unary request until it is
-//! answered), and a message that was begun must go on.
+//! answered), and a message that was begun must go on. Who may not ask is refused here; whether the server is well may be
+//! asked by everybody.
 
 use super::connection::Presence;
+use super::guard::Guard;
 use super::limits::Limits;
 use super::status;
 use super::turns::CLIENT;
@@ -27,23 +29,27 @@ use tonic::{Code, Status};
 const STREAMS: [&str; 2] = ["/Trial", "/ServerReflectionInfo"];
 
 /// Counts for all services of a server.
-#[derive(Debug)]
 pub(super) struct Gate {
     calls: AtomicUsize,
     held: AtomicUsize,
     most_calls: usize,
     most_held: usize,
     pause: Duration,
+    guard: Arc<Guard>,
 }
 
+/// A service without tokens: who watches over servers has none.
+const OPEN: &str = "grpc.health.v1.Health";
+
 impl Gate {
-    pub(super) fn new(limits: &Limits) -> Arc<Self> {
+    pub(super) fn new(limits: &Limits, guard: Arc<Guard>) -> Arc<Self> {
         Arc::new(Self {
             calls: AtomicUsize::new(0),
             held: AtomicUsize::new(0),
             most_calls: limits.calls,
             most_held: limits.held_bytes,
             pause: limits.request_pause,
+            guard,
         })
     }
 
@@ -114,7 +120,7 @@ type Answer = Pin<Box<dyn Future<Output = Result<http::Response<Body>, Infallibl
 
 impl<S> Service<http::Request<Body>> for Intake<S>
 where
-    S: Service<http::Request<Body>, Response = http::Response<Body>, Error = Infallible>,
+    S: Service<http::Request<Body>, Response = http::Response<Body>, Error = Infallible> + NamedService,
     S::Future: Send + 'static,
 {
     type Response = http::Response<Body>;
@@ -130,6 +136,13 @@ where
             Ok(call) => Arc::new(call),
             Err(status) => return Box::pin(std::future::ready(Ok(status.into_http()))),
         };
+        if S::NAME != OPEN
+            && let Some(presence) = &call.presence
+            && let Err(status) = self.gate.guard.admit(presence, request.headers())
+        {
+            tracing::warn!(call = request.uri().path(), reason = status.message(), "refused");
+            return Box::pin(std::future::ready(Ok(status.into_http())));
+        }
         let stream = STREAMS.iter().any(|name| request.uri().path().ends_with(name));
         let client = call.presence.as_ref().map_or(0, |presence| presence.number());
         let received = Arc::clone(&call);

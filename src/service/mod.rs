@@ -2,12 +2,13 @@
 //!
 //! # Layout
 //! [`proto`] is what travels and [`convert`] the only place that knows both it and the library's own types. [`client`]
-//! is built with the feature `remote` alone. The rest is the feature `server`: [`server`] listens and stops
-//! (`sockets`, `connection`, `shutdown`), `intake` counts what comes in, `rpc` answers calls, `stream` is the Newton loop,
+//! is built with the feature `remote` alone, and shows what [`access`] says; `tls` is for both ends. The rest is the feature `server`: [`server`] listens and stops
+//! (`sockets`, `connection`, `shutdown`), [`guard`] and `tokens` ask who comes, `intake` counts what comes in, `rpc` answers calls, `stream` is the Newton loop,
 //! `models`, `sessions` and `sweeps` keep what clients can name, under `ids` that nobody guesses, `snapshots` puts sessions
 //! into bytes, `work` computes, in the `turns` of clients, `chunks` sends what is long, `status` says what went wrong, [`log`]
 //! says it without waiting, and [`limits`] is what clients may ask for.
 
+pub mod access;
 pub mod address;
 pub mod client;
 pub mod convert;
@@ -17,6 +18,8 @@ pub mod proto;
 mod chunks;
 #[cfg(feature = "server")]
 mod connection;
+#[cfg(feature = "server")]
+pub mod guard;
 #[cfg(feature = "server")]
 mod ids;
 #[cfg(feature = "server")]
@@ -45,6 +48,10 @@ mod status;
 mod stream;
 #[cfg(feature = "server")]
 mod sweeps;
+#[cfg(feature = "tls")]
+pub mod tls;
+#[cfg(feature = "server")]
+pub mod tokens;
 #[cfg(feature = "server")]
 mod turns;
 #[cfg(feature = "server")]

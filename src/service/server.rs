@@ -2,6 +2,7 @@
 
 use super::address::Address;
 use super::connection::Connections;
+use super::guard::{Guard, GuardError, GuardFiles};
 use super::intake::{Gate, Intake};
 use super::limits::Limits;
 use super::log::{self, Lines};
@@ -37,7 +38,9 @@ const LAST_WORDS: Duration = Duration::from_millis(200);
 pub struct ServeOptions {
     /// Addresses to listen on; at least one. See [`Address`].
     pub listen: Vec<Address>,
-    /// Allow TCP addresses that other machines can reach. The service has no passwords and no encryption.
+    /// What is asked of who comes over TCP.
+    pub guard: GuardFiles,
+    /// Allow TCP addresses that other machines can reach without TLS, or without tokens and certificates of clients.
     pub insecure: bool,
     /// What clients may ask for.
     pub limits: Limits,
@@ -58,6 +61,7 @@ impl Default for ServeOptions {
     fn default() -> Self {
         Self {
             listen: Vec::new(),
+            guard: GuardFiles::default(),
             insecure: false,
             limits: Limits::default(),
             while_stdin: false,
@@ -75,13 +79,23 @@ pub enum ServeError {
     NoAddress,
     /// A TCP address beyond this machine, without [`ServeOptions::insecure`].
     #[error(
-        "{address} can be reached from other machines, and the service has no passwords and no encryption; listen \
-             on 127.0.0.1 or a Unix socket, or pass --insecure if the network is trusted"
+        "{address} can be reached from other machines: that takes TLS (--tls-cert, --tls-key) and a token for each client \
+         (--token-file) or an authority of their certificates (--tls-client-ca); or listen on 127.0.0.1 or a Unix socket, \
+         or pass --insecure if the network is trusted"
     )]
     NotLoopback {
         /// The address.
         address: Address,
     },
+    /// An `https://` address without a certificate.
+    #[error("{address} asks for TLS, which takes a certificate and its key: --tls-cert and --tls-key")]
+    NoTls {
+        /// The address.
+        address: Address,
+    },
+    /// Certificates, keys or tokens cannot be used.
+    #[error(transparent)]
+    Guard(#[from] GuardError),
     /// A live server already has this Unix socket.
     #[error("{address} is in use by a running server; stop it or choose another path")]
     InUse {
@@ -127,13 +141,14 @@ pub async fn run_with(
     make: MakeDevice,
     shutdown: impl Future<Output = ()> + Send,
 ) -> Result<(), ServeError> {
-    let ServeOptions { listen, insecure, limits, ready, while_stdin: _ } = options;
+    let ServeOptions { listen, guard, insecure, limits, ready, while_stdin: _ } = options;
     if listen.is_empty() {
         return Err(ServeError::NoAddress);
     }
+    let guard = Arc::new(Guard::read(&guard)?);
     let mut listeners = Vec::with_capacity(listen.len());
     for address in &listen {
-        listeners.push(Listener::bind(address, insecure).await?);
+        listeners.push(Listener::bind(address, insecure, &guard).await?);
     }
     let bound: Vec<Address> = listeners.iter().map(Listener::address).collect();
     let signals = Shutdown::default();
@@ -141,7 +156,7 @@ pub async fn run_with(
     let connections = Arc::new(Connections::new(&limits, &signals.cutting));
     let mut accepting = tokio::task::JoinSet::new();
     for listener in listeners {
-        accepting.spawn(listener.accept(Arc::clone(&connections), signals.clone(), sender.clone()));
+        accepting.spawn(listener.accept(Arc::clone(&connections), Arc::clone(&guard), signals.clone(), sender.clone()));
     }
     drop(sender);
 
@@ -167,7 +182,7 @@ pub async fn run_with(
             .register_encoded_file_descriptor_set(DESCRIPTORS)
             .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
     };
-    let gate = Gate::new(&shared.limits);
+    let gate = Gate::new(&shared.limits, guard);
     let reflection = |error: &dyn Fn(&dyn std::error::Error) -> ServeError| {
         let v1 = reflection().build_v1().map_err(|e| error(&e))?;
         let v1alpha = reflection().build_v1alpha().map_err(|e| error(&e))?;

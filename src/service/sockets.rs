@@ -2,6 +2,7 @@
 
 use super::address::Address;
 use super::connection::{Connection, Connections};
+use super::guard::Guard;
 use super::server::ServeError;
 use super::shutdown::Shutdown;
 use std::fs;
@@ -10,11 +11,17 @@ use std::os::unix::fs::{DirBuilderExt, FileTypeExt, MetadataExt, PermissionsExt}
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
-use tokio::net::{TcpListener, UnixListener};
-use tokio::sync::mpsc;
+use tokio::net::{TcpListener, TcpStream, UnixListener, UnixStream};
+use tokio::sync::{OwnedSemaphorePermit, mpsc};
 
 /// Pause after a failed accept (no file descriptors left, say), so that it does not spin.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(50);
+
+/// A socket that was just accepted.
+enum Socket {
+    Tcp(TcpStream),
+    Unix(UnixStream),
+}
 
 /// An open listener with its address as bound.
 pub(super) enum Listener {
@@ -23,16 +30,22 @@ pub(super) enum Listener {
 }
 
 impl Listener {
-    /// Opens an address.
-    pub(super) async fn bind(address: &Address, insecure: bool) -> Result<Self, ServeError> {
+    /// Opens an address. With TLS, every TCP address speaks it.
+    pub(super) async fn bind(address: &Address, insecure: bool, guard: &Guard) -> Result<Self, ServeError> {
         let refused = |reason| ServeError::Bind { address: address.clone(), reason };
         match address {
-            Address::Tcp(socket) => {
-                if !socket.ip().is_loopback() && !insecure {
+            Address::Tls { .. } if !guard.speaks_tls() => Err(ServeError::NoTls { address: address.clone() }),
+            Address::Tcp(socket) | Address::Tls { socket, .. } => {
+                if !socket.ip().is_loopback() && !insecure && !guard.is_enough() {
                     return Err(ServeError::NotLoopback { address: address.clone() });
                 }
                 let listener = TcpListener::bind(socket).await.map_err(refused)?;
-                let bound = Address::Tcp(listener.local_addr().map_err(refused)?);
+                let socket = listener.local_addr().map_err(refused)?;
+                let bound = match address {
+                    Address::Tls { host, .. } => Address::Tls { host: host.clone(), socket },
+                    _ if guard.speaks_tls() => Address::Tls { host: socket.ip().to_string(), socket },
+                    _ => Address::Tcp(socket),
+                };
                 Ok(Self::Tcp(listener, bound))
             }
             Address::Unix(path) => {
@@ -58,6 +71,7 @@ impl Listener {
     pub(super) async fn accept(
         self,
         connections: Arc<Connections>,
+        guard: Arc<Guard>,
         shutdown: Shutdown,
         accepted: mpsc::Sender<io::Result<Connection>>,
     ) {
@@ -67,10 +81,20 @@ impl Listener {
                 () = shutdown.draining.cancelled() => return,
             };
             match next {
-                Ok(Some(connection)) => {
-                    if accepted.send(Ok(connection)).await.is_err() {
+                Ok(Some((Socket::Unix(socket), place))) => {
+                    if accepted.send(Ok(connections.unix(socket, place))).await.is_err() {
                         return;
                     }
+                }
+                Ok(Some((Socket::Tcp(socket), place))) => {
+                    // a handshake waits for its client, and nobody else does
+                    let (connections, guard, accepted) =
+                        (Arc::clone(&connections), Arc::clone(&guard), accepted.clone());
+                    tokio::spawn(async move {
+                        if let Some(connection) = connections.tcp(socket, &guard, place).await {
+                            let _ = accepted.send(Ok(connection)).await;
+                        }
+                    });
                 }
                 Ok(None) => tracing::warn!("connection refused: the limit is reached"),
                 Err(error) => {
@@ -82,17 +106,17 @@ impl Listener {
     }
 
     /// One connection; none when there is no place for it.
-    async fn next(&self, connections: &Connections) -> io::Result<Option<Connection>> {
+    async fn next(&self, connections: &Connections) -> io::Result<Option<(Socket, OwnedSemaphorePermit)>> {
         match self {
             Self::Tcp(listener, _) => {
                 let (socket, _) = listener.accept().await?;
                 // Without this, replies wait for the peer's delayed acknowledgement: 40 ms a trial.
                 socket.set_nodelay(true)?;
-                Ok(connections.place().await.map(|place| connections.tcp(socket, place)))
+                Ok(connections.place().await.map(|place| (Socket::Tcp(socket), place)))
             }
             Self::Unix(listener, _) => {
                 let (socket, _) = listener.accept().await?;
-                Ok(connections.place().await.map(|place| connections.unix(socket, place)))
+                Ok(connections.place().await.map(|place| (Socket::Unix(socket), place)))
             }
         }
     }

@@ -8,4 +8,6 @@ mod errors;
 mod export;
 mod layouts;
 mod outputs;
+mod secure;
 mod service;
+mod serving;

@@ -65,7 +65,9 @@ pub enum CardError {
         word: String,
     },
     /// An address that ngspice cut at its `//`.
-    #[error("remote: ngspice takes // for a comment; write remote=\"unix:/PATH\" or remote=\"HOST:PORT\"")]
+    #[error(
+        "remote: ngspice takes // for a comment; write remote=\"unix:/PATH\", remote=\"HOST:PORT\" or remote=\"https:HOST:PORT\""
+    )]
     Address,
     /// An option of the model that cannot be so.
     #[error(transparent)]
@@ -136,7 +138,9 @@ impl ModelCard {
             ports: settings::rejoin(&raw.ports).iter().map(|p| PortName::parse(p)).collect(),
             monitors: settings::rejoin(&raw.monitors).iter().map(|m| Monitor::parse(m)).collect(),
             remote: match remote.or_else(|| raw.remote.clone()).filter(|r| !r.is_empty()) {
-                Some(cut) if ["unix:", "http:", "grpc:"].contains(&cut.as_str()) => return Err(CardError::Address),
+                Some(cut) if ["unix:", "http:", "grpc:", "https:"].contains(&cut.as_str()) => {
+                    return Err(CardError::Address);
+                }
                 address => address,
             },
             options,

@@ -11,6 +11,7 @@ use crate::analysis::{PortVoltages, Watch};
 use crate::compile::CompileOptions;
 use crate::jobs::sweep::{SweepProgress, SweepSpec, SweepTable};
 use crate::netlist::Bundle;
+use crate::service::access::Access;
 use crate::service::convert::model::bundle_to_wire;
 use crate::service::convert::options::options_to_wire;
 use crate::service::convert::{analysis as results, harmonic as harmonics, named, sweep as sweeps};
@@ -66,13 +67,22 @@ pub struct RemoteTransient {
 }
 
 impl Client {
-    /// Connects to `uri` (`unix:///path`, `host:port`, `http://host:port`, `grpc://host:port`). `deadline` bounds the
-    /// connection, each unary call, and the silence between two messages of a stream.
+    /// Connects to `uri` (`unix:///path`, `host:port`, `http://host:port`, `grpc://host:port`, `https://host:port`), showing
+    /// what the environment says ([`Access::from_environment`]). `deadline` bounds the connection, each unary call, and
+    /// the silence between two messages of a stream.
     ///
     /// # Errors
     /// [`ClientError`].
     pub fn connect(uri: &str, deadline: Duration) -> Result<Self, ClientError> {
-        let link = Link::connect(uri, deadline).map_err(|status| error(uri, &status))?;
+        Self::connect_with(uri, &Access::from_environment(), deadline)
+    }
+
+    /// The same, showing `access`.
+    ///
+    /// # Errors
+    /// [`ClientError`].
+    pub fn connect_with(uri: &str, access: &Access, deadline: Duration) -> Result<Self, ClientError> {
+        let link = Link::connect(uri, access, deadline).map_err(|status| error(uri, &status))?;
         Ok(Self { address: uri.to_owned(), link })
     }
 

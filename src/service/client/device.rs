@@ -4,6 +4,7 @@ use super::link::{Link, reason};
 use crate::compile::CompileOptions;
 use crate::device::{Description, Device, DeviceError, OpenRequest, SmallSignal, Token, Trial, TrialReply};
 use crate::netlist::Bundle;
+use crate::service::access::Access;
 use crate::service::convert::device as wire;
 use crate::service::proto;
 use proto::device_reply::Kind as ReplyKind;
@@ -23,6 +24,7 @@ const QUEUE: usize = 64;
 #[derive(Debug)]
 pub struct RemoteDevice {
     address: String,
+    access: Access,
     bundle: Bundle,
     options: CompileOptions,
     deadline: Duration,
@@ -42,8 +44,8 @@ struct Stream {
 }
 
 impl RemoteDevice {
-    /// Connects to `uri` (`unix:///path` or `http://host:port`), sends the netlist and compiles it there. `deadline`
-    /// bounds this and every later call.
+    /// Connects to `uri` (`unix:///path`, `host:port`, `https://host:port`), showing what the environment says
+    /// ([`Access::from_environment`]), sends the netlist and compiles it there. `deadline` bounds this and every later call.
     ///
     /// # Errors
     /// [`DeviceError::Remote`], naming the address and what happened: no server, a netlist with errors, a limit.
@@ -53,8 +55,23 @@ impl RemoteDevice {
         options: &CompileOptions,
         deadline: Duration,
     ) -> Result<Self, DeviceError> {
+        Self::connect_with(uri, Access::from_environment(), bundle, options, deadline)
+    }
+
+    /// The same, showing `access`.
+    ///
+    /// # Errors
+    /// [`DeviceError::Remote`].
+    pub fn connect_with(
+        uri: &str,
+        access: Access,
+        bundle: &Bundle,
+        options: &CompileOptions,
+        deadline: Duration,
+    ) -> Result<Self, DeviceError> {
         let mut device = Self {
             address: uri.to_owned(),
+            access,
             bundle: bundle.clone(),
             options: options.clone(),
             deadline,
@@ -74,7 +91,7 @@ impl RemoteDevice {
 
     /// Connects and compiles.
     fn reach(&mut self) -> Result<(), Status> {
-        let link = Link::connect(&self.address, self.deadline)?;
+        let link = Link::connect(&self.address, &self.access, self.deadline)?;
         self.model = link.compile(&self.bundle, &self.options)?.id;
         self.link = Some(link);
         Ok(())

@@ -1,36 +1,73 @@
-//! A connection and the runtime that drives it while a call runs.
+//! A connection, the token it shows, and the runtime that drives it while a call runs.
 
 use crate::compile::CompileOptions;
 use crate::netlist::Bundle;
+use crate::service::access::{Access, AccessError};
 use crate::service::address::Address;
 use crate::service::convert::model::bundle_to_wire;
 use crate::service::convert::options::options_to_wire;
 use crate::service::proto::{self, bimorph_client::BimorphClient};
 use std::future::Future;
+use std::net::SocketAddr;
 use std::time::Duration;
 use tokio::runtime::Runtime;
+use tonic::metadata::{Ascii, MetadataValue};
+use tonic::service::Interceptor;
+use tonic::service::interceptor::InterceptedService;
 use tonic::transport::{Channel, Endpoint};
-use tonic::{Code, Status};
+use tonic::{Code, Request, Status};
 
 /// Largest reply accepted [byte], as the server's default limit.
 const MESSAGE_BYTES: usize = 64 << 20;
+
+/// The calls of a server, with what it asks for.
+pub(super) type Rpc = BimorphClient<InterceptedService<Channel, Shown>>;
+
+/// The token that goes with every call.
+#[derive(Debug, Clone)]
+pub(super) struct Shown(Option<MetadataValue<Ascii>>);
+
+impl Shown {
+    fn new(address: &Address, access: &Access) -> Result<Self, Status> {
+        let Some(token) = access.token(address).map_err(|error| unusable(&error))? else { return Ok(Self(None)) };
+        let mut value: MetadataValue<Ascii> = format!("Bearer {}", token.0)
+            .parse()
+            .map_err(|_| Status::invalid_argument("the token has characters that no token has"))?;
+        value.set_sensitive(true);
+        Ok(Self(Some(value)))
+    }
+}
+
+impl Interceptor for Shown {
+    fn call(&mut self, mut request: Request<()>) -> Result<Request<()>, Status> {
+        if let Some(value) = &self.0 {
+            request.metadata_mut().insert("authorization", value.clone());
+        }
+        Ok(request)
+    }
+}
+
+fn unusable(error: &AccessError) -> Status {
+    Status::invalid_argument(error.to_string())
+}
 
 /// A connected server.
 #[derive(Debug)]
 pub(super) struct Link {
     runtime: Runtime,
-    pub(super) rpc: BimorphClient<Channel>,
+    pub(super) rpc: Rpc,
     pub(super) deadline: Duration,
 }
 
 impl Link {
     /// Connects within the deadline.
-    pub(super) fn connect(uri: &str, deadline: Duration) -> Result<Self, Status> {
+    pub(super) fn connect(uri: &str, access: &Access, deadline: Duration) -> Result<Self, Status> {
         if tokio::runtime::Handle::try_current().is_ok() {
             let text = "a blocking client was used from asynchronous code; call it on a thread of its own";
             return Err(Status::failed_precondition(text));
         }
         let address: Address = uri.parse().map_err(|error| Status::invalid_argument(format!("{error}")))?;
+        let shown = Shown::new(&address, access)?;
         let endpoint = Endpoint::from_shared(address.uri())
             .map_err(|error| Status::invalid_argument(error.to_string()))?
             .connect_timeout(deadline)
@@ -39,17 +76,8 @@ impl Link {
             .enable_all()
             .build()
             .map_err(|error| Status::internal(format!("no asynchronous runtime: {error}")))?;
-        let channel = within(&runtime, deadline, async {
-            endpoint.connect().await.map_err(|error| {
-                // the innermost cause says it all; the layers around it only repeat it
-                let mut cause: &dyn std::error::Error = &error;
-                while let Some(inner) = cause.source() {
-                    cause = inner;
-                }
-                Status::unavailable(format!("no connection: {cause}"))
-            })
-        })?;
-        let rpc = BimorphClient::new(channel)
+        let channel = within(&runtime, deadline, channel(&endpoint, &address, access))?;
+        let rpc = BimorphClient::with_interceptor(channel, shown)
             .max_decoding_message_size(MESSAGE_BYTES)
             .max_encoding_message_size(MESSAGE_BYTES);
         Ok(Self { runtime, rpc, deadline })
@@ -83,6 +111,35 @@ impl Link {
     }
 }
 
+async fn channel(endpoint: &Endpoint, address: &Address, access: &Access) -> Result<Channel, Status> {
+    let connected = match address {
+        Address::Tls { host, socket } => secured(endpoint, host, *socket, access).await?,
+        _ => endpoint.connect().await,
+    };
+    connected.map_err(|error| {
+        // the innermost cause says it all; the layers around it only repeat it
+        let mut cause: &dyn std::error::Error = &error;
+        while let Some(inner) = cause.source() {
+            cause = inner;
+        }
+        Status::unavailable(format!("no connection: {cause}"))
+    })
+}
+
+type Connected = Result<Channel, tonic::transport::Error>;
+
+#[cfg(feature = "tls")]
+async fn secured(endpoint: &Endpoint, host: &str, socket: SocketAddr, access: &Access) -> Result<Connected, Status> {
+    let connect = super::secure::Connect::new(host, socket, access).map_err(|error| unusable(&error))?;
+    Ok(endpoint.connect_with_connector(connect).await)
+}
+
+#[cfg(not(feature = "tls"))]
+#[allow(clippy::unused_async)]
+async fn secured(_: &Endpoint, host: &str, socket: SocketAddr, _: &Access) -> Result<Connected, Status> {
+    Err(unusable(&AccessError::NoTls(format!("https://{host}:{}", socket.port()))))
+}
+
 fn within<T>(
     runtime: &Runtime,
     deadline: Duration,
@@ -103,6 +160,10 @@ pub(super) fn reason(status: &Status) -> String {
         }
         // A status that a server sent has no source; one that was made of a broken connection has.
         _ if std::error::Error::source(status).is_some() => {
+            #[cfg(feature = "tls")]
+            if let Some(text) = super::secure::refused(status) {
+                return text;
+            }
             format!("the connection broke: the server was stopped or killed, or crashed ({})", status.message())
         }
         code => format!("{}: {}", code.description().to_lowercase(), status.message()),

@@ -6,6 +6,8 @@
 mod analyses;
 mod device;
 mod link;
+#[cfg(feature = "tls")]
+mod secure;
 
 pub use analyses::{Client, ClientError, RemoteTransient};
 pub use device::RemoteDevice;

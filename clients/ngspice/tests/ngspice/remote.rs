@@ -2,6 +2,9 @@
 
 use crate::support::{all_decks, deck, deviation, real, run, skipped};
 use bimorph::cosim::{CosimError, CosimOptions};
+use bimorph::service::access::Access;
+use bimorph::service::address::Address;
+use bimorph::service::guard::GuardFiles;
 use bimorph::service::server::{self, ServeOptions};
 use std::io::{Read, Write};
 use std::os::unix::net::{UnixListener, UnixStream};
@@ -15,24 +18,31 @@ use tokio::sync::oneshot;
 /// A server on a Unix socket, stopped when dropped.
 struct Serving {
     folder: TempDir,
+    /// Its port.
+    address: String,
     stop: Option<oneshot::Sender<()>>,
     thread: Option<thread::JoinHandle<()>>,
 }
 
 impl Serving {
     fn start() -> Self {
-        let folder = tempfile::tempdir().unwrap();
+        Self::start_with(tempfile::tempdir().unwrap(), GuardFiles::default())
+    }
+
+    /// On its socket and at a free port, where it asks for what `guard` says.
+    fn start_with(folder: TempDir, guard: GuardFiles) -> Self {
         let (stop, stopped) = oneshot::channel::<()>();
         let (ready, is_ready) = mpsc::channel();
-        let listen = vec![format!("unix://{}", folder.path().join("server").display()).parse().unwrap()];
-        let options =
-            ServeOptions { listen, ready: Box::new(move |_| ready.send(()).unwrap()), ..ServeOptions::default() };
+        let socket = format!("unix://{}", folder.path().join("server").display());
+        let listen = vec![socket.parse().unwrap(), "127.0.0.1:0".parse().unwrap()];
+        let ready = Box::new(move |bound: &[Address]| ready.send(bound[1].to_string()).unwrap());
+        let options = ServeOptions { listen, guard, ready, ..ServeOptions::default() };
         let thread = thread::spawn(move || {
             let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build().unwrap();
             runtime.block_on(server::run(options, async { drop(stopped.await) })).unwrap();
         });
-        is_ready.recv().unwrap();
-        Self { folder, stop: Some(stop), thread: Some(thread) }
+        let address = is_ready.recv().unwrap();
+        Self { folder, address, stop: Some(stop), thread: Some(thread) }
     }
 
     fn socket(&self) -> PathBuf {
@@ -108,6 +118,35 @@ fn a_server_gives_the_same_bits() {
         let there = run(on(&server.socket(), name)).unwrap();
         assert_eq!(here.plots, there.plots, "{name}");
     }
+}
+
+/// A server with TLS and tokens (certificates of tests/tls): what the environment shows gives the bytes of the process, and
+/// without a token the run ends with the server's words.
+#[test]
+fn a_deck_over_tls() {
+    if skipped() {
+        return;
+    }
+    let keys = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/tls");
+    let folder = tempfile::tempdir().unwrap();
+    let token_file = Some(folder.path().join("token"));
+    std::fs::write(folder.path().join("token"), "ngspice 0123456789abcdef0123456789abcdef\n").unwrap();
+    let (certificate, key) = (Some(keys.join("server.pem")), Some(keys.join("server.key")));
+    let guard = GuardFiles { certificate, key, token_file: token_file.clone(), ..GuardFiles::default() };
+    let server = Serving::start_with(folder, guard);
+    let shown = Access { authority: Some(keys.join("authority.pem")), token_file, ..Access::default() };
+    let with = |access: Access| CosimOptions {
+        deck: deck("comb_edges.cir"),
+        remote: Some(server.address.replace("https://", "https:")),
+        environment: access.to_environment(),
+        ..CosimOptions::default()
+    };
+    let here = run(CosimOptions { deck: deck("comb_edges.cir"), ..CosimOptions::default() }).unwrap();
+    assert_eq!(here.plots, run(with(shown.clone())).unwrap().plots);
+    let Err(CosimError::Stopped { reason, .. }) = run(with(Access { token_file: None, ..shown })) else {
+        panic!("served without a token")
+    };
+    assert!(reason.contains("asks for a token"), "{reason}");
 }
 
 /// The bank's deck in each formulation: on a server the waveforms are those of the process to the last bit, and two

@@ -15,6 +15,7 @@ from typing import Any, TypeVar
 
 import grpc
 
+from .access import Access, is_secure, target
 from .errors import from_rpc
 from .v1 import service_pb2_grpc
 
@@ -23,28 +24,35 @@ T = TypeVar("T")
 _OPTIONS = [
     ("grpc.max_receive_message_length", 64 << 20),
     ("grpc.max_send_message_length", 64 << 20),
-    # For a Unix socket gRPC would send the escaped path as HTTP authority, which the server's HTTP layer refuses.
-    ("grpc.default_authority", "localhost"),
     # Channels to one address share a connection otherwise, and a forked child would get its parent's.
     ("grpc.use_local_subchannel_pool", 1),
 ]
 
 
+# For a Unix socket gRPC would send the escaped path as HTTP authority, which the server's HTTP layer refuses.
+_PLAIN = [*_OPTIONS, ("grpc.default_authority", "localhost")]
+
+
 class _Connection:
     """A gRPC channel of this process; closed when nobody holds it any more."""
 
-    def __init__(self, target: str) -> None:
+    def __init__(self, address: str, access: Access) -> None:
         self._pid = os.getpid()
-        self._channel = grpc.insecure_channel(target, options=_OPTIONS)
+        self._channel: Any = None
+        if is_secure(address):
+            credentials = grpc.ssl_channel_credentials(*access.certificates())
+            self._channel = grpc.secure_channel(target(address), credentials, options=_OPTIONS)
+        else:
+            self._channel = grpc.insecure_channel(target(address), options=_PLAIN)
         self.stub: Any = service_pb2_grpc.BimorphStub(self._channel)
 
     def __del__(self) -> None:
         # A channel of another process is left alone: closing it here could hang.
-        if self._pid == os.getpid():
+        if self._pid == os.getpid() and self._channel is not None:
             self._channel.close()
 
 
-_connections: weakref.WeakValueDictionary[str, _Connection] = weakref.WeakValueDictionary()
+_connections: weakref.WeakValueDictionary[tuple[str, Access], _Connection] = weakref.WeakValueDictionary()
 _lock = threading.Lock()
 _inherited: list[Any] = []
 
@@ -61,20 +69,23 @@ if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_forked)
 
 
-def _connect(target: str) -> _Connection:
+def _connect(address: str, access: Access) -> _Connection:
     with _lock:
-        connection = _connections.get(target)
+        connection = _connections.get((address, access))
         if connection is None:
-            connection = _connections[target] = _Connection(target)
+            connection = _connections[address, access] = _Connection(address, access)
         return connection
 
 
 class Channel:
     """The way to one server, connected when first used."""
 
-    def __init__(self, address: str, timeout: float) -> None:
+    def __init__(self, address: str, timeout: float, access: Access | None = None) -> None:
         self.address = address
         self.timeout = timeout
+        self._access = access or Access()
+        self.metadata: tuple[tuple[str, str], ...] | None = None
+        """What every call carries; known once the stub is."""
         self._pid: int | None = None
         self._connection: _Connection | None = None
 
@@ -83,20 +94,21 @@ class Channel:
         """The stub of this process."""
         connection = self._connection
         if connection is None or self._pid != os.getpid():
-            target = self.address
-            for scheme in ("http://", "grpc://"):
-                target = target.removeprefix(scheme)
-            self._connection = connection = _connect(target)
+            access = self._access.with_environment()
+            self.metadata = access.metadata(self.address)
+            self._connection = connection = _connect(self.address, access)
             self._pid = os.getpid()
         return connection.stub
 
     def call(self, method: str, request: Any) -> Any:
         """A unary call within the timeout."""
-        return self.guard(lambda: getattr(self.stub, method)(request, timeout=self.timeout))
+        stub = self.stub
+        return self.guard(lambda: getattr(stub, method)(request, timeout=self.timeout, metadata=self.metadata))
 
     def stream(self, method: str, request: Any) -> Iterator[Any]:
         """A call with many answers; left early, it is cancelled."""
-        call = self.guard(lambda: getattr(self.stub, method)(request))
+        stub = self.stub
+        call = self.guard(lambda: getattr(stub, method)(request, metadata=self.metadata))
         try:
             while True:
                 try:
@@ -126,7 +138,7 @@ class Channel:
         self._connection = None
 
     def __getstate__(self) -> dict[str, Any]:
-        return {"address": self.address, "timeout": self.timeout}
+        return {"address": self.address, "timeout": self.timeout, "access": self._access}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__init__(state["address"], state["timeout"])  # type: ignore[misc]
+        self.__init__(state["address"], state["timeout"], state["access"])  # type: ignore[misc]

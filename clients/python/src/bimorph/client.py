@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from . import sweep as sweeps
+from .access import Access
 from .channel import Channel
 from .conversion import LAYOUTS, Conversion, Piece
 from .errors import Diagnostic, InvalidRequest, NetlistError, NotFound, Unavailable
@@ -33,12 +34,28 @@ Voltages = Mapping[str, float]
 class Client:
     """A server.
 
-    ``address`` is ``unix:///path`` or ``host:port``. ``timeout`` [s] bounds each unary call. The connection is made when
-    it is first needed, again in each process: a client may be used after a fork, and sent to worker processes.
+    ``address`` is ``unix:///path``, ``host:port`` or, with TLS, ``https://host:port``. ``timeout`` [s] bounds each unary call. The
+    connection is made when it is first needed, again in each process: a client may be used after a fork, and sent to worker
+    processes.
+
+    ``ca`` is a file (PEM) of the authorities to trust at ``https://``; ``token_file`` holds the token to show, or ``token`` is it;
+    ``client_cert`` and ``client_key`` are for servers that ask for a certificate. Those left out are taken from the environment:
+    ``BIMORPH_CA``, ``BIMORPH_TOKEN_FILE``, ``BIMORPH_CLIENT_CERT``, ``BIMORPH_CLIENT_KEY``.
     """
 
-    def __init__(self, address: str, timeout: float = 120.0) -> None:
-        self._channel = Channel(address, timeout)
+    def __init__(
+        self,
+        address: str,
+        timeout: float = 120.0,
+        *,
+        ca: str | os.PathLike[str] | None = None,
+        token: str | None = None,
+        token_file: str | os.PathLike[str] | None = None,
+        client_cert: str | os.PathLike[str] | None = None,
+        client_key: str | os.PathLike[str] | None = None,
+    ) -> None:
+        files = (None if file is None else os.fspath(file) for file in (ca, token_file, client_cert, client_key))
+        self._channel = Channel(address, timeout, Access(*files, token=token))
 
     @property
     def address(self) -> str:

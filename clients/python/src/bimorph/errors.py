@@ -81,6 +81,10 @@ class StepFailed(NoResult):
     """A device that cannot take a step, however short."""
 
 
+class Refused(BimorphError):
+    """A server that asks for a token, or knows another one."""
+
+
 class Unavailable(BimorphError):
     """No server, a server that stops, or no answer in time."""
 
@@ -89,6 +93,7 @@ _BY_CODE: dict[grpc.StatusCode, type[BimorphError]] = {
     grpc.StatusCode.NOT_FOUND: NotFound,
     grpc.StatusCode.RESOURCE_EXHAUSTED: LimitExceeded,
     grpc.StatusCode.FAILED_PRECONDITION: NoResult,
+    grpc.StatusCode.UNAUTHENTICATED: Refused,
     grpc.StatusCode.UNAVAILABLE: Unavailable,
     grpc.StatusCode.DEADLINE_EXCEEDED: Unavailable,
 }

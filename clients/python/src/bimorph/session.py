@@ -77,7 +77,8 @@ class Session:
         self._requests: queue.SimpleQueue[_Question | None] = queue.SimpleQueue()
         self._sent: collections.deque[_Question] = collections.deque()
         self._over: BimorphError | None = None
-        self._call = channel.stub.Trial(self._outgoing())
+        stub = channel.stub
+        self._call = stub.Trial(self._outgoing(), metadata=channel.metadata)
         threading.Thread(target=self._receive, args=(self._call,), daemon=True).start()
         self.t = 0.0
         """Time of the accepted state [s]."""

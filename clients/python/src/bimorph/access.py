@@ -1,0 +1,96 @@
+"""What a client shows to a server that asks for it, and which servers it trusts."""
+
+from __future__ import annotations
+
+import ipaddress
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from .errors import InvalidRequest
+
+_VARIABLES = {
+    "ca": "BIMORPH_CA",
+    "token_file": "BIMORPH_TOKEN_FILE",
+    "client_cert": "BIMORPH_CLIENT_CERT",
+    "client_key": "BIMORPH_CLIENT_KEY",
+}
+_SCHEMES = ("http://", "grpc://")
+_SECURE = ("https://", "https:")
+
+
+@dataclass(frozen=True)
+class Access:
+    """Files of a client, by keyword or by the environment: ``BIMORPH_CA``, ``BIMORPH_TOKEN_FILE``, ``BIMORPH_CLIENT_CERT``,
+    ``BIMORPH_CLIENT_KEY``."""
+
+    ca: str | None = None
+    """Certificates (PEM) of the authorities to trust; needed for ``https://``."""
+    token_file: str | None = None
+    """File with the token to show: the last word of its first line that is no comment."""
+    client_cert: str | None = None
+    """The client's own certificate (PEM), for servers that ask for one."""
+    client_key: str | None = None
+    """Key of that certificate (PEM)."""
+    token: str | None = field(default=None, repr=False)
+    """The token itself, in place of a file."""
+
+    def with_environment(self) -> Access:
+        """The same, with what the environment says of those left out."""
+        given = {name: getattr(self, name) or os.environ.get(variable) or None for name, variable in _VARIABLES.items()}
+        if self.token:
+            given["token_file"] = None
+        return Access(**given, token=self.token)
+
+    def metadata(self, address: str) -> tuple[tuple[str, str], ...] | None:
+        """What every call to a server carries. None is shown at a Unix socket, which asks for none."""
+        if not (self.token or self.token_file) or address.startswith("unix:"):
+            return None
+        if not is_secure(address) and not _is_here(target(address)):
+            raise InvalidRequest(f"a token is not sent unencrypted to another machine: write https:// before {address}")
+        return (("authorization", f"Bearer {self.token or self._read()}"),)
+
+    def _read(self) -> str:
+        assert self.token_file is not None
+        for line in _text("token file", self.token_file).decode(errors="replace").splitlines():
+            words = line.split()
+            if words and not words[0].startswith("#"):
+                return words[-1]
+        raise InvalidRequest(f"token file {self.token_file}: expected a token, got none")
+
+    def certificates(self) -> tuple[bytes, bytes | None, bytes | None]:
+        """Authority, key and certificate of a connection with TLS."""
+        if self.ca is None:
+            raise InvalidRequest("https:// needs the certificates of an authority to trust: ca=FILE or BIMORPH_CA")
+        if (self.client_cert is None) != (self.client_key is None):
+            raise InvalidRequest("a client certificate and its key go together: client_cert and client_key")
+        key = None if self.client_key is None else _text("key", self.client_key)
+        own = None if self.client_cert is None else _text("certificate", self.client_cert)
+        return _text("authority", self.ca), key, own
+
+
+def is_secure(address: str) -> bool:
+    """Whether an address asks for TLS."""
+    return address.startswith("https:")
+
+
+def target(address: str) -> str:
+    """An address as gRPC has it."""
+    for scheme in (*_SECURE, *_SCHEMES):
+        address = address.removeprefix(scheme)
+    return address.rstrip("/")
+
+
+def _is_here(place: str) -> bool:
+    host = place.rsplit(":", 1)[0].strip("[]")
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
+def _text(what: str, path: str) -> bytes:
+    try:
+        return Path(path).read_bytes()
+    except OSError as error:
+        raise InvalidRequest(f"{what} {path}: {error.strerror}") from None

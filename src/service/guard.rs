@@ -1,0 +1,178 @@
+//! What a server asks of who comes from elsewhere: TLS, a certificate, a token.
+//!
+//! A Unix socket asks for nothing: its mode lets in its owner alone.
+
+use super::connection::{Presence, Who};
+use super::tls::{ALPN, Pair, PemError, authorities, provider};
+use super::tokens::{TokenError, Tokens, is_open, sha256};
+use std::io;
+use std::path::PathBuf;
+use std::sync::Arc;
+use thiserror::Error;
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::net::TcpStream;
+use tokio_rustls::TlsAcceptor;
+use tokio_rustls::rustls::server::{VerifierBuilderError, WebPkiClientVerifier};
+use tokio_rustls::rustls::{self, ServerConfig};
+use tokio_rustls::server::TlsStream;
+use tonic::Status;
+use tonic::codegen::http::HeaderMap;
+
+/// Files by which a server knows itself and its clients; each may be left out.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct GuardFiles {
+    /// The server's certificate and those up to its authority (PEM): every TCP address speaks TLS.
+    pub certificate: Option<PathBuf>,
+    /// The key of that certificate (PEM).
+    pub key: Option<PathBuf>,
+    /// Certificates (PEM) of the authorities of clients: each must have a certificate of one of them.
+    pub client_authority: Option<PathBuf>,
+    /// Tokens, a line for each client, `TOKEN` or `NAME TOKEN`: every call over TCP must show one.
+    pub token_file: Option<PathBuf>,
+}
+
+/// Why a server cannot guard itself.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum GuardError {
+    /// A file of certificates or keys.
+    #[error(transparent)]
+    Pem(#[from] PemError),
+    /// The token file.
+    #[error(transparent)]
+    Tokens(#[from] TokenError),
+    /// A certificate without its key, or a key without its certificate.
+    #[error("a certificate and its key go together: --tls-cert and --tls-key")]
+    Unpaired,
+    /// Clients are to show certificates, and the server has none.
+    #[error("--tls-client-ca asks for certificates of clients, which needs TLS: --tls-cert and --tls-key")]
+    NoCertificate,
+    /// The certificate and the key, or the authority, are refused.
+    #[error("certificate {path}: {reason}", path = path.display())]
+    Refused {
+        /// The certificate.
+        path: PathBuf,
+        /// What is wrong.
+        reason: String,
+    },
+}
+
+/// What is asked of clients.
+#[derive(Default)]
+pub(super) struct Guard {
+    tls: Option<Arc<ServerConfig>>,
+    certified: bool,
+    tokens: Option<Tokens>,
+}
+
+impl Guard {
+    /// Reads the files.
+    ///
+    /// # Errors
+    /// [`GuardError`].
+    pub(super) fn read(files: &GuardFiles) -> Result<Self, GuardError> {
+        let tls = match (&files.certificate, &files.key) {
+            (Some(certificate), Some(key)) => {
+                let pair = Pair::read(certificate, key)?;
+                let refused = |reason: String| GuardError::Refused { path: certificate.clone(), reason };
+                Some(Arc::new(config(pair, files, refused)?))
+            }
+            (None, None) if files.client_authority.is_some() => return Err(GuardError::NoCertificate),
+            (None, None) => None,
+            _ => return Err(GuardError::Unpaired),
+        };
+        let tokens = files.token_file.as_deref().map(Tokens::read).transpose()?;
+        for file in [&files.key, &files.token_file].into_iter().flatten() {
+            if is_open(file) {
+                tracing::warn!(file = %file.display(), "others can read this file: chmod 600");
+            }
+        }
+        if let Some(tokens) = &tokens {
+            tracing::info!(tokens = tokens.len(), "calls over TCP must show a token");
+        }
+        Ok(Self { tls, certified: files.client_authority.is_some(), tokens })
+    }
+
+    /// Whether TCP addresses speak TLS.
+    pub(super) fn speaks_tls(&self) -> bool {
+        self.tls.is_some()
+    }
+
+    /// Whether other machines may be let in: nothing travels in the clear, and not everybody may ask.
+    pub(super) fn is_enough(&self) -> bool {
+        self.tls.is_some() && (self.certified || self.tokens.is_some())
+    }
+
+    /// Who asks, if that is known to the server.
+    pub(super) fn admit(&self, presence: &Presence, headers: &HeaderMap) -> Result<Who, Status> {
+        match presence.who() {
+            Who::Plain => Err(Status::unauthenticated("this address speaks TLS: connect with https://")),
+            Who::Local => Ok(Who::Local),
+            known => match &self.tokens {
+                Some(tokens) => tokens.who(headers).map(Who::Named),
+                None => Ok(known),
+            },
+        }
+    }
+
+    /// Finds out how a client speaks. Without TLS here, as it likes.
+    ///
+    /// A client that speaks plain HTTP/2 to TLS is let in, to be told so by every call.
+    pub(super) async fn greet(&self, socket: TcpStream) -> io::Result<(Voice, Who)> {
+        let Some(tls) = &self.tls else { return Ok((Voice::Plain(socket), Who::Unknown)) };
+        let mut first = [0];
+        if socket.peek(&mut first).await? == 0 {
+            return Err(io::ErrorKind::UnexpectedEof.into());
+        }
+        if first == *b"P" {
+            return Ok((Voice::Plain(socket), Who::Plain));
+        }
+        match TlsAcceptor::from(Arc::clone(tls)).accept(socket).into_fallible().await {
+            Ok(stream) => {
+                let shown = stream.get_ref().1.peer_certificates().and_then(<[_]>::first);
+                let who = shown.map_or(Who::Unknown, |certificate| Who::Certified(sha256(certificate)));
+                Ok((Voice::Secure(Box::new(stream)), who))
+            }
+            Err((error, socket)) => {
+                say_goodbye(socket).await;
+                Err(error)
+            }
+        }
+    }
+}
+
+/// A socket whose client has been understood.
+pub(super) enum Voice {
+    Plain(TcpStream),
+    Secure(Box<TlsStream<TcpStream>>),
+}
+
+/// Lets the client read why it was refused: closing with unread bytes would take the alert back.
+async fn say_goodbye(mut socket: TcpStream) {
+    let mut rest = [0; 1024];
+    let _ = socket.shutdown().await;
+    for _ in 0..64 {
+        match socket.read(&mut rest).await {
+            Ok(1..) => {}
+            _ => return,
+        }
+    }
+}
+
+fn config(pair: Pair, files: &GuardFiles, refused: impl Fn(String) -> GuardError) -> Result<ServerConfig, GuardError> {
+    let error = |error: rustls::Error| refused(error.to_string());
+    let builder = ServerConfig::builder_with_provider(provider())
+        .with_protocol_versions(&[&rustls::version::TLS13])
+        .map_err(error)?;
+    let builder = match &files.client_authority {
+        None => builder.with_no_client_auth(),
+        Some(path) => {
+            let roots = Arc::new(authorities(path)?);
+            let built = WebPkiClientVerifier::builder_with_provider(roots, provider()).build();
+            builder.with_client_cert_verifier(built.map_err(|error: VerifierBuilderError| refused(error.to_string()))?)
+        }
+    };
+    let mut config = builder.with_single_cert(pair.chain, pair.key).map_err(error)?;
+    config.alpn_protocols.push(ALPN.to_vec());
+    Ok(config)
+}
