@@ -215,7 +215,7 @@ fn a_seed_decides() {
     device.trial(&step(1e-6), &mut reply).unwrap();
     assert!(reply.dt_next <= 2.5e-6);
     let mut other = LocalDevice::new(Arc::clone(&model));
-    other.load(&device.save(Some(token)).unwrap()).unwrap();
+    other.load(&device.save(Some(&[token])).unwrap()).unwrap();
     let (mut here, mut there) = (TrialReply::default(), TrialReply::default());
     device.trial(&step(2e-6), &mut here).unwrap();
     other.trial(&step(2e-6), &mut there).unwrap();

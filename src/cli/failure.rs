@@ -22,6 +22,7 @@ use bimorph::results::table::LengthMismatch;
 use bimorph::service::address::AddressError;
 use bimorph::service::client::ClientError;
 use bimorph::service::server::ServeError;
+use bimorph::service::settings::SettingError;
 use std::io::{self, IsTerminal};
 use std::path::PathBuf;
 use thiserror::Error;
@@ -79,6 +80,8 @@ pub(crate) enum Failure {
     Around(#[from] AroundError),
     #[error(transparent)]
     Serve(#[from] ServeError),
+    #[error(transparent)]
+    Setting(#[from] SettingError),
     #[error(transparent)]
     Front(FrontError),
     #[error(transparent)]

@@ -2,57 +2,26 @@
 
 use super::failure::Failure;
 use bimorph::service::address::Address;
-use bimorph::service::guard::GuardFiles;
-use bimorph::service::limits::Limits;
 use bimorph::service::log;
 use bimorph::service::server::{ServeOptions, run_until_signal};
-use clap::Args;
-use std::path::PathBuf;
+use bimorph::service::settings::{ENVIRONMENT, SETTINGS, Setting, Settings, Source};
+use clap::{Arg, ArgAction, ArgMatches, Args, Command, Error, FromArgMatches};
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 
 /// Serve models over gRPC (bimorph.v1), until interrupted.
 ///
 /// Prints one line "listening on ADDRESS" for each address on standard error once it accepts connections. Health and
-/// reflection services are always on. An address that other machines can reach takes TLS, and tokens or certificates of clients.
+/// reflection services are always on. An address that other machines can reach takes TLS, and tokens or certificates of
+/// clients. What options do not say is taken from the environment (BIMORPH_SERVE_NAME), then from the file of --config.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  bimorph serve --listen unix:///tmp/bimorph.sock\n  \
                         bimorph serve --listen 127.0.0.1:50051 --listen unix:///run/bimorph.sock\n  \
-                        bimorph serve --listen 127.0.0.1:0         any free port; the line says which")]
+                        bimorph serve --listen 127.0.0.1:0         any free port; the line says which\n  \
+                        bimorph serve --config /etc/bimorph/serve.toml")]
 pub(crate) struct Serve {
-    /// Address: unix:///path or host:port. Repeatable
-    #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:50051")]
-    listen: Vec<String>,
-
-    /// Certificate of this server and those up to its authority, PEM: every TCP address speaks TLS
-    #[arg(long, value_name = "FILE")]
-    tls_cert: Option<PathBuf>,
-
-    /// Key of the certificate, PEM
-    #[arg(long, value_name = "FILE")]
-    tls_key: Option<PathBuf>,
-
-    /// Authorities of clients, PEM: each client must have a certificate of one of them
-    #[arg(long, value_name = "FILE")]
-    tls_client_ca: Option<PathBuf>,
-
-    /// Tokens, a line for each client, TOKEN or NAME TOKEN: every call over TCP must show one
-    #[arg(long, value_name = "FILE")]
-    token_file: Option<PathBuf>,
-
-    /// Allow addresses that other machines can reach, whoever may come and whoever may listen
-    #[arg(long)]
-    insecure: bool,
-
-    /// Most sessions open at once; as --limit sessions=N
-    #[arg(long, value_name = "N")]
-    max_sessions: Option<String>,
-
-    /// Most connections at once; as --limit connections=N
-    #[arg(long, value_name = "N")]
-    max_connections: Option<String>,
-
-    /// Set a limit of docs/service.md: bytes as 64M or 2G, times in seconds. Repeatable
-    #[arg(long = "limit", value_name = "NAME=VALUE")]
-    limits: Vec<String>,
+    #[command(flatten)]
+    told: Told,
 
     /// Stop when standard input ends, as it does when the program that started this server ends
     #[arg(long)]
@@ -61,44 +30,121 @@ pub(crate) struct Serve {
 
 impl Serve {
     pub(crate) fn run(&self) -> Result<(), Failure> {
-        let listen = self.listen.iter().map(|text| text.parse()).collect::<Result<Vec<Address>, _>>()?;
         let ready = |addresses: &[Address]| {
             for address in addresses {
                 log::line(&format!("listening on {address}"));
             }
         };
-        let options = ServeOptions {
-            listen,
-            guard: GuardFiles {
-                certificate: self.tls_cert.clone(),
-                key: self.tls_key.clone(),
-                client_authority: self.tls_client_ca.clone(),
-                token_file: self.token_file.clone(),
-            },
-            insecure: self.insecure,
-            limits: self.limits()?,
-            while_stdin: self.while_stdin,
-            ready: Box::new(ready),
-        };
-        Ok(run_until_signal(options)?)
+        let options = self.told.settings()?.options();
+        Ok(run_until_signal(ServeOptions { while_stdin: self.while_stdin, ready: Box::new(ready), ..options })?)
+    }
+}
+
+/// What the options of a server say, in the order in which files, the environment and options are asked.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Told {
+    config: Option<PathBuf>,
+    /// Name of the setting, its value, and the option that says so.
+    given: Vec<(String, String, String)>,
+}
+
+/// The arguments' names, which live as long as the program.
+static FLAGS: LazyLock<Vec<String>> = LazyLock::new(|| SETTINGS.iter().map(Setting::flag).collect());
+
+/// Options for limits that are often changed.
+const SHORT: [(&str, &str, &str); 2] = [
+    ("max-sessions", "sessions", "Most sessions open at once; as --limit sessions=N"),
+    ("max-connections", "connections", "Most connections at once; as --limit connections=N"),
+];
+
+impl Told {
+    /// Everything that was said, the strongest voice first heard.
+    pub(crate) fn settings(&self) -> Result<Settings, Failure> {
+        let mut settings = Settings::default();
+        for (name, text, place) in &self.given {
+            settings.set(name, text, Source::Option, place.clone())?;
+        }
+        settings.read_environment(
+            std::env::vars_os()
+                .filter_map(|(name, text)| Some((name.into_string().ok()?, text.to_string_lossy().into_owned()))),
+        )?;
+        if let Some(path) = self.config() {
+            settings.read_file(&path)?;
+        }
+        Ok(settings)
     }
 
-    fn limits(&self) -> Result<Limits, Failure> {
-        let mut limits = Limits::default();
-        for text in &self.limits {
-            let (name, value) = text
-                .split_once('=')
-                .ok_or_else(|| Failure::bad("--limit", "NAME=VALUE, as sessions=1000", text.clone()))?;
-            limits.set(name, value).map_err(|error| Failure::bad("--limit", "a limit of docs/service.md", error))?;
+    /// The file, as the option or the environment names it.
+    fn config(&self) -> Option<PathBuf> {
+        let named = std::env::var_os(format!("{ENVIRONMENT}CONFIG")).filter(|path| !path.is_empty());
+        self.config.clone().or_else(|| named.map(PathBuf::from))
+    }
+
+    fn take(&mut self, matches: &ArgMatches) -> Result<(), Error> {
+        self.config = matches.get_one::<String>("config").map(Path::new).map(Path::to_owned);
+        for (setting, flag) in SETTINGS.iter().zip(FLAGS.iter()) {
+            let place = format!("--{flag}");
+            let text = if setting.place.is_empty() {
+                matches.get_flag(flag).then(|| "true".to_owned())
+            } else {
+                matches.get_many::<String>(flag).map(|words| words.cloned().collect::<Vec<_>>().join(","))
+            };
+            self.given.extend(text.map(|text| (setting.name.to_owned(), text, place)));
         }
-        for (flag, name, value) in [
-            ("--max-sessions", "sessions", &self.max_sessions),
-            ("--max-connections", "connections", &self.max_connections),
-        ] {
-            if let Some(value) = value {
-                limits.set(name, value).map_err(|_| Failure::bad(flag, "a whole number above 0", value.clone()))?;
+        for (flag, limit, _) in SHORT {
+            let text = matches.get_one::<String>(flag).cloned();
+            self.given.extend(text.map(|text| (limit.to_owned(), text, format!("--{flag}"))));
+        }
+        for text in matches.get_many::<String>("limit").into_iter().flatten() {
+            let (name, value) = text.split_once('=').ok_or_else(|| {
+                Error::raw(
+                    clap::error::ErrorKind::ValueValidation,
+                    format!("--limit: expected NAME=VALUE, as sessions=1000, got {text}\n"),
+                )
+            })?;
+            self.given.push((name.to_owned(), value.to_owned(), format!("--limit {name}")));
+        }
+        Ok(())
+    }
+}
+
+impl FromArgMatches for Told {
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, Error> {
+        let mut told = Self::default();
+        told.take(matches)?;
+        Ok(told)
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), Error> {
+        self.take(matches)
+    }
+}
+
+impl Args for Told {
+    fn augment_args(command: Command) -> Command {
+        let value = |name: &'static str, place: &'static str| Arg::new(name).long(name).value_name(place);
+        let settings = SETTINGS.iter().zip(FLAGS.iter()).map(|(setting, flag)| {
+            let help = setting.help.split_whitespace().collect::<Vec<_>>().join(" ");
+            let help = help.trim_end_matches('.').to_owned();
+            let arg = Arg::new(flag.as_str()).long(flag.as_str());
+            let value = Settings::default().get(setting);
+            let shown = if value.is_empty() || value == "false" { help } else { format!("{help} [default: {value}]") };
+            match setting.place {
+                "" => arg.action(ArgAction::SetTrue).help(shown),
+                "ADDRESS" => arg.value_name("ADDRESS").action(ArgAction::Append).help(shown),
+                place => arg.value_name(place).help(shown),
             }
-        }
-        Ok(limits)
+        });
+        let short = SHORT.map(|(flag, _, help)| value(flag, "N").help(help));
+        let limits = "Set a limit of docs/service.md: bytes as 64M or 2G, times in seconds. Repeatable";
+        command
+            .arg(value("config", "FILE").help("File of settings, TOML; docs/service.md has their names"))
+            .args(settings)
+            .args(short)
+            .arg(value("limit", "NAME=VALUE").action(ArgAction::Append).help(limits))
+    }
+
+    fn augment_args_for_update(command: Command) -> Command {
+        Self::augment_args(command)
     }
 }

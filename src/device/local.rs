@@ -135,11 +135,11 @@ impl Device for LocalDevice {
         session.noise(&self.compiled, (token, &state), omega, reply)
     }
 
-    fn save(&self, only: Option<Token>) -> Result<Vec<u8>, DeviceError> {
+    fn save(&self, only: Option<&[Token]>) -> Result<Vec<u8>, DeviceError> {
         let session = self.session.as_ref().ok_or(DeviceError::NotOpen)?;
         match only {
-            Some(token) => {
-                let alone = session.states.only(token).ok_or(DeviceError::UnknownToken(token))?;
+            Some(tokens) => {
+                let alone = session.states.only(tokens).map_err(DeviceError::UnknownToken)?;
                 Ok(saved::write(&session.opened, &alone))
             }
             None => Ok(saved::write(&session.opened, &session.states)),

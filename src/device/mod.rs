@@ -252,12 +252,12 @@ pub trait Device: Send {
     /// anew, its states stay as they are. A device that holds no half computed storage does nothing.
     fn recover(&mut self) {}
 
-    /// What is open and its states, as bytes from which a device of the same model goes on with the same bits. `only`: that
-    /// state alone.
+    /// What is open and its states, as bytes from which a device of the same model goes on with the same bits. `only`: those
+    /// states alone.
     ///
     /// # Errors
     /// [`DeviceError::NotOpen`], [`DeviceError::UnknownToken`], [`DeviceError::BadRequest`] where a device cannot do it.
-    fn save(&self, only: Option<Token>) -> Result<Vec<u8>, DeviceError> {
+    fn save(&self, only: Option<&[Token]>) -> Result<Vec<u8>, DeviceError> {
         let _ = only;
         Err(saved::refused("a device that can be saved", "another kind"))
     }

@@ -82,12 +82,17 @@ impl States {
         self.used.iter().filter_map(|token| self.held.get(token).map(|(parent, state)| (*token, *parent, &**state)))
     }
 
-    /// One of them alone, as it was.
-    pub(super) fn only(&self, token: Token) -> Option<Self> {
-        let (parent, state) = self.held.get(&token)?;
+    /// Some of them alone, as they were.
+    ///
+    /// # Errors
+    /// The first token that is not held.
+    pub(super) fn only(&self, tokens: &[Token]) -> Result<Self, Token> {
         let mut alone = Self::default();
-        alone.put(token, *parent, Snapshot::clone(state));
-        Some(alone)
+        for &token in tokens {
+            let (parent, state) = self.held.get(&token).ok_or(token)?;
+            alone.put(token, *parent, Snapshot::clone(state));
+        }
+        Ok(alone)
     }
 
     fn forget(&mut self, token: Token) {

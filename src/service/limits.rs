@@ -1,215 +1,164 @@
-//! What one server allows.
+//! What one server allows: a table, from which come the fields, their defaults, and what everybody is told of them.
 
 use super::proto;
+use super::written::{Bytes, Count, Time, Written};
+use std::sync::LazyLock;
 use std::time::Duration;
 
-/// Limits of a server. A request beyond one is answered with RESOURCE_EXHAUSTED and a message that names it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Limits {
-    /// Largest message in either direction [byte], default 64 MiB. Streams send chunks of at most 1 MiB whatever this is.
-    pub message_bytes: usize,
-    /// Largest netlist, all files together [byte], default 16 MiB.
-    pub netlist_bytes: usize,
-    /// Largest SUGAR 3 netlist, all files together [byte], default 0: such a netlist is a program, and none is run.
-    pub program_bytes: usize,
-    /// Most mechanical unknowns of one model, default 200 000. Larger: more memory and longer trials.
-    pub unknowns: usize,
-    /// Models with at most this many unknowns are stepped on the task of their stream, default 2 000; larger ones on a
-    /// thread of their own for each trial, which costs some ten microseconds but lets other streams run meanwhile.
-    pub inline_unknowns: usize,
-    /// Most compiled models kept, default 64; the one unused for longest is forgotten first.
-    pub models: usize,
-    /// Most bytes of compiled models kept, default 512 MiB, counted by what their compilation laid out.
-    pub model_memory: usize,
-    /// Most sessions open at once, default 256. Each holds a bounded number of states: the device forgets the least
-    /// recently used.
-    pub sessions: usize,
-    /// Most points of one sweep, default 1 000 000.
-    pub sweep_points: usize,
-    /// Most sweeps kept, running or finished, default 16.
-    pub sweeps: usize,
-    /// Most samples times signals of one transient, default 100 000 000.
-    pub transient_values: usize,
-    /// Most modes of one request, default 1 000.
-    pub modes: usize,
-    /// Most unknowns times the square of the modes of one request, default 2e9: what one restart of the iteration takes, which
-    /// cannot be stopped half way.
-    pub mode_work: usize,
-    /// Analyses computed at once, default the number of cores; others wait their turn. As many compilations and openings
-    /// have places of their own, so that long transients do not keep a circuit from starting.
-    pub analyses: usize,
-    /// Bytes that one computation may lay out, all together, default 512 MiB. Counted before they are laid out.
-    pub memory: usize,
-    /// Processor time of one computation, default 1 h. Unary calls end earlier, at `request_timeout`.
-    pub cpu: Duration,
-    /// Most signals, outputs, events or ports of one request, default 10 000.
-    pub signals: usize,
-    /// Most transients and tables being sent at once, default 64: each may wait for a reader that is slow.
-    pub result_streams: usize,
-    /// Most calls at once, streams among them, default 4 096.
-    pub calls: usize,
-    /// Most bytes of requests that are held at once, default 256 MiB: those being received, and those of unary calls until
-    /// they are answered.
-    pub held_bytes: usize,
-    /// Longest pause inside a request [s], default 20 s: a message that was begun must go on.
-    pub request_pause: Duration,
-    /// A connection that has not said what it speaks by then is closed [s], default 10 s.
-    pub handshake: Duration,
-    /// Most connections at once, default 512. A further one takes the place of the one without calls that was idle for
-    /// longest; with none such it is closed as it comes.
-    pub connections: usize,
-    /// Most HTTP/2 streams of one connection, default 128.
-    pub streams_per_connection: u32,
-    /// Longest unary call [s], default 120 s; then DEADLINE_EXCEEDED.
-    pub request_timeout: Duration,
-    /// A session without a stream, or a finished sweep, untouched for this long is forgotten, default 10 min.
-    pub idle: Duration,
-    /// A session on an open stream untouched for this long is forgotten, default 12 h: a circuit may be paused for lunch,
-    /// but a client that vanished without a word must not stay for ever.
-    pub stream_idle: Duration,
-    /// After the signal to stop, open streams may go on for this long, default 5 s; then they end with UNAVAILABLE, and
-    /// connections that do not close are cut.
-    pub drain: Duration,
+/// A limit: what it is, and its field.
+pub struct Limit {
+    /// Name, as `--limit NAME=VALUE`, the environment and files have it.
+    pub name: &'static str,
+    /// What is written for its value: `N`, `BYTES`, `SECONDS`.
+    pub place: &'static str,
+    /// What it means, in one sentence or two.
+    pub help: &'static str,
+    pub(super) read: fn(&mut Limits, &str) -> Result<(), &'static str>,
+    pub(super) write: fn(&Limits) -> String,
 }
 
-impl Default for Limits {
-    fn default() -> Self {
-        Self {
-            message_bytes: 64 << 20,
-            netlist_bytes: 16 << 20,
-            program_bytes: 0,
-            unknowns: 200_000,
-            inline_unknowns: 2_000,
-            models: 64,
-            model_memory: 512 << 20,
-            sessions: 256,
-            sweep_points: 1_000_000,
-            sweeps: 16,
-            transient_values: 100_000_000,
-            modes: 1_000,
-            mode_work: 2_000_000_000,
-            analyses: std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
-            memory: 512 << 20,
-            cpu: Duration::from_secs(3600),
-            signals: 10_000,
-            result_streams: 64,
-            calls: 4096,
-            held_bytes: 256 << 20,
-            request_pause: Duration::from_secs(20),
-            handshake: Duration::from_secs(10),
-            connections: 512,
-            streams_per_connection: 128,
-            request_timeout: Duration::from_secs(120),
-            idle: Duration::from_secs(600),
-            stream_idle: Duration::from_secs(12 * 3600),
-            drain: Duration::from_secs(5),
+macro_rules! limits {
+    ($($(#[doc = $help:literal])+ $field:ident: $kind:ident = $default:expr;)+) => {
+        /// Limits of a server. A request beyond one is answered with RESOURCE_EXHAUSTED and a message that names it.
+        /// `Default` is the only place where the numbers stand; bytes are in [byte], times in [s].
+        #[derive(Debug, Clone, PartialEq)]
+        pub struct Limits {
+            $($(#[doc = $help])+ pub $field: <$kind as Written>::Held,)+
         }
-    }
+
+        impl Default for Limits {
+            fn default() -> Self {
+                Self { $($field: $default,)+ }
+            }
+        }
+
+        /// Every limit, in the order of the documentation.
+        pub static LIMITS: LazyLock<Vec<Limit>> = LazyLock::new(|| vec![$(Limit {
+            name: stringify!($field),
+            place: $kind::PLACE,
+            help: concat!($($help, "\n"),+),
+            read: |limits, text| $kind::read(text).map(|value| limits.$field = value),
+            write: |limits| $kind::write(&limits.$field),
+        }),+]);
+    };
 }
 
-/// A limit by its name.
-enum Field<'a> {
-    Count(&'a mut usize),
-    Count32(&'a mut u32),
-    Bytes(&'a mut usize),
-    Time(&'a mut Duration),
-}
+limits! {
+    /// Largest message in either direction. Streams send chunks of at most 1 MiB whatever this is. A session whose
+    /// answers would be larger (derivatives are as many as the square of the ports) does not open, and a `Linearize` of
+    /// too many frequencies or cross-spectra is refused.
+    message_bytes: Bytes = 64 << 20;
 
-/// Names of all limits, as `--limit NAME=VALUE` and docs/service.md have them.
-pub const NAMES: [&str; 28] = [
-    "message_bytes",
-    "netlist_bytes",
-    "program_bytes",
-    "unknowns",
-    "inline_unknowns",
-    "models",
-    "model_memory",
-    "sessions",
-    "sweep_points",
-    "sweeps",
-    "transient_values",
-    "modes",
-    "mode_work",
-    "analyses",
-    "memory",
-    "cpu",
-    "signals",
-    "result_streams",
-    "calls",
-    "held_bytes",
-    "request_pause",
-    "handshake",
-    "connections",
-    "streams_per_connection",
-    "request_timeout",
-    "idle",
-    "stream_idle",
-    "drain",
-];
+    /// Largest netlist, all files together, and largest layout.
+    netlist_bytes: Bytes = 16 << 20;
+
+    /// Largest SUGAR 3 netlist, all files together: such a netlist is a Lua program, and 0 runs none. With 1M they run
+    /// in the sandbox of docs/netlist.md.
+    program_bytes: Bytes = 0;
+
+    /// Most mechanical unknowns of one model.
+    unknowns: Count = 200_000;
+
+    /// Models with at most this many unknowns are stepped where their requests arrive; larger ones on a thread of their
+    /// own for each trial, which costs some ten microseconds but lets other streams run meanwhile.
+    inline_unknowns: Count = 2_000;
+
+    /// Most compiled models kept; the one unused for longest is forgotten first.
+    models: Count = 64;
+
+    /// Most bytes of all models kept, counted by what their compilation laid out.
+    model_memory: Bytes = 512 << 20;
+
+    /// Most sessions open at once. Each holds a bounded number of states.
+    sessions: Count = 256;
+
+    /// Most bytes of states and netlists in the folder `state_dir`; a session whose states would be beyond does not open, and an
+    /// accepted state that would be is refused.
+    state_bytes: Bytes = 1 << 30;
+
+    /// Most points of one sweep.
+    sweep_points: Count = 1_000_000;
+
+    /// Most sweeps kept, running or finished.
+    sweeps: Count = 16;
+
+    /// Most samples times signals of one transient.
+    transient_values: Count = 100_000_000;
+
+    /// Most modes of one request.
+    modes: Count = 1_000;
+
+    /// Most unknowns times the square of the modes of one request, which is what one restart of the iteration takes: 1
+    /// 000 modes of 2 000 unknowns, 100 of 200 000.
+    mode_work: Count = 2_000_000_000;
+
+    /// Analyses computed at once, others wait their turn: as many as there are cores. As many compilations and openings
+    /// have places of their own, and twice as many long trials.
+    analyses: Count = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+
+    /// Bytes that one computation may lay out, all together, counted before they are laid out.
+    memory: Bytes = 512 << 20;
+
+    /// Processor time of one computation. Unary calls end earlier, at `request_timeout`.
+    cpu: Time = Duration::from_secs(3600);
+
+    /// Most signals, outputs, events or ports of one request.
+    signals: Count = 10_000;
+
+    /// Most transients and tables being sent at once; one whose reader is slow gives its place among analyses to
+    /// others.
+    result_streams: Count = 64;
+
+    /// Most calls at once of all connections, streams among them.
+    calls: Count = 4096;
+
+    /// Most bytes of requests held at once: those being received, and those of unary calls until they are answered.
+    held_bytes: Bytes = 256 << 20;
+
+    /// Longest pause inside a request: a message that was begun must go on, or the call ends with `DEADLINE_EXCEEDED`.
+    request_pause: Time = Duration::from_secs(20);
+
+    /// A connection that has not said by then what it speaks is closed.
+    handshake: Time = Duration::from_secs(10);
+
+    /// Most connections at once. A further one takes the place of the one without calls that was idle for longest; with
+    /// none such it is closed as it comes.
+    connections: Count = 512;
+
+    /// Most HTTP/2 streams of one connection.
+    streams_per_connection: Count = 128;
+
+    /// Longest unary call; then `DEADLINE_EXCEEDED`.
+    request_timeout: Time = Duration::from_secs(120);
+
+    /// A session without a stream and without a lease, or a finished sweep, untouched for this long is forgotten.
+    idle: Time = Duration::from_secs(600);
+
+    /// A session on an open stream untouched for this long is forgotten: a circuit may be paused for lunch, but a
+    /// client that vanished without a word must not stay for ever. Also the longest lease.
+    stream_idle: Time = Duration::from_secs(12 * 3600);
+
+    /// After the signal to stop, open streams may go on for this long; then they end with `UNAVAILABLE`, and
+    /// connections that do not close are cut.
+    drain: Time = Duration::from_secs(5);
+}
 
 impl Limits {
-    fn field(&mut self, name: &str) -> Option<Field<'_>> {
-        Some(match name {
-            "message_bytes" => Field::Bytes(&mut self.message_bytes),
-            "netlist_bytes" => Field::Bytes(&mut self.netlist_bytes),
-            "program_bytes" => Field::Bytes(&mut self.program_bytes),
-            "unknowns" => Field::Count(&mut self.unknowns),
-            "inline_unknowns" => Field::Count(&mut self.inline_unknowns),
-            "models" => Field::Count(&mut self.models),
-            "model_memory" => Field::Bytes(&mut self.model_memory),
-            "sessions" => Field::Count(&mut self.sessions),
-            "sweep_points" => Field::Count(&mut self.sweep_points),
-            "sweeps" => Field::Count(&mut self.sweeps),
-            "transient_values" => Field::Count(&mut self.transient_values),
-            "modes" => Field::Count(&mut self.modes),
-            "mode_work" => Field::Count(&mut self.mode_work),
-            "analyses" => Field::Count(&mut self.analyses),
-            "memory" => Field::Bytes(&mut self.memory),
-            "cpu" => Field::Time(&mut self.cpu),
-            "signals" => Field::Count(&mut self.signals),
-            "result_streams" => Field::Count(&mut self.result_streams),
-            "calls" => Field::Count(&mut self.calls),
-            "held_bytes" => Field::Bytes(&mut self.held_bytes),
-            "request_pause" => Field::Time(&mut self.request_pause),
-            "handshake" => Field::Time(&mut self.handshake),
-            "connections" => Field::Count(&mut self.connections),
-            "streams_per_connection" => Field::Count32(&mut self.streams_per_connection),
-            "request_timeout" => Field::Time(&mut self.request_timeout),
-            "idle" => Field::Time(&mut self.idle),
-            "stream_idle" => Field::Time(&mut self.stream_idle),
-            "drain" => Field::Time(&mut self.drain),
-            _ => return None,
-        })
-    }
-
     /// Sets a limit by name: a whole number, bytes with an optional k, M or G (times 1024), or seconds.
     ///
     /// # Errors
     /// A name that is none, with the names there are, or a value that is not positive.
     pub fn set(&mut self, name: &str, value: &str) -> Result<(), String> {
-        let unknown = || format!("no limit named \"{name}\"; expected one of {}", NAMES.join(", "));
-        let whole = |text: &str| text.parse::<usize>().ok().filter(|n| *n > 0);
-        let set = match self.field(name).ok_or_else(unknown)? {
-            Field::Count(to) => whole(value).map(|n| *to = n).ok_or("a whole number above 0"),
-            Field::Count32(to) => {
-                whole(value).and_then(|n| n.try_into().ok()).map(|n| *to = n).ok_or("a whole number above 0")
-            }
-            Field::Bytes(to) => {
-                let (digits, shift) = match value.char_indices().last() {
-                    Some((at, 'k')) => (&value[..at], 10),
-                    Some((at, 'M')) => (&value[..at], 20),
-                    Some((at, 'G')) => (&value[..at], 30),
-                    _ => (value, 0),
-                };
-                let bytes = whole(digits).and_then(|n| n.checked_mul(1 << shift));
-                bytes.map(|n| *to = n).ok_or("bytes above 0, as 1000000, 64M or 2G")
-            }
-            Field::Time(to) => {
-                let seconds = value.parse::<f64>().ok().filter(|s| *s > 0.0 && *s <= 1e9);
-                seconds.map(|s| *to = Duration::from_secs_f64(s)).ok_or("seconds above 0, at most 1e9")
-            }
-        };
-        set.map_err(|expected| format!("{name}: expected {expected}, got \"{value}\""))
+        let limit = LIMITS.iter().find(|limit| limit.name == name).ok_or_else(|| {
+            let names: Vec<&str> = LIMITS.iter().map(|limit| limit.name).collect();
+            format!("no limit named \"{name}\"; expected one of {}", names.join(", "))
+        })?;
+        (limit.read)(self, value).map_err(|expected| format!("{name}: expected {expected}, got \"{value}\""))
+    }
+
+    /// The value of a limit as it is written.
+    pub fn get(&self, limit: &Limit) -> String {
+        (limit.write)(self)
     }
 
     /// The limits as Info tells them.
@@ -242,15 +191,17 @@ impl Limits {
 
 #[cfg(test)]
 mod tests {
-    //! Every limit is set by its name, and docs/service.md has it.
+    //! Every limit is set by its name, and shown as it reads.
     use super::*;
 
     #[test]
     fn every_limit_has_a_name() {
-        for name in NAMES {
+        for limit in LIMITS.iter() {
+            let name = limit.name;
             let mut limits = Limits::default();
             limits.set(name, "7").unwrap_or_else(|error| panic!("{error}"));
             assert_ne!(limits, Limits::default(), "{name}");
+            assert_eq!(limits.get(limit), "7", "{name}");
             for bad in ["0", "-1", "x", "", "1e99", "G"] {
                 let error = limits.set(name, bad).expect_err("means nothing");
                 assert!(error.starts_with(name), "{error}");
@@ -261,13 +212,5 @@ mod tests {
         let mut limits = Limits::default();
         limits.set("memory", "2G").expect("bytes");
         assert_eq!(limits.memory, 2 << 30);
-    }
-
-    #[test]
-    fn every_limit_is_documented() {
-        let docs = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/docs/service.md")).expect("readable");
-        for name in NAMES {
-            assert!(docs.contains(&format!("`{name}`")), "{name}");
-        }
     }
 }

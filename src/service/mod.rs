@@ -5,8 +5,9 @@
 //! is built with the feature `remote` alone, and shows what [`access`] says; `tls` is for both ends. The rest is the feature `server`: [`server`] listens and stops
 //! (`sockets`, `connection`, `shutdown`), [`guard`] and `tokens` ask who comes, `intake` counts what comes in, `rpc` answers calls, `stream` is the Newton loop,
 //! `models`, `sessions` and `sweeps` keep what clients can name, under `ids` that nobody guesses, `snapshots` puts sessions
-//! into bytes, `work` computes, in the `turns` of clients, `chunks` sends what is long, `status` says what went wrong, [`log`]
-//! says it without waiting, and [`limits`] is what clients may ask for.
+//! into bytes, [`store`] keeps those that outlive the server, `work` computes, in the `turns` of clients, `chunks` sends what is long, `status` says what went wrong, [`log`]
+//! says it without waiting, [`limits`] is what clients may ask for, and [`settings`] all
+//! that a server is told, in whichever way it is [`written`].
 
 pub mod access;
 pub mod address;
@@ -37,6 +38,8 @@ pub mod server;
 #[cfg(feature = "server")]
 mod sessions;
 #[cfg(feature = "server")]
+pub mod settings;
+#[cfg(feature = "server")]
 mod shutdown;
 #[cfg(feature = "server")]
 mod snapshots;
@@ -44,6 +47,8 @@ mod snapshots;
 mod sockets;
 #[cfg(feature = "server")]
 mod status;
+#[cfg(feature = "server")]
+pub mod store;
 #[cfg(feature = "server")]
 mod stream;
 #[cfg(feature = "server")]
@@ -56,3 +61,5 @@ pub mod tokens;
 mod turns;
 #[cfg(feature = "server")]
 mod work;
+#[cfg(feature = "server")]
+pub mod written;

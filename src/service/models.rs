@@ -1,6 +1,7 @@
 //! Compiled models by the hash of their text.
 
-use super::convert::model::{bundle_bytes, diagnostics_to_wire, setting_to_wire};
+use super::convert::model::{bundle_bytes, bundle_to_wire, diagnostics_to_wire, setting_to_wire};
+use super::convert::options::options_to_wire;
 use super::limits::Limits;
 use super::server::MakeDevice;
 use super::{proto, status};
@@ -26,6 +27,14 @@ pub(super) struct Model {
 impl Model {
     pub(super) fn id(&self) -> &str {
         &self.description.id
+    }
+
+    /// What it was compiled from, as it travels.
+    pub(super) fn source(&self) -> proto::CompileRequest {
+        proto::CompileRequest {
+            bundle: Some(bundle_to_wire(&self.bundle)),
+            options: Some(options_to_wire(&self.options)),
+        }
     }
 
     pub(super) fn unknowns(&self) -> usize {

@@ -7,8 +7,9 @@ use super::convert::{
 use super::limits::Limits;
 use super::models::{Model, Models, check_size};
 use super::server::MakeDevice;
-use super::sessions::{Question, Sessions};
+use super::sessions::{Question, Session, Sessions};
 use super::shutdown::Shutdown;
+use super::store::Store;
 use super::stream::{TrialStream, answerable};
 use super::sweeps::Sweeps;
 use super::work::{Results, Work, guarded};
@@ -34,10 +35,14 @@ use tonic::{Request, Response, Status, Streaming};
 /// What all calls of a server share.
 pub(super) struct Shared {
     pub(super) limits: Limits,
+    /// Everything that this server was told, for Info.
+    pub(super) told: Vec<proto::ServerSetting>,
     pub(super) make: MakeDevice,
     pub(super) models: Models,
     pub(super) sessions: Sessions,
     pub(super) sweeps: Sweeps,
+    /// States that outlive the server.
+    pub(super) store: Option<Arc<Store>>,
     /// Places for analyses, which may take long.
     pub(super) work: Work,
     /// Places for what a circuit waits for before it can start.
@@ -50,12 +55,45 @@ pub(super) struct Shared {
 }
 
 impl Shared {
+    /// A session that outlives streams, and the server where states are kept.
+    fn created(&self, model: &Model) -> Result<Arc<Session>, Status> {
+        match &self.store {
+            Some(store) => self.sessions.create_kept(store, model, self.make, &self.limits),
+            None => self.sessions.create(model, self.make, &self.limits),
+        }
+    }
+
     /// A session with the states of a snapshot.
     fn restored(&self, model: &Model, snapshot: &[u8]) -> Result<proto::OpenResponse, Status> {
-        let session = self.sessions.create(model, self.make, &self.limits)?;
-        session.restore(snapshot).inspect_err(|_| {
+        let session = self.created(model)?;
+        let opened = session.restore(snapshot).and_then(|opened| session.keep_all().map(|()| opened));
+        opened.inspect_err(|_| {
             self.sessions.close(session.id());
         })
+    }
+
+    /// The session of that id, here or kept by an earlier server.
+    pub(super) async fn session(self: &Arc<Self>, id: &str) -> Result<Arc<Session>, Status> {
+        let here = self.sessions.get(id);
+        let Some(store) = self.store.clone().filter(|store| here.is_err() && store.asleep(id).is_some()) else {
+            return here;
+        };
+        let (shared, id) = (Arc::clone(self), id.to_owned());
+        self.desk.run(move || shared.wake(&store, &id)).await
+    }
+
+    /// Goes on with what an earlier server kept of a session, whose model is compiled again where it is not here.
+    fn wake(&self, store: &Arc<Store>, id: &str) -> Result<Arc<Session>, Status> {
+        let _hold = store.hold();
+        let Some(name) = store.asleep(id) else { return self.sessions.get(id) };
+        let kept = store.load(id, &name).ok_or_else(|| gone(id))?;
+        let model = self.models.get(&name).or_else(|_| {
+            let source = store.model(&name).ok_or_else(|| status::not_found("model", &name))?;
+            let bundle = text::bundle_from_wire(source.bundle).map_err(status::violation)?;
+            let options = options_wire::options_from_wire(source.options).map_err(status::violation)?;
+            self.models.compile(bundle, options, &self.limits, self.make)
+        })?;
+        self.sessions.wake((store, id, &kept), &model, self.make, &self.limits)
     }
 }
 
@@ -110,6 +148,7 @@ impl proto::bimorph_server::Bimorph for Calls {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             protocols: vec!["bimorph.v1".to_owned()],
             limits: Some(limits.to_wire()),
+            settings: self.0.told.clone(),
         }))
     }
 
@@ -150,7 +189,7 @@ impl proto::bimorph_server::Bimorph for Calls {
         let model = shared.models.get(&request.model)?;
         answerable(&request, model.compiled.parts.system.electrics.ports, &shared.limits)?;
         let job = move |budget: &Budget| {
-            let session = shared.sessions.create(&model, shared.make, &shared.limits)?;
+            let session = shared.created(&model)?;
             match session.answer(&Question::Open(request), budget) {
                 Some(ReplyKind::Opened(opened)) => Ok(opened),
                 Some(ReplyKind::Fault(fault)) => {
@@ -171,7 +210,7 @@ impl proto::bimorph_server::Bimorph for Calls {
 
     async fn linearize(&self, request: Request<proto::LinearizeRequest>) -> Reply<proto::LinearizeResponse> {
         let request = request.into_inner();
-        let session = self.0.sessions.get(&request.session)?;
+        let session = self.0.session(&request.session).await?;
         session.bound_small_signals(request.omega.len(), request.noise, &self.0.limits)?;
         let turn = session.turn().await?;
         let job = move || {
@@ -184,7 +223,7 @@ impl proto::bimorph_server::Bimorph for Calls {
 
     async fn snapshot(&self, request: Request<proto::SnapshotRequest>) -> Reply<proto::SnapshotResponse> {
         let request = request.into_inner();
-        let session = self.0.sessions.get(&request.session)?;
+        let session = self.0.session(&request.session).await?;
         let turn = session.turn().await?;
         let only = (request.token != 0).then_some(Token(request.token));
         let job = move || {
@@ -204,7 +243,7 @@ impl proto::bimorph_server::Bimorph for Calls {
 
     async fn fork(&self, request: Request<proto::ForkRequest>) -> Reply<proto::OpenResponse> {
         let shared = Arc::clone(&self.0);
-        let session = shared.sessions.get(&request.get_ref().session)?;
+        let session = shared.session(&request.get_ref().session).await?;
         let model = shared.models.get(session.model())?;
         let turn = session.turn().await?;
         let job = move || {
@@ -216,16 +255,26 @@ impl proto::bimorph_server::Bimorph for Calls {
 
     async fn keep_alive(&self, request: Request<proto::KeepAliveRequest>) -> Reply<proto::KeepAliveResponse> {
         let proto::KeepAliveRequest { session, lease_s } = request.into_inner();
-        let session = self.0.sessions.get(&session)?;
+        let session = self.0.session(&session).await?;
         let (limits, none) = (&self.0.limits, lease_s == 0.0);
         let lease_s = if none { limits.idle.as_secs_f64() } else { lease_s.min(limits.stream_idle.as_secs_f64()) };
         let lease_s = convert::number("lease_s", lease_s, true).map_err(status::violation)?;
-        session.keep((!none).then(|| Duration::from_secs_f64(lease_s)));
+        session.lease((!none).then(|| Duration::from_secs_f64(lease_s)));
         Ok(Response::new(proto::KeepAliveResponse { lease_s }))
     }
 
     async fn close(&self, request: Request<proto::CloseRequest>) -> Reply<proto::CloseResponse> {
         let id = &request.get_ref().session;
+        let asleep = self.0.store.clone().filter(|store| store.asleep(id).is_some());
+        if let Some(store) = asleep {
+            let id = id.clone();
+            let forgotten = self.0.desk.run(move || {
+                store.forget(&id);
+                Ok(())
+            });
+            let forgotten = forgotten.await;
+            return forgotten.map(|()| Response::new(proto::CloseResponse {}));
+        }
         if self.0.sessions.close(id) { Ok(Response::new(proto::CloseResponse {})) } else { Err(gone(id)) }
     }
 

@@ -10,8 +10,10 @@ use super::models::Models;
 use super::proto::{DESCRIPTORS, bimorph_server::BimorphServer};
 use super::rpc::{Calls, Shared};
 use super::sessions::Sessions;
+use super::settings::Settings;
 use super::shutdown::{GRACE, Shutdown};
 use super::sockets::Listener;
+use super::store::{Store, StoreError};
 use super::sweeps::Sweeps;
 use super::work::Work;
 use crate::compile::Compiled;
@@ -19,6 +21,7 @@ use crate::device::Device;
 use crate::device::local::LocalDevice;
 use std::future::Future;
 use std::io::IsTerminal;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 use thiserror::Error;
@@ -44,6 +47,12 @@ pub struct ServeOptions {
     pub insecure: bool,
     /// What clients may ask for.
     pub limits: Limits,
+    /// Where accepted states are kept, to outlive the server; none: nowhere.
+    pub state_dir: Option<PathBuf>,
+    /// Do not wait for the disk: states outlive the server, not the machine.
+    pub state_unsynced: bool,
+    /// What all this comes from, for `Info`; none: the limits alone are told.
+    pub settings: Option<Settings>,
     /// Whether [`run_until_signal`] also ends when standard input does: a program that starts a server for itself holds the
     /// other end of a pipe, which the system closes however that program ends.
     pub while_stdin: bool,
@@ -64,6 +73,9 @@ impl Default for ServeOptions {
             guard: GuardFiles::default(),
             insecure: false,
             limits: Limits::default(),
+            state_dir: None,
+            state_unsynced: false,
+            settings: None,
             while_stdin: false,
             ready: Box::new(|_| {}),
         }
@@ -93,6 +105,9 @@ pub enum ServeError {
         /// The address.
         address: Address,
     },
+    /// States cannot be kept.
+    #[error(transparent)]
+    Store(#[from] StoreError),
     /// Certificates, keys or tokens cannot be used.
     #[error(transparent)]
     Guard(#[from] GuardError),
@@ -141,11 +156,14 @@ pub async fn run_with(
     make: MakeDevice,
     shutdown: impl Future<Output = ()> + Send,
 ) -> Result<(), ServeError> {
-    let ServeOptions { listen, guard, insecure, limits, ready, while_stdin: _ } = options;
+    let ServeOptions { listen, guard, insecure, limits, state_dir, state_unsynced, settings, ready, while_stdin: _ } =
+        options;
     if listen.is_empty() {
         return Err(ServeError::NoAddress);
     }
     let guard = Arc::new(Guard::read(&guard)?);
+    let open = |folder| Store::open(folder, !state_unsynced, limits.state_bytes, limits.stream_idle);
+    let store = state_dir.as_deref().map(open).transpose()?.map(Arc::new);
     let mut listeners = Vec::with_capacity(listen.len());
     for address in &listen {
         listeners.push(Listener::bind(address, insecure, &guard).await?);
@@ -165,11 +183,13 @@ pub async fn run_with(
         desk: Work::new(limits.analyses, &limits, signals.clone()),
         trials: Work::new(2 * limits.analyses, &limits, signals.clone()),
         results: Arc::new(Semaphore::new(limits.result_streams)),
+        told: settings.map(|settings| settings.told()).unwrap_or_default(),
         limits,
         make,
         models: Models::default(),
         sessions: Sessions::default(),
         sweeps: Sweeps::new(),
+        store,
         shutdown: signals.clone(),
     });
     let calls = BimorphServer::new(Calls(Arc::clone(&shared)))
@@ -192,7 +212,7 @@ pub async fn run_with(
     let (v1, v1alpha) = reflection(&transport)?;
     let mut serving = std::pin::pin!(
         Server::builder()
-            .max_concurrent_streams(shared.limits.streams_per_connection)
+            .max_concurrent_streams(u32::try_from(shared.limits.streams_per_connection).unwrap_or(u32::MAX))
             .initial_connection_window_size(CONNECTION_WINDOW)
             .add_service(Intake::new(calls, &gate))
             .add_service(Intake::new(health_service, &gate))
@@ -292,6 +312,10 @@ async fn expire(shared: Arc<Shared>) {
     );
     loop {
         ticks.tick().await;
+        if let Some(store) = shared.store.clone() {
+            let forget = shared.limits.stream_idle;
+            let _ = tokio::task::spawn_blocking(move || store.expire(forget)).await;
+        }
         let (sessions, sweeps) = (shared.sessions.expire(&shared.limits), shared.sweeps.expire(idle));
         if sessions + sweeps > 0 {
             tracing::info!(sessions, sweeps, open = shared.sessions.len(), "forgot what was idle");

@@ -6,6 +6,7 @@ use super::limits::Limits;
 use super::models::Model;
 use super::server::MakeDevice;
 use super::snapshots;
+use super::store::{Keeper, Kept, Store};
 use super::work::caught;
 use super::{proto, status};
 use crate::budget::{self, Allowance, Budget, Stopped};
@@ -38,6 +39,10 @@ pub(super) struct Session {
     closed: AtomicBool,
     /// Streams that hold this session.
     streams: AtomicUsize,
+    /// Where its accepted states are kept, if they are to outlive the server.
+    keeper: Option<Arc<Mutex<Keeper>>>,
+    /// The last accepted state that is kept; 0: none yet.
+    accepted: AtomicU64,
 }
 
 /// A question that needs a thread.
@@ -52,8 +57,15 @@ const AFTER_SLOW: u32 = 64;
 pub(super) enum Question {
     Open(proto::OpenRequest),
     Trial(proto::TrialRequest),
-    Accept(Token),
+    Accept(proto::Accept),
     Linearize(proto::SmallSignalRequest),
+}
+
+impl Question {
+    /// Whether it has no answer.
+    pub(super) fn is_silent(&self) -> bool {
+        matches!(self, Self::Accept(accept) if !accept.answer)
+    }
 }
 
 impl Session {
@@ -78,7 +90,12 @@ impl Session {
     /// # Errors
     /// [`Later`]: to be asked again with [`Session::answer`], on a thread. Trials are pure, so nothing has happened.
     pub(super) fn answer_at_once(&self, question: &Question) -> Result<Option<ReplyKind>, Later> {
-        if !self.inline || self.slow.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |n| n.checked_sub(1)).is_ok() {
+        // what waits for the disk waits elsewhere
+        let kept = self.keeper.is_some() && matches!(question, Question::Open(_) | Question::Accept(_));
+        if kept
+            || !self.inline
+            || self.slow.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |n| n.checked_sub(1)).is_ok()
+        {
             return Err(Later);
         }
         let device = match self.device.try_lock() {
@@ -118,7 +135,7 @@ impl Session {
     }
 
     fn refuse(&self, question: &Question, status: &Status) -> Option<ReplyKind> {
-        (!matches!(question, Question::Accept(_))).then(|| refused(status))
+        (!question.is_silent()).then(|| refused(status))
     }
 
     fn ask(&self, device: &mut dyn Device, question: &Question) -> Option<ReplyKind> {
@@ -128,7 +145,7 @@ impl Session {
                 device.open(&request).map(|description| {
                     let description = wire::description_to_wire(&description);
                     *self.description.lock().unwrap_or_else(PoisonError::into_inner) = description;
-                    ReplyKind::Opened(self.opened())
+                    self.keep(device, None).map_or_else(|s| refused(&s), |_| ReplyKind::Opened(self.opened()))
                 })
             }
             Question::Trial(request) => {
@@ -137,9 +154,14 @@ impl Session {
                     .and_then(|trial| device.trial(&trial, &mut reply))
                     .map(|()| ReplyKind::Trial(wire::reply_to_wire(&mut reply)))
             }
-            Question::Accept(token) => {
-                device.accept(*token);
-                return None;
+            Question::Accept(proto::Accept { token, answer }) => {
+                device.accept(Token(*token));
+                let kept = self.keep(device, Some(Token(*token)));
+                if let Err(status) = &kept {
+                    tracing::warn!(session = self.id, reason = status.message(), "an accepted state is not kept");
+                }
+                let accepted = |kept| ReplyKind::Accepted(proto::Accepted { token: *token, kept });
+                return answer.then(|| kept.map_or_else(|status| refused(&status), accepted));
             }
             Question::Linearize(request) => {
                 small_signal(device, Token(request.token), request.omega, request.noise).map(ReplyKind::Linearized)
@@ -148,10 +170,41 @@ impl Session {
         Some(answer.unwrap_or_else(|error| ReplyKind::Fault(wire::fault_to_wire(&error))))
     }
 
+    /// Keeps the accepted state and the one before, where states are kept; without a token all that are held. Whether it did.
+    fn keep(&self, device: &dyn Device, token: Option<Token>) -> Result<bool, Status> {
+        let Some(keeper) = &self.keeper else { return Ok(false) };
+        let mut keeper = keeper.lock().unwrap_or_else(PoisonError::into_inner);
+        if self.is_closed() {
+            return Err(status::not_found("session", &self.id));
+        }
+        let before = Token(keeper.accepted);
+        let states = match token {
+            None => device.save(None),
+            Some(token) => match device.save(Some(&[before, token])) {
+                // the first one, or a state that is not held any more
+                Err(DeviceError::UnknownToken(unknown)) if unknown == before => device.save(Some(&[token])),
+                saved => saved,
+            },
+        };
+        let states = states.map_err(|error| status::device(&error))?;
+        let sealed = snapshots::seal(&self.model, &states);
+        let accepted = token.map_or(0, |token| token.0);
+        keeper.keep(accepted, &sealed).map_err(|error| status::not_kept(&error))?;
+        self.accepted.store(accepted, Ordering::Relaxed);
+        Ok(true)
+    }
+
+    /// Keeps all states that are held, where states are kept.
+    pub(super) fn keep_all(&self) -> Result<(), Status> {
+        let device = self.lock()?;
+        self.keep(&**device, None).map(|_| ())
+    }
+
     /// Its states as a sealed snapshot.
     pub(super) fn snapshot(&self, only: Option<Token>) -> Result<Vec<u8>, Status> {
         self.touch();
-        let states = self.lock()?.save(only).map_err(|error| status::device(&error))?;
+        let states =
+            self.lock()?.save(only.as_ref().map(std::slice::from_ref)).map_err(|error| status::device(&error))?;
         Ok(snapshots::seal(&self.model, &states))
     }
 
@@ -171,7 +224,7 @@ impl Session {
     }
 
     /// Keeps it for `lease` without use, or for as long as the server keeps any.
-    pub(super) fn keep(&self, lease: Option<Duration>) {
+    pub(super) fn lease(&self, lease: Option<Duration>) {
         self.touch();
         let millis = lease.map_or(0, |lease| u64::try_from(lease.as_millis()).unwrap_or(u64::MAX).max(1));
         self.lease_ms.store(millis, Ordering::Relaxed);
@@ -239,7 +292,12 @@ impl Session {
     /// What the last open said; an empty description before any.
     pub(super) fn opened(&self) -> proto::OpenResponse {
         let device = self.description.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        proto::OpenResponse { session: self.id.clone(), device: Some(device) }
+        proto::OpenResponse {
+            session: self.id.clone(),
+            device: Some(device),
+            kept: self.keeper.is_some(),
+            accepted: self.accepted.load(Ordering::Relaxed),
+        }
     }
 
     pub(super) fn is_closed(&self) -> bool {
@@ -254,6 +312,13 @@ impl Session {
 
     fn close(&self) {
         self.closed.store(true, Ordering::Relaxed);
+        let Some(keeper) = self.keeper.clone() else { return };
+        // whoever keeps at this moment is waited for, and then finds it closed
+        let forget = move || keeper.lock().unwrap_or_else(PoisonError::into_inner).forget();
+        match tokio::runtime::Handle::try_current() {
+            Ok(runtime) => drop(runtime.spawn_blocking(forget)),
+            Err(_) => forget(),
+        }
     }
 
     /// A stream takes hold of this session.
@@ -316,9 +381,56 @@ pub(super) struct Sessions {
 impl Sessions {
     /// Makes a session with a device that is not open yet.
     pub(super) fn create(&self, model: &Model, make: MakeDevice, limits: &Limits) -> Result<Arc<Session>, Status> {
+        self.admit(self.ids.make()?, None, model, make, limits)
+    }
+
+    /// The same whose accepted states are kept. Waits for the disk.
+    pub(super) fn create_kept(
+        &self,
+        store: &Arc<Store>,
+        model: &Model,
+        make: MakeDevice,
+        limits: &Limits,
+    ) -> Result<Arc<Session>, Status> {
+        let id = self.ids.make()?;
+        let keeper = Keeper::new(store, &id, model.id(), &model.source());
+        let keeper = keeper.map_err(|error| status::not_kept(&error))?;
+        self.admit(id.clone(), Some(keeper), model, make, limits).inspect_err(|_| store.forget(&id))
+    }
+
+    /// A session of an earlier server goes on with what was kept of it. Waits for the disk.
+    pub(super) fn wake(
+        &self,
+        (store, id, kept): (&Arc<Store>, &str, &Kept),
+        model: &Model,
+        make: MakeDevice,
+        limits: &Limits,
+    ) -> Result<Arc<Session>, Status> {
+        // bytes that do not fit leave what is kept as it is
+        snapshots::open(model.id(), &kept.sealed)?;
+        let keeper = Keeper::after(store, id, model.id(), kept);
+        let session = self.admit(id.to_owned(), Some(keeper), model, make, limits);
+        let session = session.inspect_err(|_| store.sleep(id))?;
+        session.restore(&kept.sealed).inspect_err(|_| {
+            self.open.lock().unwrap_or_else(PoisonError::into_inner).remove(id);
+            store.sleep(id);
+        })?;
+        Ok(session)
+    }
+
+    fn admit(
+        &self,
+        id: String,
+        keeper: Option<Keeper>,
+        model: &Model,
+        make: MakeDevice,
+        limits: &Limits,
+    ) -> Result<Arc<Session>, Status> {
         let device = catch_unwind(|| make(Arc::clone(&model.compiled))).map_err(|_| status::fault())?;
         let session = Arc::new(Session {
-            id: self.ids.make()?,
+            id,
+            accepted: AtomicU64::new(keeper.as_ref().map_or(0, |keeper| keeper.accepted)),
+            keeper: keeper.map(|keeper| Arc::new(Mutex::new(keeper))),
             model: model.id().to_owned(),
             device: Mutex::new(device),
             description: Mutex::default(),

@@ -60,7 +60,7 @@ fn word(bytes: &[u8]) -> Option<(&[u8], &[u8])> {
 }
 
 /// FNV-1a, 128 bits (Fowler, Noll, Vo): against accidents, not against forgery, which would harm only who forges.
-fn checksum(bytes: &[u8]) -> u128 {
+pub(super) fn checksum(bytes: &[u8]) -> u128 {
     bytes.iter().fold(0x6c62_272e_07bb_0142_62b8_2175_6295_c58d, |hash, byte| {
         (hash ^ u128::from(*byte)).wrapping_mul(0x0000_0000_0100_0000_0000_0000_0000_013b)
     })

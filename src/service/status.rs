@@ -104,6 +104,16 @@ pub(super) fn not_found(kind: &str, id: &str) -> Status {
     Status::not_found(format!("no {kind} \"{id}\" here; {way_out}"))
 }
 
+/// States that cannot be kept: RESOURCE_EXHAUSTED where there is no room for them, UNAVAILABLE for anything else.
+pub(super) fn not_kept(error: &std::io::Error) -> Status {
+    use std::io::ErrorKind;
+    let text = cut(format!("the state is not kept: {error}"), MESSAGE_BYTES);
+    match error.kind() {
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge => Status::resource_exhausted(text),
+        _ => Status::unavailable(text),
+    }
+}
+
 /// RESOURCE_EXHAUSTED for a limit.
 pub(super) fn limit(name: &str, most: usize, got: impl std::fmt::Display) -> Status {
     Status::resource_exhausted(format!("{name}: at most {most}, got {got}; Info lists the limits of this server"))

@@ -11,7 +11,6 @@ use super::sessions::{Question, Session, refused};
 use super::turns::{CLIENT, client};
 use super::{proto, status};
 use crate::budget::Budget;
-use crate::device::Token;
 use proto::device_reply::Kind as ReplyKind;
 use proto::device_request::Kind as RequestKind;
 use std::future::Future;
@@ -25,6 +24,9 @@ use tonic::{Status, Streaming};
 /// Requests without a reply (accepts) answered before other tasks get their turn.
 const BURST: usize = 64;
 
+/// What is awaited.
+type Running<T> = Pin<Box<dyn Future<Output = T> + Send>>;
+
 /// The replies of one stream.
 pub(super) struct TrialStream {
     shared: Arc<Shared>,
@@ -33,7 +35,9 @@ pub(super) struct TrialStream {
     session: Option<Arc<Session>>,
     /// Whether the session ends with this stream.
     owned: bool,
-    running: Option<Pin<Box<dyn Future<Output = Option<ReplyKind>> + Send>>>,
+    /// A session that is being woken, to be joined.
+    waking: Option<Running<Result<Arc<Session>, Status>>>,
+    running: Option<Running<Option<ReplyKind>>>,
     finished: bool,
     client: u64,
 }
@@ -41,7 +45,17 @@ pub(super) struct TrialStream {
 impl TrialStream {
     pub(super) fn new(shared: Arc<Shared>, requests: Streaming<proto::DeviceRequest>) -> Self {
         let ending = Box::pin(shared.shutdown.ending.clone().cancelled_owned());
-        Self { shared, requests, ending, session: None, owned: false, running: None, finished: false, client: client() }
+        Self {
+            shared,
+            requests,
+            ending,
+            session: None,
+            owned: false,
+            waking: None,
+            running: None,
+            finished: false,
+            client: client(),
+        }
     }
 
     /// Starts on a request: a reply at once, none (an accept), or a thread in `running`.
@@ -50,9 +64,9 @@ impl TrialStream {
             Some(RequestKind::Open(open)) => {
                 return self.enter(&open).map_or_else(|s| Some(refused(&s)), |()| self.ask(Question::Open(open)));
             }
-            Some(RequestKind::Attach(attach)) => return Some(self.attach(&attach.session)),
+            Some(RequestKind::Attach(attach)) => return self.attach(attach.session),
             Some(RequestKind::Trial(trial)) => Question::Trial(trial),
-            Some(RequestKind::Accept(accept)) => Question::Accept(Token(accept.token)),
+            Some(RequestKind::Accept(accept)) => Question::Accept(accept),
             Some(RequestKind::Linearize(request)) => {
                 let limits = &self.shared.limits;
                 let bound = |session: &Arc<Session>| session.bound_small_signals(1, request.noise, limits);
@@ -68,9 +82,8 @@ impl TrialStream {
 
     fn ask(&mut self, question: Question) -> Option<ReplyKind> {
         let Some(session) = &self.session else {
-            let silent = matches!(question, Question::Accept(_));
             let fault = super::convert::device::fault_to_wire(&crate::device::DeviceError::NotOpen);
-            return (!silent).then_some(ReplyKind::Fault(fault));
+            return (!question.is_silent()).then_some(ReplyKind::Fault(fault));
         };
         if let Ok(reply) = session.answer_at_once(&question) {
             return reply;
@@ -99,8 +112,20 @@ impl TrialStream {
         Ok(())
     }
 
-    fn attach(&mut self, id: &str) -> ReplyKind {
-        match self.shared.sessions.get(id) {
+    /// Joins a session: at once where it is here, else when it has been woken.
+    fn attach(&mut self, id: String) -> Option<ReplyKind> {
+        let here = self.shared.sessions.get(&id);
+        if here.is_ok() || self.shared.store.is_none() {
+            return Some(self.join(here));
+        }
+        let shared = Arc::clone(&self.shared);
+        let woken = async move { shared.session(&id).await };
+        self.waking = Some(Box::pin(CLIENT.scope(self.client, woken)));
+        None
+    }
+
+    fn join(&mut self, session: Result<Arc<Session>, Status>) -> ReplyKind {
+        match session {
             Ok(session) => {
                 self.leave();
                 let opened = session.opened();
@@ -150,7 +175,7 @@ async fn later(shared: Arc<Shared>, session: Arc<Session>, question: Question) -
         Ok(turn) => turn,
         Err(status) => return Some(refused(&status)),
     };
-    let silent = matches!(question, Question::Accept(_));
+    let silent = question.is_silent();
     let job = move |budget: &Budget| {
         let _turn = turn;
         Ok(session.answer(&question, budget))
@@ -177,7 +202,11 @@ impl Stream for TrialStream {
             return Poll::Ready(Some(Err(status::stopping())));
         }
         for _ in 0..BURST {
-            let reply = if let Some(running) = &mut this.running {
+            let reply = if let Some(waking) = &mut this.waking {
+                let woken = ready!(waking.as_mut().poll(cx));
+                this.waking = None;
+                Some(this.join(woken))
+            } else if let Some(running) = &mut this.running {
                 let reply = ready!(running.as_mut().poll(cx));
                 this.running = None;
                 reply

@@ -4,6 +4,7 @@ mod analyses;
 mod batch;
 mod bench;
 mod chart;
+mod configuration;
 mod errors;
 mod export;
 mod layouts;

@@ -231,7 +231,7 @@ impl Device for RemoteDevice {
 
     fn accept(&mut self, token: Token) {
         if let Some(stream) = &self.stream {
-            let accept = proto::Accept { token: token.0 };
+            let accept = proto::Accept { token: token.0, answer: false };
             // Advisory: when the queue is full, the next one says as much.
             let _ = stream.requests.try_send(proto::DeviceRequest { kind: Some(RequestKind::Accept(accept)) });
         }

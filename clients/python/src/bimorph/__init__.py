@@ -36,7 +36,7 @@ from .results import (
     TrialReply,
 )
 from .server import Server, serve
-from .session import Session, Snapshot
+from .session import Session, Snapshot, Ticket
 from .sweep import LogNormal, Modes, Normal, PullIn, Row, Samples, Static, Table, Transient, Uniform
 from .sweep_handle import Sweep, SweepStatus
 
@@ -75,6 +75,7 @@ __all__ = [
     "Sweep",
     "SweepStatus",
     "Table",
+    "Ticket",
     "Transient",
     "TransientResult",
     "TrialReply",

@@ -19,7 +19,7 @@ from .errors import Diagnostic, InvalidRequest, NetlistError, NotFound, Unavaila
 from .netlist import Netlist
 from .options import WIRE, Options
 from .results import FrequencyResponse, ModesResult, NodeMotion, PullInResult, Root, StaticResult, TransientResult
-from .session import Session, Snapshot
+from .session import Session, Snapshot, Ticket, _resumed
 from .sweep_handle import Sweep
 from .v1 import analysis_pb2, device_pb2, model_pb2, sweep_pb2
 from .waveforms import Waveform, drive
@@ -65,6 +65,10 @@ class Client:
     def version(self) -> str:
         """Version of the server."""
         return str(self._channel.call("Info", model_pb2.InfoRequest()).version)
+
+    def settings(self) -> dict[str, str]:
+        """Everything that the server was told, or does by default, by the names of docs/service.md."""
+        return {s.name: s.value for s in self._channel.call("Info", model_pb2.InfoRequest()).settings}
 
     def convert(
         self,
@@ -187,6 +191,13 @@ class Client:
             netlist = self.convert(netlist).netlist
         read = netlist if isinstance(netlist, Netlist) else Netlist.read(netlist, include)
         return model_pb2.Bundle(root=read.root, files=dict(read.files))
+
+    def resume(self, ticket: Ticket, timeout: float = 60.0) -> Session:
+        """Goes on with a kept session from its :meth:`Session.ticket`, also when the server was started anew.
+
+        Raises :class:`NotFound` when the session is not kept (any more).
+        """
+        return _resumed(self._channel, ticket, timeout)
 
     def close(self) -> None:
         """Closes the connection. The client may be used again."""
@@ -412,6 +423,7 @@ class Model:
         *,
         seed: int | None = None,
         noise_band: float | None = None,
+        kept: bool = False,
     ) -> Session:
         """Opens a device to be stepped; use it in a ``with`` block.
 
@@ -423,11 +435,16 @@ class Model:
         ``timeout`` [s] bounds each call. With a ``seed``, warm gas and dampers shake the mechanism in every step, the same way for the
         same seed; ``noise_band`` [Hz] is the band of their force, by default twenty times the lowest natural frequency. Steps
         are then taken in pieces of at most two cells of 1/(2·band).
+        A ``kept`` session outlives its connection for a time (:meth:`Session.resume`), and the server, where that keeps states
+        (``bimorph serve --state-dir``).
         """
         self._describe()
         if seed is None and noise_band is not None:
             raise ValueError("noise_band says nothing without a seed")
         noise = None if seed is None else device_pb2.Agitation(seed=seed, band_hz=noise_band)
+        if kept:
+            opened = self._call("Open", device_pb2.OpenRequest(model=self.id, ports=ports, signals=signals, noise=noise))
+            return Session(self._channel, self.id, (), (), timeout, opened.session)
         return Session(self._channel, self.id, tuple(ports), tuple(signals), timeout, noise=noise)
 
     def restore(self, snapshot: Snapshot, timeout: float = 60.0) -> Session:

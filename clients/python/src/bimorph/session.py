@@ -44,6 +44,22 @@ class Snapshot:
     """Accepted port voltages [V]."""
 
 
+@dataclass(frozen=True)
+class Ticket:
+    """Where a kept session stands on its server: :meth:`Client.resume` goes on there, also when the server was started anew."""
+
+    model: str
+    """Id of the model."""
+    session: str
+    """Id of the session: who has it may use it."""
+    accepted: TrialReply | None
+    """The accepted state."""
+    t: float
+    """Its time [s]."""
+    voltages: dict[str, float]
+    """Accepted port voltages [V]."""
+
+
 class Session:
     """A device with states of its own. Make one with :meth:`Model.session`, use it in a ``with`` block.
 
@@ -105,6 +121,8 @@ class Session:
         (N; m/s), "moment_rate" (N·m; rad/s), "thermal" (W; K above ambient), "acceleration" (m/s²; 0), "rate" (rad/s; 0)."""
         self.signals: dict[str, str] = {s.name: s.unit for s in opened.device.signals}
         """Opened signals and their units."""
+        self.kept: bool = opened.kept
+        """Whether accepted states outlive the server."""
         self.unknowns: int = opened.device.unknowns
         """Mechanical unknowns."""
         self._voltages = dict.fromkeys(self.ports, 0.0)
@@ -135,11 +153,17 @@ class Session:
         return self._named(self._ask(device_pb2.DeviceRequest(trial=request)).trial, t)
 
     def accept(self, reply: TrialReply, voltages: Mapping[str, float] | None = None) -> None:
-        """Makes a trial's state the one that later trials start from."""
+        """Makes a trial's state the one that later trials start from. In a kept session it has outlived the server when this
+        returns, and if this raises, the state before is still accepted and the same trial gives the same state again."""
         if reply.need_dt is not None:
             raise ValueError("a reply that asks for a shorter step has no state to accept")
         with self._lock:
             kept = self._voltages if voltages is None else dict(zip(self.ports, self._vector(voltages)))
+            if self.kept:
+                # There first, with an answer: the server keeps the state before as well.
+                self._ask(device_pb2.DeviceRequest(accept=device_pb2.Accept(token=reply.token, answer=True)))
+                self.accepted, self.t, self._voltages = reply, reply.t, kept
+                return
             # Here first: the server only frees memory, and an interrupted call must not leave half of this done.
             self.accepted, self.t, self._voltages = reply, reply.t, kept
             self._put(_Question(device_pb2.DeviceRequest(accept=device_pb2.Accept(token=reply.token)), None))
@@ -224,6 +248,24 @@ class Session:
             opened = self._channel.call("Fork", device_pb2.ForkRequest(session=self._session))
             other = Session(self._channel, self._model, (), (), self._timeout, opened.session)
             other.accepted, other.t, other._voltages = self.accepted, self.t, dict(self._voltages)
+            return other
+
+    def ticket(self) -> Ticket:
+        """Where this session stands, to go on from with :meth:`Client.resume`, also in another process."""
+        with self._lock:
+            if not self._joined:
+                raise BimorphError("only a session of Model.session(kept=True) outlives its connection")
+            return Ticket(self._model, self._session, self.accepted, self.t, dict(self._voltages))
+
+    def resume(self) -> Session:
+        """This session on a new connection, when the old one broke or the server was started anew. This object is closed, the
+        session is not.
+        """
+        with self._lock:
+            ticket = self.ticket()
+            other = _resumed(self._channel, ticket, self._timeout)
+            self._joined = False
+            self.close()
             return other
 
     def close(self) -> None:
@@ -320,6 +362,12 @@ class Session:
         except grpc.RpcError as error:
             over = from_rpc(error, self._channel.address)
         self._over = self._over or over
+
+
+def _resumed(channel: Channel, ticket: Ticket, timeout: float) -> Session:
+    session = Session(channel, ticket.model, (), (), timeout, ticket.session)
+    session.accepted, session.t, session._voltages = ticket.accepted, ticket.t, dict(ticket.voltages)
+    return session
 
 
 class _Question(NamedTuple):

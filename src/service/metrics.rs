@@ -1,0 +1,237 @@
+//! What a server counts, as Prometheus reads it (text format 0.0.4), and whether it is ready for more.
+
+use super::rpc::Shared;
+use super::{intake::Gate, log};
+use std::fmt::Write;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use tonic::Code;
+
+/// Calls that are counted by name; the last stands for all others.
+const CALLS: [&str; 25] = [
+    "Info",
+    "Check",
+    "Convert",
+    "Compile",
+    "Describe",
+    "Open",
+    "Trial",
+    "Linearize",
+    "Snapshot",
+    "Restore",
+    "Fork",
+    "KeepAlive",
+    "Close",
+    "Static",
+    "Modes",
+    "FrequencyResponse",
+    "PullIn",
+    "Transient",
+    "SubmitSweep",
+    "WatchSweep",
+    "FetchSweep",
+    "CancelSweep",
+    "Watch",
+    "ServerReflectionInfo",
+    "other",
+];
+/// Codes of gRPC, by number.
+const CODES: usize = 17;
+/// Upper ends of the classes of durations [s].
+const CLASSES: [f64; 8] = [0.001, 0.01, 0.1, 1.0, 10.0, 100.0, 1000.0, f64::INFINITY];
+
+/// A metric: its name, what it is, and what it means.
+pub struct Metric {
+    /// Name.
+    pub name: &'static str,
+    /// "gauge", "counter" or "histogram".
+    pub kind: &'static str,
+    /// What it means, with its unit.
+    pub help: &'static str,
+}
+
+const fn metric(name: &'static str, kind: &'static str, help: &'static str) -> Metric {
+    Metric { name, kind, help }
+}
+
+/// Every metric, in the order in which they are told.
+pub const METRICS: [Metric; 17] = [
+    metric("bimorph_info", "gauge", "1, with the version of the server."),
+    metric("bimorph_start_time_seconds", "gauge", "When the server started, since 1970 [s]."),
+    metric("bimorph_ready", "gauge", "1 where it is ready for more, 0 where it is full or stops."),
+    metric("bimorph_connections", "gauge", "Connections open."),
+    metric("bimorph_calls", "gauge", "Calls under way, streams among them."),
+    metric("bimorph_calls_total", "counter", "Calls that ended, by name and gRPC code."),
+    metric("bimorph_call_seconds", "histogram", "How long calls took, by name [s]."),
+    metric("bimorph_trials_total", "counter", "Questions on Trial streams."),
+    metric("bimorph_held_bytes", "gauge", "Bytes of requests that are held [byte]."),
+    metric("bimorph_sessions", "gauge", "Sessions open."),
+    metric("bimorph_models", "gauge", "Models kept."),
+    metric("bimorph_sweeps", "gauge", "Sweeps kept, running or finished."),
+    metric("bimorph_waiting", "gauge", "Computations that wait for a place, by what they are."),
+    metric("bimorph_kept_sessions", "gauge", "Sessions in the folder of states."),
+    metric("bimorph_kept_bytes", "gauge", "Bytes in the folder of states [byte]."),
+    metric("bimorph_log_lines_dropped_total", "counter", "Lines of the log that nobody read in time."),
+    metric("process_resident_memory_bytes", "gauge", "Resident memory [byte]."),
+];
+
+/// Counts of one server.
+#[derive(Debug)]
+pub(super) struct Metrics {
+    started: SystemTime,
+    ended: Vec<[AtomicU64; CODES]>,
+    classes: Vec<[AtomicU64; CLASSES.len()]>,
+    /// Microseconds.
+    took: Vec<AtomicU64>,
+    /// Questions on Trial streams.
+    pub(super) trials: AtomicU64,
+}
+
+impl Default for Metrics {
+    fn default() -> Self {
+        Self {
+            started: SystemTime::now(),
+            ended: CALLS.iter().map(|_| Default::default()).collect(),
+            classes: CALLS.iter().map(|_| Default::default()).collect(),
+            took: CALLS.iter().map(|_| AtomicU64::new(0)).collect(),
+            trials: AtomicU64::new(0),
+        }
+    }
+}
+
+/// The place of a call among those that are counted.
+pub(super) fn place(path: &str) -> usize {
+    let name = path.rsplit('/').next().unwrap_or_default();
+    CALLS.iter().position(|call| *call == name).unwrap_or(CALLS.len() - 1)
+}
+
+/// The name of a call that is counted.
+pub(super) fn name(place: usize) -> &'static str {
+    CALLS.get(place).copied().unwrap_or("other")
+}
+
+impl Metrics {
+    /// A call has ended.
+    pub(super) fn ended(&self, place: usize, code: Code, time: Duration) {
+        let class = CLASSES.iter().position(|end| time.as_secs_f64() <= *end).unwrap_or(0);
+        self.ended[place][code as usize % CODES].fetch_add(1, Ordering::Relaxed);
+        self.classes[place][class].fetch_add(1, Ordering::Relaxed);
+        self.took[place].fetch_add(u64::try_from(time.as_micros()).unwrap_or(u64::MAX), Ordering::Relaxed);
+    }
+
+    fn calls(&self, out: &mut String) {
+        for (name, codes) in CALLS.iter().zip(&self.ended) {
+            for (code, count) in codes.iter().enumerate().map(|(k, count)| (k, count.load(Ordering::Relaxed))) {
+                if count > 0 {
+                    let code = Code::from_i32(i32::try_from(code).unwrap_or(2));
+                    let _ = writeln!(out, "bimorph_calls_total{{call=\"{name}\",code=\"{code:?}\"}} {count}");
+                }
+            }
+        }
+    }
+
+    fn durations(&self, out: &mut String) {
+        for (k, name) in CALLS.iter().enumerate() {
+            let counts: Vec<u64> = self.classes[k].iter().map(|count| count.load(Ordering::Relaxed)).collect();
+            let mut sum = 0;
+            if counts.iter().all(|count| *count == 0) {
+                continue;
+            }
+            for (end, count) in CLASSES.iter().zip(counts) {
+                sum += count;
+                let end = if end.is_finite() { end.to_string() } else { "+Inf".to_owned() };
+                let _ = writeln!(out, "bimorph_call_seconds_bucket{{call=\"{name}\",le=\"{end}\"}} {sum}");
+            }
+            let took = Duration::from_micros(self.took[k].load(Ordering::Relaxed)).as_secs_f64();
+            let _ = writeln!(out, "bimorph_call_seconds_sum{{call=\"{name}\"}} {took}");
+            let _ = writeln!(out, "bimorph_call_seconds_count{{call=\"{name}\"}} {sum}");
+        }
+    }
+}
+
+/// Why a server is not ready for more; none: it is.
+pub(super) fn busy(shared: &Shared, gate: &Gate) -> Option<String> {
+    let limits = &shared.limits;
+    if shared.shutdown.draining.is_cancelled() {
+        return Some("it is stopping".to_owned());
+    }
+    let sessions = shared.sessions.len();
+    let (calls, held) = (gate.calls(), gate.held());
+    let waiting = shared.work.waiting().max(shared.desk.waiting());
+    for (what, have, most) in [
+        ("sessions", sessions, limits.sessions),
+        ("calls", calls, limits.calls),
+        ("held_bytes", held, limits.held_bytes),
+        // each would wait for this many others before its turn
+        ("waiting", waiting, WAITING * limits.analyses),
+    ] {
+        if have >= most {
+            return Some(format!("{what}: {have} of {most}"));
+        }
+    }
+    None
+}
+
+/// Computations that may wait for each place before others are sent elsewhere.
+const WAITING: usize = 8;
+
+/// Everything, as Prometheus reads it.
+pub(super) fn text(shared: &Shared, gate: &Gate) -> String {
+    let mut out = String::with_capacity(8192);
+    for Metric { name, kind, help } in METRICS {
+        let _ = writeln!(out, "# HELP {name} {help}\n# TYPE {name} {kind}");
+        let value = match name {
+            "bimorph_info" => {
+                let _ = writeln!(out, "bimorph_info{{version=\"{}\"}} 1", env!("CARGO_PKG_VERSION"));
+                continue;
+            }
+            "bimorph_calls_total" => {
+                shared.metrics.calls(&mut out);
+                continue;
+            }
+            "bimorph_call_seconds" => {
+                shared.metrics.durations(&mut out);
+                continue;
+            }
+            "bimorph_waiting" => {
+                for (what, work) in [("analyses", &shared.work), ("openings", &shared.desk), ("trials", &shared.trials)] {
+                    let _ = writeln!(out, "bimorph_waiting{{for=\"{what}\"}} {}", work.waiting());
+                }
+                continue;
+            }
+            "bimorph_start_time_seconds" => {
+                shared.metrics.started.duration_since(UNIX_EPOCH).unwrap_or_default().as_secs()
+            }
+            "bimorph_ready" => u64::from(busy(shared, gate).is_none()),
+            "bimorph_connections" => shared.connections.open() as u64,
+            "bimorph_calls" => gate.calls() as u64,
+            "bimorph_trials_total" => shared.metrics.trials.load(Ordering::Relaxed),
+            "bimorph_held_bytes" => gate.held() as u64,
+            "bimorph_sessions" => shared.sessions.len() as u64,
+            "bimorph_models" => shared.models.len() as u64,
+            "bimorph_sweeps" => shared.sweeps.len() as u64,
+            "bimorph_kept_sessions" => shared.store.as_ref().map_or(0, |store| store.len() as u64),
+            "bimorph_kept_bytes" => shared.store.as_ref().map_or(0, |store| store.used() as u64),
+            "bimorph_log_lines_dropped_total" => log::dropped(),
+            _ => resident(),
+        };
+        let _ = writeln!(out, "{name} {value}");
+    }
+    out
+}
+
+/// Resident memory [byte], as Linux tells it; 0 elsewhere.
+fn resident() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"));
+    let kilobytes = line.and_then(|line| line.split_whitespace().next()).and_then(|word| word.parse::<u64>().ok());
+    kilobytes.unwrap_or(0) * 1024
+}
+
+/// What an overseer may ask for.
+#[derive(Clone)]
+pub(super) struct Overseen {
+    pub(super) shared: Arc<Shared>,
+    pub(super) gate: Arc<Gate>,
+}

@@ -1,0 +1,295 @@
+//! What a server is told: a table, and the places where it is said, each before the next: options of the command, the
+//! environment (`BIMORPH_SERVE_NAME`), a file, and what holds when nobody says anything.
+
+use super::access::read;
+use super::address::Address;
+use super::guard::GuardFiles;
+use super::limits::{LIMITS, Limits};
+use super::proto;
+use super::server::ServeOptions;
+use super::written::{File, Flag, Places, Written};
+use std::collections::BTreeMap;
+use std::net::{Ipv4Addr, SocketAddr};
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
+use thiserror::Error;
+
+/// Head of the names of environment variables.
+pub const ENVIRONMENT: &str = "BIMORPH_SERVE_";
+
+/// A setting beside the limits: what it is, and its field.
+pub struct Setting {
+    /// Name in files; with `-` for `_` an option of the command; in capitals after [`ENVIRONMENT`] a variable.
+    pub name: &'static str,
+    /// What is written for its value: `FILE`, `ADDRESS`; empty: yes or no.
+    pub place: &'static str,
+    /// What it means, in one sentence or two.
+    pub help: &'static str,
+    read: fn(&mut Settings, &str) -> Result<(), &'static str>,
+    write: fn(&Settings) -> String,
+}
+
+macro_rules! settings {
+    ($($(#[doc = $help:literal])+ $field:ident: $kind:ident = $default:expr;)+) => {
+        /// Everything that a server is told. `Default` is the only place where the values stand.
+        #[derive(Debug, Clone, PartialEq)]
+        pub struct Settings {
+            $($(#[doc = $help])+ pub $field: <$kind as Written>::Held,)+
+            /// The limits.
+            pub limits: Limits,
+            /// Who said what is not as nobody says.
+            sources: BTreeMap<&'static str, Source>,
+        }
+
+        impl Default for Settings {
+            fn default() -> Self {
+                Self { $($field: $default,)+ limits: Limits::default(), sources: BTreeMap::new() }
+            }
+        }
+
+        /// Every setting beside the limits, in the order of the documentation.
+        pub static SETTINGS: LazyLock<Vec<Setting>> = LazyLock::new(|| vec![$(Setting {
+            name: stringify!($field),
+            place: $kind::PLACE,
+            help: concat!($($help, "\n"),+),
+            read: |settings, text| $kind::read(text).map(|value| settings.$field = value),
+            write: |settings| $kind::write(&settings.$field),
+        }),+]);
+    };
+}
+
+settings! {
+    /// Where to listen: unix:///path or host:port. Repeated, or with commas between.
+    listen: Places = vec![Address::Tcp(SocketAddr::from((Ipv4Addr::LOCALHOST, 50051)))];
+
+    /// Certificate of this server and those up to its authority, PEM: every TCP address speaks TLS 1.3.
+    tls_cert: File = None;
+
+    /// Key of the certificate, PEM.
+    tls_key: File = None;
+
+    /// Authorities of clients, PEM: each client must have a certificate of one of them.
+    tls_client_ca: File = None;
+
+    /// Tokens, a line for each client, TOKEN or NAME TOKEN: every call over TCP must show one.
+    token_file: File = None;
+
+    /// Folder for accepted states of sessions, which then outlive the server: a client goes on where it was.
+    state_dir: File = None;
+
+    /// Do not wait for the disk when a state is kept: it outlives the end of the server, not that of the machine.
+    state_unsynced: Flag = false;
+
+    /// Allow addresses that other machines can reach, whoever may come and whoever may listen.
+    insecure: Flag = false;
+}
+
+/// Who said how a setting is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Source {
+    /// A file.
+    File,
+    /// A variable of the environment.
+    Environment,
+    /// An option of the command.
+    Option,
+}
+
+/// A setting that cannot be as it was said.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum SettingError {
+    /// There is no such setting.
+    #[error("{place}: there is no such setting; expected one of {known}")]
+    Unknown {
+        /// Where it is said.
+        place: String,
+        /// Those there are.
+        known: String,
+    },
+    /// It cannot have that value.
+    #[error("{place}: expected {expected}, got \"{got}\"")]
+    Value {
+        /// Where it is said.
+        place: String,
+        /// What it takes.
+        expected: String,
+        /// What it was given.
+        got: String,
+    },
+    /// A file that cannot be read, or is no TOML.
+    #[error("configuration {path}: {reason}", path = path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        reason: String,
+    },
+}
+
+impl Setting {
+    /// The name as an option of the command.
+    pub fn flag(&self) -> String {
+        self.name.replace('_', "-")
+    }
+}
+
+/// The variable of a setting or a limit.
+pub fn variable(name: &str) -> String {
+    format!("{ENVIRONMENT}{}", name.to_uppercase())
+}
+
+impl Settings {
+    /// Sets one by its name. What a stronger source has said stays.
+    ///
+    /// # Errors
+    /// [`SettingError`], which names `place`.
+    pub fn set(&mut self, name: &str, text: &str, source: Source, place: String) -> Result<(), SettingError> {
+        let value =
+            |place, expected: &str| SettingError::Value { place, expected: expected.to_owned(), got: text.to_owned() };
+        if let Some(setting) = SETTINGS.iter().find(|setting| setting.name == name) {
+            if self.yields(setting.name, source) {
+                (setting.read)(self, text).map_err(|expected| value(place, expected))?;
+            }
+            return Ok(());
+        }
+        let Some(limit) = LIMITS.iter().find(|limit| limit.name == name) else {
+            let known = SETTINGS.iter().map(|setting| setting.name).chain(LIMITS.iter().map(|limit| limit.name));
+            return Err(SettingError::Unknown { place, known: known.collect::<Vec<_>>().join(", ") });
+        };
+        if self.yields(limit.name, source) {
+            (limit.read)(&mut self.limits, text).map_err(|expected| value(place, expected))?;
+        }
+        Ok(())
+    }
+
+    /// Whether a setting takes what `source` says; then it is remembered.
+    fn yields(&mut self, name: &'static str, source: Source) -> bool {
+        let strongest = self.sources.entry(name).or_insert(source);
+        if source < *strongest {
+            return false;
+        }
+        *strongest = source;
+        true
+    }
+
+    /// Takes what variables say, those whose names begin with [`ENVIRONMENT`].
+    ///
+    /// # Errors
+    /// [`SettingError`].
+    pub fn read_environment(&mut self, variables: impl Iterator<Item = (String, String)>) -> Result<(), SettingError> {
+        for (variable, text) in variables {
+            let Some(name) = variable.strip_prefix(ENVIRONMENT).map(str::to_lowercase) else { continue };
+            if !text.is_empty() && name != "config" {
+                self.set(&name, &text, Source::Environment, variable)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes what a TOML file says: settings by name, limits in the table `limits`. Paths in it start from its folder.
+    ///
+    /// # Errors
+    /// [`SettingError`].
+    pub fn read_file(&mut self, path: &Path) -> Result<(), SettingError> {
+        let wrong = |reason: String| SettingError::File { path: path.to_owned(), reason };
+        let text = read(path).map_err(|error| wrong(error.to_string()))?;
+        let table: toml::Table = text.parse().map_err(|error: toml::de::Error| wrong(error.to_string()))?;
+        for (name, value) in &table {
+            match value {
+                toml::Value::Table(limits) if name == "limits" => {
+                    for (name, value) in limits.iter().filter(|(name, _)| is_limit(name)) {
+                        self.set_from_file(path, name, value)?;
+                    }
+                    if let Some((name, _)) = limits.iter().find(|(name, _)| !is_limit(name)) {
+                        let known = LIMITS.iter().map(|limit| limit.name).collect::<Vec<_>>().join(", ");
+                        return Err(SettingError::Unknown {
+                            place: format!("{}: limits.{name}", path.display()),
+                            known,
+                        });
+                    }
+                }
+                value if !is_limit(name) => self.set_from_file(path, name, value)?,
+                _ => return Err(wrong(format!("{name} is a limit: it belongs under [limits]"))),
+            }
+        }
+        Ok(())
+    }
+
+    fn set_from_file(&mut self, path: &Path, name: &str, value: &toml::Value) -> Result<(), SettingError> {
+        let place = format!("{}: {name}", path.display());
+        let word = |value: &toml::Value| match value {
+            toml::Value::String(text) => Some(text.clone()),
+            toml::Value::Integer(number) => Some(number.to_string()),
+            toml::Value::Float(number) => Some(number.to_string()),
+            toml::Value::Boolean(flag) => Some(flag.to_string()),
+            _ => None,
+        };
+        let text = match value {
+            toml::Value::Array(values) => {
+                values.iter().map(word).collect::<Option<Vec<_>>>().map(|words| words.join(","))
+            }
+            other => word(other),
+        };
+        let Some(text) = text else {
+            let expected = "a text, a number, true, false, or a list of texts".to_owned();
+            return Err(SettingError::Value { place, expected, got: value.type_str().to_owned() });
+        };
+        let is_path = SETTINGS.iter().any(|setting| setting.name == name && setting.place == File::PLACE);
+        let text = match path.parent() {
+            Some(folder) if is_path => folder.join(text).display().to_string(),
+            _ => text,
+        };
+        self.set(name, &text, Source::File, place)
+    }
+
+    /// The value of a setting as it is written; empty: none.
+    pub fn get(&self, setting: &Setting) -> String {
+        (setting.write)(self)
+    }
+
+    /// Every setting as it is written, and who said so. Paths are told as given or not.
+    pub(super) fn told(&self) -> Vec<proto::ServerSetting> {
+        let settings = SETTINGS.iter().map(|setting| {
+            let value = (setting.write)(self);
+            let hidden = setting.place == File::PLACE && !value.is_empty();
+            (setting.name, if hidden { "given".to_owned() } else { value })
+        });
+        let limits = LIMITS.iter().map(|limit| (limit.name, self.limits.get(limit)));
+        let source = |name| match self.sources.get(name) {
+            None => "default",
+            Some(Source::File) => "file",
+            Some(Source::Environment) => "environment",
+            Some(Source::Option) => "option",
+        };
+        let told = settings.chain(limits).map(|(name, value)| proto::ServerSetting {
+            name: name.to_owned(),
+            value,
+            source: source(name).to_owned(),
+        });
+        told.collect()
+    }
+
+    /// What a server needs to run so.
+    pub fn options(self) -> ServeOptions {
+        ServeOptions {
+            listen: self.listen.clone(),
+            guard: GuardFiles {
+                certificate: self.tls_cert.clone(),
+                key: self.tls_key.clone(),
+                client_authority: self.tls_client_ca.clone(),
+                token_file: self.token_file.clone(),
+            },
+            insecure: self.insecure,
+            limits: self.limits.clone(),
+            state_dir: self.state_dir.clone(),
+            state_unsynced: self.state_unsynced,
+            settings: Some(self),
+            ..ServeOptions::default()
+        }
+    }
+}
+
+fn is_limit(name: &str) -> bool {
+    LIMITS.iter().any(|limit| limit.name == name)
+}

@@ -1,0 +1,158 @@
+//! How what a server is told is written: whole numbers, bytes, times, files, addresses.
+
+use super::address::Address;
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// A way of writing a value.
+pub trait Written {
+    /// What is held.
+    type Held;
+    /// What is written in place of the value in help: `N`, `BYTES`.
+    const PLACE: &'static str;
+
+    /// Reads it.
+    ///
+    /// # Errors
+    /// What was expected.
+    fn read(text: &str) -> Result<Self::Held, &'static str>;
+
+    /// Writes it so that it reads back; empty: nothing.
+    fn write(held: &Self::Held) -> String;
+}
+
+fn whole(text: &str) -> Option<usize> {
+    text.parse().ok().filter(|n| *n > 0)
+}
+
+/// A whole number above 0.
+#[derive(Debug)]
+pub struct Count;
+
+impl Written for Count {
+    type Held = usize;
+    const PLACE: &'static str = "N";
+
+    fn read(text: &str) -> Result<usize, &'static str> {
+        whole(text).ok_or("a whole number above 0")
+    }
+
+    fn write(held: &usize) -> String {
+        held.to_string()
+    }
+}
+
+/// Bytes: a whole number above 0, with an optional k, M or G (times 1024).
+#[derive(Debug)]
+pub struct Bytes;
+
+impl Written for Bytes {
+    type Held = usize;
+    const PLACE: &'static str = "BYTES";
+
+    fn read(text: &str) -> Result<usize, &'static str> {
+        let (digits, shift) = match text.char_indices().last() {
+            Some((at, 'k')) => (&text[..at], 10),
+            Some((at, 'M')) => (&text[..at], 20),
+            Some((at, 'G')) => (&text[..at], 30),
+            _ => (text, 0),
+        };
+        whole(digits).and_then(|n| n.checked_mul(1 << shift)).ok_or("bytes above 0, as 1000000, 64M or 2G")
+    }
+
+    fn write(held: &usize) -> String {
+        let unit = [(30, "G"), (20, "M"), (10, "k")]
+            .into_iter()
+            .find(|(shift, _)| *held > 0 && held.is_multiple_of(1 << shift));
+        unit.map_or(held.to_string(), |(shift, unit)| format!("{}{unit}", held >> shift))
+    }
+}
+
+/// A time in seconds, above 0.
+#[derive(Debug)]
+pub struct Time;
+
+impl Written for Time {
+    type Held = Duration;
+    const PLACE: &'static str = "SECONDS";
+
+    fn read(text: &str) -> Result<Duration, &'static str> {
+        let seconds = text.parse::<f64>().ok().filter(|s| *s > 0.0 && *s <= 1e9);
+        seconds.map(Duration::from_secs_f64).ok_or("seconds above 0, at most 1e9")
+    }
+
+    fn write(held: &Duration) -> String {
+        held.as_secs_f64().to_string()
+    }
+}
+
+/// A path, or nothing.
+#[derive(Debug)]
+pub struct File;
+
+impl Written for File {
+    type Held = Option<PathBuf>;
+    const PLACE: &'static str = "FILE";
+
+    fn read(text: &str) -> Result<Option<PathBuf>, &'static str> {
+        if text.is_empty() { Err("a path") } else { Ok(Some(text.into())) }
+    }
+
+    fn write(held: &Option<PathBuf>) -> String {
+        held.as_ref().map_or(String::new(), |path| path.display().to_string())
+    }
+}
+
+/// An address, or nothing.
+#[derive(Debug)]
+pub struct Place;
+
+impl Written for Place {
+    type Held = Option<Address>;
+    const PLACE: &'static str = "ADDRESS";
+
+    fn read(text: &str) -> Result<Option<Address>, &'static str> {
+        text.parse().map(Some).map_err(|_| "host:port or unix:///path")
+    }
+
+    fn write(held: &Option<Address>) -> String {
+        held.as_ref().map_or(String::new(), Address::to_string)
+    }
+}
+
+/// Addresses, separated by commas.
+#[derive(Debug)]
+pub struct Places;
+
+impl Written for Places {
+    type Held = Vec<Address>;
+    const PLACE: &'static str = "ADDRESS";
+
+    fn read(text: &str) -> Result<Vec<Address>, &'static str> {
+        let read: Result<Vec<_>, _> = text.split(',').map(|place| place.trim().parse()).collect();
+        read.map_err(
+            |_| "unix:///path, host:port or https://host:port, of a host that is known; several with commas between",
+        )
+    }
+
+    fn write(held: &Vec<Address>) -> String {
+        held.iter().map(Address::to_string).collect::<Vec<_>>().join(",")
+    }
+}
+
+/// Yes or no.
+#[derive(Debug)]
+pub struct Flag;
+
+impl Written for Flag {
+    type Held = bool;
+    const PLACE: &'static str = "";
+
+    fn read(text: &str) -> Result<bool, &'static str> {
+        text.parse().map_err(|_| "true or false")
+    }
+
+    fn write(held: &bool) -> String {
+        held.to_string()
+    }
+}

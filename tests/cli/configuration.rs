@@ -1,0 +1,147 @@
+//! What a server is told: options before the environment before a file; `Info` shows it, and docs/service.md has every setting.
+
+use crate::bench::Bench;
+use crate::serving::Server;
+use bimorph::service::limits::{LIMITS, Limits};
+use bimorph::service::proto;
+use bimorph::service::settings::{SETTINGS, Settings, variable};
+use proto::bimorph_client::BimorphClient;
+use std::collections::BTreeMap;
+use tonic::transport::Endpoint;
+
+const FILE: &str = "listen = [\"127.0.0.1:0\"]\ntoken_file = \"keys/tokens\"\n\n[limits]\nsessions = 3\nmodels = 4\nmemory = \"64M\"\nidle = 1.5\n";
+
+/// The settings of a server as `Info` tells them: value and source by name.
+fn told(address: &str) -> BTreeMap<String, (String, String)> {
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a runtime");
+    let info = runtime.block_on(async {
+        let endpoint = Endpoint::from_shared(address.to_owned()).expect("a uri");
+        let mut client = BimorphClient::new(endpoint.connect().await.expect("connects"));
+        client.info(proto::InfoRequest {}).await.expect("an answer").into_inner()
+    });
+    info.settings.into_iter().map(|setting| (setting.name, (setting.value, setting.source))).collect()
+}
+
+/// Each voice is heard where a stronger one is silent; paths of a file start from its folder; and `Info` shows every setting of
+/// the table, which says who said so.
+#[test]
+fn options_before_the_environment_before_a_file() {
+    let bench = Bench::new(&[]);
+    let folder = bench.path("etc/keys");
+    std::fs::create_dir_all(&folder).expect("made");
+    std::fs::write(folder.join("tokens"), "0123456789abcdef\n").expect("written");
+    std::fs::write(bench.path("etc/serve.toml"), FILE).expect("written");
+    let socket = format!("unix://{}", bench.path("s").display());
+    let mut command = bench.command(&format!("serve --listen {socket} --limit models=6"));
+    command.env("BIMORPH_SERVE_CONFIG", "etc/serve.toml").env("BIMORPH_SERVE_MODELS", "5");
+    command.env("BIMORPH_SERVE_SESSIONS", "7").env("BIMORPH_SERVE_LISTEN", "127.0.0.1:1").env("BIMORPH_SERVE_IDLE", "");
+    let server = Server::spawn(command);
+    let told = told(&server.address);
+    let names: Vec<&str> = SETTINGS.iter().map(|s| s.name).chain(LIMITS.iter().map(|l| l.name)).collect();
+    assert_eq!(told.len(), names.len());
+    for (name, value, source) in [
+        ("listen", socket.as_str(), "option"),
+        ("models", "6", "option"),
+        ("sessions", "7", "environment"),
+        ("memory", "64M", "file"),
+        ("idle", "1.5", "file"),
+        ("token_file", "given", "file"),
+        ("tls_cert", "", "default"),
+        ("message_bytes", "64M", "default"),
+    ] {
+        assert_eq!(told[name], (value.to_owned(), source.to_owned()), "{name}");
+    }
+}
+
+/// What means nothing is refused with its place and what was expected, before anything is listened on.
+#[test]
+fn mistakes_are_named_by_place() {
+    let bench = Bench::new(&[
+        ("unknown.toml", "listens = \"127.0.0.1:0\"\n"),
+        ("limit.toml", "[limits]\nsession = 3\n"),
+        ("misplaced.toml", "sessions = 3\n"),
+        ("value.toml", "[limits]\nmemory = \"much\"\n"),
+        ("kind.toml", "listen = { a = 1 }\n"),
+        ("broken.toml", "listen = [\n"),
+    ]);
+    for (options, variable, said) in [
+        (
+            "--config unknown.toml",
+            None,
+            "unknown.toml: listens: there is no such setting; expected one of listen, tls_cert",
+        ),
+        ("--config limit.toml", None, "limit.toml: limits.session: there is no such setting"),
+        ("--config misplaced.toml", None, "belongs under [limits]"),
+        (
+            "--config value.toml",
+            None,
+            "value.toml: memory: expected bytes above 0, as 1000000, 64M or 2G, got \"much\"",
+        ),
+        ("--config kind.toml", None, "kind.toml: listen: expected a text"),
+        ("--config broken.toml", None, "configuration broken.toml: "),
+        ("--config nosuch.toml", None, "configuration nosuch.toml: "),
+        ("", Some(("BIMORPH_SERVE_SESION", "3")), "BIMORPH_SERVE_SESION: there is no such setting"),
+        ("", Some(("BIMORPH_SERVE_INSECURE", "yes")), "BIMORPH_SERVE_INSECURE: expected true or false, got \"yes\""),
+        ("--limit sessions=none", None, "--limit sessions: expected a whole number above 0, got \"none\""),
+        ("--max-sessions 0", None, "--max-sessions: expected a whole number above 0"),
+        ("--listen nowhere", None, "--listen: expected unix:///path, host:port"),
+    ] {
+        let mut command = bench.command(&format!("serve {options}"));
+        command.envs(variable);
+        let ran = command.output().expect("it runs");
+        let stderr = String::from_utf8_lossy(&ran.stderr);
+        assert_eq!(ran.status.code(), Some(1), "{options}: {stderr}");
+        assert!(stderr.contains(said), "{options}: expected \"{said}\", got \"{stderr}\"");
+    }
+}
+
+fn one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+fn settings_rows() -> String {
+    let defaults = Settings::default();
+    let mut text = String::from("| in files | option | environment | default | meaning |\n|---|---|---|---|---|\n");
+    for setting in SETTINGS.iter() {
+        let (name, place) = (setting.name, setting.place);
+        let option = format!("--{} {place}", setting.flag());
+        let default = defaults.get(setting);
+        let default = if default.is_empty() { "–".to_owned() } else { format!("`{default}`") };
+        let row = format!("| `{name}` | `{}` | `{}` | {default} |", option.trim_end(), variable(name));
+        text += &format!("{row} {} |\n", one_line(setting.help));
+    }
+    text
+}
+
+fn limits_rows() -> String {
+    let defaults = Limits::default();
+    let mut text = String::from("| limit | default | written as | meaning |\n|---|---|---|---|\n");
+    for limit in LIMITS.iter() {
+        // what depends on the machine is said in words
+        let default = if limit.name == "analyses" { "cores".to_owned() } else { defaults.get(limit) };
+        text += &format!("| `{}` | {default} | {} | {} |\n", limit.name, limit.place, one_line(limit.help));
+    }
+    text
+}
+
+/// The tables of docs/service.md are written from those of the program: `BIMORPH_WRITE=1 cargo test --test cli documented` does so.
+#[test]
+fn documented() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/service.md");
+    let mut text = std::fs::read_to_string(path).expect("the page");
+    for (first, last, want) in [
+        ("<!-- settings -->\n", "<!-- end of settings -->", settings_rows()),
+        ("<!-- limits -->\n", "<!-- end of limits -->", limits_rows()),
+    ] {
+        let start = text.find(first).unwrap_or_else(|| panic!("no {first}")) + first.len();
+        let end = start + text[start..].find(last).unwrap_or_else(|| panic!("no {last}"));
+        if std::env::var_os("BIMORPH_WRITE").is_some() {
+            text.replace_range(start..end, &want);
+        } else {
+            assert_eq!(&text[start..end], want, "run BIMORPH_WRITE=1 cargo test --test cli documented");
+        }
+    }
+    if std::env::var_os("BIMORPH_WRITE").is_some() {
+        std::fs::write(path, text).expect("written");
+    }
+}
