@@ -2,6 +2,7 @@
 
 use super::failure::Failure;
 use super::output::print;
+use super::serve::Told;
 use bimorph::analysis::statics::static_equilibrium;
 use bimorph::compile::{CompileOptions, Junctions, compile};
 use bimorph::cosim::{self, CosimOptions, find_ngspice, find_plugin};
@@ -10,18 +11,25 @@ use bimorph::results::raw;
 use bimorph::service::address::Address;
 use bimorph::service::client::Client;
 use bimorph::service::server::{self, ServeOptions};
+use bimorph::service::settings::Settings;
+use bimorph::service::{guard, store};
 use clap::Args;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::mpsc;
 use std::time::Duration;
 
 /// Check what is installed and what works: the core, ngspice, the plug-in, a server, the Python client.
 ///
-/// Exit status 0 when the core works; the other lines say what is missing and what to do.
+/// Exit status 0 when the core works; the other lines say what is missing and what to do. Of a server that is told its settings
+/// by a file or the environment (BIMORPH_SERVE_NAME), certificate, key, tokens and folder of states must be good, too.
 #[derive(Debug, Args)]
-#[command(after_help = "Example:\n  bimorph doctor")]
-pub(crate) struct Doctor {}
+#[command(after_help = "Examples:\n  bimorph doctor\n  bimorph doctor --config /etc/bimorph/serve.toml")]
+pub(crate) struct Doctor {
+    /// File of settings of a server, TOML
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+}
 
 /// A cantilever of 100 µm x 2 µm x 2 µm under 1 µN at its tip.
 const CANTILEVER: &str = "process p = [Youngsmodulus=165e9 Poisson=0.3 density=2300 viscosity=0 fluid=2u h=2u]\n\
@@ -51,7 +59,29 @@ impl Doctor {
         line("plug-in", &plugin(), "build it: cargo build --release -p bimorph-ngspice, or name it in BIMORPH_CM")?;
         line("server", &server(), "check that sockets can be made in the temporary folder")?;
         line("python", &python(), "install the client: pip install ./clients/python")?;
-        core.map(|_| ()).map_err(|_| Failure::Doctor)
+        core.map(|_| ()).map_err(|_| Failure::Doctor)?;
+        self.settings()
+    }
+
+    /// What a server with these settings would find.
+    fn settings(&self) -> Result<(), Failure> {
+        let settings = Told::of(self.config.clone()).settings()?;
+        if settings == Settings::default() {
+            return Ok(());
+        }
+        let options = settings.options();
+        let found = guard::look_at(&options.guard).map_err(|error| error.to_string()).map(|found| match found {
+            found if found.is_empty() => "nobody is asked for anything".to_owned(),
+            found => found.join("; "),
+        });
+        line("access", &found, "docs/service.md says what a server asks of its clients, and of its files")?;
+        let mut good = found.is_ok();
+        if let Some(folder) = &options.state_dir {
+            let found = store::look_at(folder).map_err(|error| error.to_string());
+            good &= found.is_ok();
+            line("states", &found, "name a folder of this server's own in state_dir, which its user can write")?;
+        }
+        if good { Ok(()) } else { Err(Failure::Settings) }
     }
 }
 

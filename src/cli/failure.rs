@@ -50,6 +50,8 @@ pub(crate) enum Failure {
     AllRuns(String),
     #[error("the core does not work on this machine; see the lines marked missing")]
     Doctor,
+    #[error("a server with these settings does not start; see the lines marked missing")]
+    Settings,
     #[error("--{}: expected {}, got {}", .0.option.replace('_', "-"), .0.expected, .0.got)]
     Option(#[from] Refused),
     #[error(transparent)]

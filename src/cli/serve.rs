@@ -30,12 +30,16 @@ pub(crate) struct Serve {
 
 impl Serve {
     pub(crate) fn run(&self) -> Result<(), Failure> {
-        let ready = |addresses: &[Address]| {
-            for address in addresses {
-                log::line(&format!("listening on {address}"));
+        let options = self.told.settings()?.options();
+        let calls = options.listen.len();
+        let ready = move |addresses: &[Address]| {
+            for (k, address) in addresses.iter().enumerate() {
+                match k < calls {
+                    true => log::line(&format!("listening on {address}")),
+                    false => log::line(&format!("metrics on http://{address}/metrics")),
+                }
             }
         };
-        let options = self.told.settings()?.options();
         Ok(run_until_signal(ServeOptions { while_stdin: self.while_stdin, ready: Box::new(ready), ..options })?)
     }
 }
@@ -58,6 +62,11 @@ const SHORT: [(&str, &str, &str); 2] = [
 ];
 
 impl Told {
+    /// What a file and the environment say, without options.
+    pub(crate) fn of(config: Option<PathBuf>) -> Self {
+        Self { config, given: Vec::new() }
+    }
+
     /// Everything that was said, the strongest voice first heard.
     pub(crate) fn settings(&self) -> Result<Settings, Failure> {
         let mut settings = Settings::default();

@@ -166,6 +166,12 @@ impl Connections {
         presence
     }
 
+    /// Connections open.
+    pub(super) fn open(&self) -> usize {
+        let open = self.open.lock().unwrap_or_else(PoisonError::into_inner);
+        open.iter().filter(|presence| presence.strong_count() > 0).count()
+    }
+
     /// A connection over TCP in a place, once it is known how its client speaks; none when that fails, or takes longer than
     /// a handshake may.
     pub(super) async fn tcp(

@@ -3,11 +3,12 @@
 //! A Unix socket asks for nothing: its mode lets in its owner alone.
 
 use super::connection::{Presence, Who};
-use super::tls::{ALPN, Pair, PemError, authorities, provider};
+use super::tls::{ALPN, Pair, PemError, authorities, certificates, provider, validity};
 use super::tokens::{TokenError, Tokens, is_open, sha256};
 use std::io;
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::{SystemTime, UNIX_EPOCH};
 use thiserror::Error;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
@@ -55,6 +56,41 @@ pub enum GuardError {
         /// What is wrong.
         reason: String,
     },
+}
+
+/// What a server would find in its files: a line for each, in words.
+///
+/// # Errors
+/// [`GuardError`].
+pub fn look_at(files: &GuardFiles) -> Result<Vec<String>, GuardError> {
+    let guard = Guard::read(files)?;
+    let mut found = Vec::new();
+    if let Some(path) = &files.certificate {
+        let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs();
+        let times = certificates("certificate", path)?.first().and_then(|certificate| validity(certificate));
+        let days = |seconds: u64| seconds / 86_400;
+        found.push(match times {
+            Some([_, until]) if until <= now => {
+                let reason = format!("it has expired {} days ago; get a new one", days(now - until));
+                return Err(GuardError::Refused { path: path.clone(), reason });
+            }
+            Some([from, _]) if from > now => {
+                let reason = format!("it holds in {} days only; is the clock right?", days(from - now) + 1);
+                return Err(GuardError::Refused { path: path.clone(), reason });
+            }
+            Some([_, until]) => format!("certificate for {} more days", days(until - now)),
+            None => "a certificate".to_owned(),
+        });
+    }
+    if guard.certified {
+        found.push("clients show certificates".to_owned());
+    }
+    if let Some(tokens) = &guard.tokens {
+        found.push(format!("{} tokens", tokens.len()));
+    }
+    let open = [&files.key, &files.token_file].into_iter().flatten().filter(|file| is_open(file));
+    found.extend(open.map(|file| format!("others can read {}: chmod 600", file.display())));
+    Ok(found)
 }
 
 /// What is asked of clients.

@@ -8,7 +8,9 @@
 
 use super::connection::Presence;
 use super::guard::Guard;
+use super::ids::Ids;
 use super::limits::Limits;
+use super::metrics::{self, Metrics};
 use super::status;
 use super::turns::CLIENT;
 use http_body::{Frame, SizeHint};
@@ -16,14 +18,15 @@ use std::convert::Infallible;
 use std::future::Future;
 use std::pin::Pin;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicI32, AtomicU64, AtomicUsize, Ordering};
 use std::task::{Context, Poll};
-use std::time::Duration;
+use std::time::{Duration, Instant as Moment};
 use tokio::time::{Instant, Sleep};
 use tonic::body::Body;
 use tonic::codegen::{Bytes, Service, http};
 use tonic::server::NamedService;
 use tonic::{Code, Status};
+use tracing::{Instrument, Span};
 
 /// Calls whose requests are streams: silence between two messages is no pause.
 const STREAMS: [&str; 2] = ["/Trial", "/ServerReflectionInfo"];
@@ -36,13 +39,23 @@ pub(super) struct Gate {
     most_held: usize,
     pause: Duration,
     guard: Arc<Guard>,
+    metrics: Arc<Metrics>,
+    /// What requests of this server are called, before their number.
+    name: String,
+    requests: AtomicU64,
 }
+
+/// Header with the name of a request, which the client may choose.
+const REQUEST_ID: &str = "x-request-id";
+/// Longest name that is taken from a client.
+const LONGEST_ID: usize = 64;
 
 /// A service without tokens: who watches over servers has none.
 const OPEN: &str = "grpc.health.v1.Health";
 
 impl Gate {
-    pub(super) fn new(limits: &Limits, guard: Arc<Guard>) -> Arc<Self> {
+    pub(super) fn new(limits: &Limits, guard: Arc<Guard>, metrics: Arc<Metrics>) -> Arc<Self> {
+        let name = Ids::default().make().map_or_else(|_| "request".to_owned(), |id| id[..8].to_owned());
         Arc::new(Self {
             calls: AtomicUsize::new(0),
             held: AtomicUsize::new(0),
@@ -50,19 +63,61 @@ impl Gate {
             most_held: limits.held_bytes,
             pause: limits.request_pause,
             guard,
+            metrics,
+            name,
+            requests: AtomicU64::new(1),
         })
     }
 
-    fn enter(self: &Arc<Self>, presence: Option<Arc<Presence>>) -> Result<Call, Status> {
-        let call = Call { gate: Arc::clone(self), presence, held: AtomicUsize::new(0) };
+    /// Calls under way.
+    pub(super) fn calls(&self) -> usize {
+        self.calls.load(Ordering::Relaxed)
+    }
+
+    /// Bytes of requests that are held.
+    pub(super) fn held(&self) -> usize {
+        self.held.load(Ordering::Relaxed)
+    }
+
+    /// The name of a request: the client's, or the next one of this server.
+    fn request_id(&self, headers: &http::HeaderMap) -> http::HeaderValue {
+        let is_name = |value: &&http::HeaderValue| {
+            (1..=LONGEST_ID).contains(&value.len()) && value.as_bytes().iter().all(u8::is_ascii_graphic)
+        };
+        headers.get(REQUEST_ID).filter(is_name).cloned().unwrap_or_else(|| {
+            let number = self.requests.fetch_add(1, Ordering::Relaxed);
+            let name = http::HeaderValue::try_from(format!("{}-{number}", self.name));
+            name.unwrap_or(http::HeaderValue::from_static("request"))
+        })
+    }
+
+    fn enter(self: &Arc<Self>, presence: Option<Arc<Presence>>, path: &str) -> Call {
+        let call = Call {
+            gate: Arc::clone(self),
+            presence,
+            held: AtomicUsize::new(0),
+            place: metrics::place(path),
+            started: Moment::now(),
+            // of who goes away before the end
+            code: AtomicI32::new(Code::Cancelled as i32),
+        };
         if let Some(presence) = &call.presence {
             presence.begin();
         }
         // from here the call gives back what it took when it is dropped
-        if self.calls.fetch_add(1, Ordering::Relaxed) >= self.most_calls {
+        self.calls.fetch_add(1, Ordering::Relaxed);
+        call
+    }
+
+    /// Whether a call may go on, and whose it is.
+    fn admit(&self, call: &Call, request: &http::Request<Body>, open: bool) -> Result<String, Status> {
+        if self.calls() > self.most_calls {
             return Err(status::limit("calls", self.most_calls, "one more; end some"));
         }
-        Ok(call)
+        match &call.presence {
+            Some(presence) if !open => Ok(self.guard.admit(presence, request.headers())?.to_string()),
+            _ => Ok("unknown".to_owned()),
+        }
     }
 }
 
@@ -71,9 +126,22 @@ struct Call {
     gate: Arc<Gate>,
     presence: Option<Arc<Presence>>,
     held: AtomicUsize,
+    /// Its place among the calls that are counted.
+    place: usize,
+    started: Moment,
+    /// How it ended.
+    code: AtomicI32,
 }
 
 impl Call {
+    /// Takes note of the code in headers or trailers.
+    fn hear(&self, headers: &http::HeaderMap) {
+        let code = headers.get("grpc-status").and_then(|value| value.to_str().ok()).and_then(|text| text.parse().ok());
+        if let Some(code) = code {
+            self.code.store(code, Ordering::Relaxed);
+        }
+    }
+
     fn hold(&self, bytes: usize) -> Result<(), Status> {
         self.held.fetch_add(bytes, Ordering::Relaxed);
         let held = self.gate.held.fetch_add(bytes, Ordering::Relaxed) + bytes;
@@ -93,6 +161,8 @@ impl Drop for Call {
     fn drop(&mut self) {
         self.release();
         self.gate.calls.fetch_sub(1, Ordering::Relaxed);
+        let (code, time) = (Code::from_i32(self.code.load(Ordering::Relaxed)), self.started.elapsed());
+        self.gate.metrics.ended(self.place, code, time);
         if let Some(presence) = &self.presence {
             presence.end();
         }
@@ -132,24 +202,35 @@ where
     }
 
     fn call(&mut self, request: http::Request<Body>) -> Answer {
-        let call = match self.gate.enter(request.extensions().get::<Arc<Presence>>().cloned()) {
-            Ok(call) => Arc::new(call),
-            Err(status) => return Box::pin(std::future::ready(Ok(status.into_http()))),
-        };
-        if S::NAME != OPEN
-            && let Some(presence) = &call.presence
-            && let Err(status) = self.gate.guard.admit(presence, request.headers())
-        {
-            tracing::warn!(call = request.uri().path(), reason = status.message(), "refused");
-            return Box::pin(std::future::ready(Ok(status.into_http())));
+        let call = Arc::new(self.gate.enter(request.extensions().get().cloned(), request.uri().path()));
+        let id = self.gate.request_id(request.headers());
+        let admitted = self.gate.admit(&call, &request, S::NAME == OPEN);
+        let name = metrics::name(call.place);
+        let span = tracing::error_span!(
+            "request",
+            id = id.to_str().unwrap_or_default(),
+            call = name,
+            client = admitted.as_deref().unwrap_or("refused"),
+        );
+        if let Err(status) = admitted {
+            span.in_scope(|| tracing::warn!(reason = status.message(), "refused"));
+            call.code.store(status.code() as i32, Ordering::Relaxed);
+            let mut response = status.into_http();
+            response.headers_mut().insert(REQUEST_ID, id);
+            return Box::pin(std::future::ready(Ok(response)));
         }
         let stream = STREAMS.iter().any(|name| request.uri().path().ends_with(name));
         let client = call.presence.as_ref().map_or(0, |presence| presence.number());
         let received = Arc::clone(&call);
         let request = request
             .map(|body| Body::new(Received { body, call: received, framing: Framing::default(), stream, pause: None }));
-        let answer = CLIENT.scope(client, self.service.call(request));
-        Box::pin(async move { Ok(answer.await?.map(|body| Body::new(Answering { body, _call: call }))) })
+        let answer = CLIENT.scope(client, self.service.call(request)).instrument(span.clone());
+        Box::pin(async move {
+            let mut response = answer.await?;
+            response.headers_mut().insert(REQUEST_ID, id);
+            call.hear(response.headers());
+            Ok(response.map(|body| Body::new(Answering { body, call, span })))
+        })
     }
 }
 
@@ -209,7 +290,16 @@ impl http_body::Body for Received {
 /// The body of an answer; the call is over when it is dropped.
 struct Answering {
     body: Body,
-    _call: Arc<Call>,
+    call: Arc<Call>,
+    span: Span,
+}
+
+impl Drop for Answering {
+    fn drop(&mut self) {
+        let code = Code::from_i32(self.call.code.load(Ordering::Relaxed));
+        let ms = self.call.started.elapsed().as_secs_f64() * 1e3;
+        self.span.in_scope(|| tracing::info!(?code, ms, "answered"));
+    }
 }
 
 impl http_body::Body for Answering {
@@ -217,7 +307,14 @@ impl http_body::Body for Answering {
     type Error = Status;
 
     fn poll_frame(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<Option<Result<Frame<Bytes>, Status>>> {
-        Pin::new(&mut self.body).poll_frame(cx)
+        let this = &mut *self;
+        let frame = this.span.in_scope(|| Pin::new(&mut this.body).poll_frame(cx));
+        if let Poll::Ready(Some(Ok(frame))) = &frame
+            && let Some(trailers) = frame.trailers_ref()
+        {
+            this.call.hear(trailers);
+        }
+        frame
     }
 
     fn is_end_stream(&self) -> bool {

@@ -5,7 +5,7 @@
 
 use std::io::{self, Write};
 use std::sync::OnceLock;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::time::Duration;
 
@@ -13,7 +13,10 @@ use std::time::Duration;
 const QUEUE: usize = 1024;
 
 static LINES: OnceLock<SyncSender<Item>> = OnceLock::new();
+/// Lines dropped since the last that was written.
 static DROPPED: AtomicUsize = AtomicUsize::new(0);
+/// Lines dropped in all.
+static LOST: AtomicU64 = AtomicU64::new(0);
 
 enum Item {
     Text(Vec<u8>),
@@ -24,6 +27,11 @@ enum Item {
 /// Says one line, without waiting.
 pub fn line(text: &str) {
     Lines.put(format!("{text}\n").into_bytes());
+}
+
+/// Lines that nobody read in time.
+pub(super) fn dropped() -> u64 {
+    LOST.load(Ordering::Relaxed)
 }
 
 /// Waits until the lines so far are written, but no longer than `most`.
@@ -42,6 +50,7 @@ impl Lines {
     fn put(self, text: Vec<u8>) {
         if queue().try_send(Item::Text(text)).is_err() {
             DROPPED.fetch_add(1, Ordering::Relaxed);
+            LOST.fetch_add(1, Ordering::Relaxed);
         }
     }
 }

@@ -195,7 +195,8 @@ pub(super) fn text(shared: &Shared, gate: &Gate) -> String {
                 continue;
             }
             "bimorph_waiting" => {
-                for (what, work) in [("analyses", &shared.work), ("openings", &shared.desk), ("trials", &shared.trials)] {
+                for (what, work) in [("analyses", &shared.work), ("openings", &shared.desk), ("trials", &shared.trials)]
+                {
                     let _ = writeln!(out, "bimorph_waiting{{for=\"{what}\"}} {}", work.waiting());
                 }
                 continue;

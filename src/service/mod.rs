@@ -30,7 +30,11 @@ pub mod limits;
 #[cfg(feature = "server")]
 pub mod log;
 #[cfg(feature = "server")]
+pub mod metrics;
+#[cfg(feature = "server")]
 mod models;
+#[cfg(feature = "server")]
+mod overseer;
 #[cfg(feature = "server")]
 mod rpc;
 #[cfg(feature = "server")]

@@ -61,6 +61,11 @@ impl Models {
         self.find(id).ok_or_else(|| status::not_found("model", id))
     }
 
+    /// Models kept.
+    pub(super) fn len(&self) -> usize {
+        self.kept.lock().unwrap_or_else(PoisonError::into_inner).models.len()
+    }
+
     fn find(&self, id: &str) -> Option<Arc<Model>> {
         let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         kept.requests += 1;

@@ -1,10 +1,12 @@
 //! The calls of `service.proto`: check, look up, compute, convert.
 
 use super::chunks::{HEARTBEAT, Outlet, TableStream, send_transient};
+use super::connection::Connections;
 use super::convert::{
     self, Violation, analysis as results, model as text, options as options_wire, sweep as sweeps_wire,
 };
 use super::limits::Limits;
+use super::metrics::Metrics;
 use super::models::{Model, Models, check_size};
 use super::server::MakeDevice;
 use super::sessions::{Question, Session, Sessions};
@@ -41,6 +43,8 @@ pub(super) struct Shared {
     pub(super) models: Models,
     pub(super) sessions: Sessions,
     pub(super) sweeps: Sweeps,
+    pub(super) connections: Arc<Connections>,
+    pub(super) metrics: Arc<Metrics>,
     /// States that outlive the server.
     pub(super) store: Option<Arc<Store>>,
     /// Places for analyses, which may take long.
@@ -275,7 +279,15 @@ impl proto::bimorph_server::Bimorph for Calls {
             let forgotten = forgotten.await;
             return forgotten.map(|()| Response::new(proto::CloseResponse {}));
         }
-        if self.0.sessions.close(id) { Ok(Response::new(proto::CloseResponse {})) } else { Err(gone(id)) }
+        let Some(session) = self.0.sessions.close(id) else { return Err(gone(id)) };
+        if self.0.store.is_some() {
+            let forget = move || {
+                session.forget();
+                Ok(())
+            };
+            self.0.desk.run(forget).await?;
+        }
+        Ok(Response::new(proto::CloseResponse {}))
     }
 
     async fn r#static(&self, request: Request<proto::StaticRequest>) -> Reply<proto::StaticResponse> {

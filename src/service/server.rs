@@ -6,7 +6,9 @@ use super::guard::{Guard, GuardError, GuardFiles};
 use super::intake::{Gate, Intake};
 use super::limits::Limits;
 use super::log::{self, Lines};
+use super::metrics::{Overseen, busy};
 use super::models::Models;
+use super::overseer;
 use super::proto::{DESCRIPTORS, bimorph_server::BimorphServer};
 use super::rpc::{Calls, Shared};
 use super::sessions::Sessions;
@@ -28,12 +30,18 @@ use thiserror::Error;
 use tokio::sync::{Semaphore, mpsc};
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::transport::Server;
+use tonic_health::ServingStatus;
+use tonic_health::server::HealthReporter;
 use tracing_subscriber::filter::{LevelFilter, Targets};
 use tracing_subscriber::layer::SubscriberExt;
 use tracing_subscriber::util::SubscriberInitExt;
 
 /// Bytes that a client may send ahead of what was read, over all streams of its connection.
 const CONNECTION_WINDOW: u32 = 256 << 10;
+/// The name under which the health service tells whether a server is ready for more.
+const READY: &str = "ready";
+/// Time between two looks whether it is.
+const LOOK: Duration = Duration::from_millis(250);
 /// How long the last log lines may take to be written.
 const LAST_WORDS: Duration = Duration::from_millis(200);
 
@@ -47,6 +55,10 @@ pub struct ServeOptions {
     pub insecure: bool,
     /// What clients may ask for.
     pub limits: Limits,
+    /// Address of metrics and readiness (HTTP/1.1, TCP): `/metrics`, `/ready`, `/live`; none: nowhere.
+    pub metrics: Option<Address>,
+    /// Log as JSON, an object a line.
+    pub log_json: bool,
     /// Where accepted states are kept, to outlive the server; none: nowhere.
     pub state_dir: Option<PathBuf>,
     /// Do not wait for the disk: states outlive the server, not the machine.
@@ -56,7 +68,7 @@ pub struct ServeOptions {
     /// Whether [`run_until_signal`] also ends when standard input does: a program that starts a server for itself holds the
     /// other end of a pipe, which the system closes however that program ends.
     pub while_stdin: bool,
-    /// Called once, when every address accepts connections, with the addresses as bound (port 0 replaced).
+    /// Called once, when every address accepts connections, with the addresses as bound (port 0 replaced), that of metrics last.
     pub ready: Ready,
 }
 
@@ -73,6 +85,8 @@ impl Default for ServeOptions {
             guard: GuardFiles::default(),
             insecure: false,
             limits: Limits::default(),
+            metrics: None,
+            log_json: false,
             state_dir: None,
             state_unsynced: false,
             settings: None,
@@ -102,6 +116,12 @@ pub enum ServeError {
     /// An `https://` address without a certificate.
     #[error("{address} asks for TLS, which takes a certificate and its key: --tls-cert and --tls-key")]
     NoTls {
+        /// The address.
+        address: Address,
+    },
+    /// Metrics over something else than TCP.
+    #[error("--metrics {address}: expected host:port, which is plain HTTP")]
+    Metrics {
         /// The address.
         address: Address,
     },
@@ -156,8 +176,19 @@ pub async fn run_with(
     make: MakeDevice,
     shutdown: impl Future<Output = ()> + Send,
 ) -> Result<(), ServeError> {
-    let ServeOptions { listen, guard, insecure, limits, state_dir, state_unsynced, settings, ready, while_stdin: _ } =
-        options;
+    let ServeOptions {
+        listen,
+        guard,
+        insecure,
+        limits,
+        metrics,
+        log_json: _,
+        state_dir,
+        state_unsynced,
+        settings,
+        ready,
+        while_stdin: _,
+    } = options;
     if listen.is_empty() {
         return Err(ServeError::NoAddress);
     }
@@ -168,7 +199,15 @@ pub async fn run_with(
     for address in &listen {
         listeners.push(Listener::bind(address, insecure, &guard).await?);
     }
-    let bound: Vec<Address> = listeners.iter().map(Listener::address).collect();
+    let mut bound: Vec<Address> = listeners.iter().map(Listener::address).collect();
+    let overseer = match &metrics {
+        Some(address) => {
+            let (listener, address) = overseer::bind(address).await?;
+            bound.push(address);
+            Some(listener)
+        }
+        None => None,
+    };
     let signals = Shutdown::default();
     let (sender, incoming) = mpsc::channel(16);
     let connections = Arc::new(Connections::new(&limits, &signals.cutting));
@@ -190,6 +229,8 @@ pub async fn run_with(
         sessions: Sessions::default(),
         sweeps: Sweeps::new(),
         store,
+        connections,
+        metrics: Arc::default(),
         shutdown: signals.clone(),
     });
     let calls = BimorphServer::new(Calls(Arc::clone(&shared)))
@@ -202,7 +243,7 @@ pub async fn run_with(
             .register_encoded_file_descriptor_set(DESCRIPTORS)
             .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
     };
-    let gate = Gate::new(&shared.limits, guard);
+    let gate = Gate::new(&shared.limits, guard, Arc::clone(&shared.metrics));
     let reflection = |error: &dyn Fn(&dyn std::error::Error) -> ServeError| {
         let v1 = reflection().build_v1().map_err(|e| error(&e))?;
         let v1alpha = reflection().build_v1alpha().map_err(|e| error(&e))?;
@@ -221,13 +262,18 @@ pub async fn run_with(
             .serve_with_incoming_shutdown(ReceiverStream::new(incoming), signals.draining.clone().cancelled_owned())
     );
     let expiry = tokio::spawn(expire(Arc::clone(&shared)));
+    let overseen = Overseen { shared: Arc::clone(&shared), gate };
+    let watching = tokio::spawn(watch_over(health.clone(), overseen.clone()));
+    let overseer = overseer.map(|listener| tokio::spawn(overseer::answer(listener, overseen)));
     ready(&bound);
 
     let served = tokio::select! {
         served = &mut serving => Some(served),
         () = shutdown => None,
     };
+    watching.abort();
     health.set_not_serving::<BimorphServer<Calls>>().await;
+    health.set_service_status(READY, ServingStatus::NotServing).await;
     tracing::info!(open = shared.sessions.len(), "stopping");
     signals.draining.cancel();
     shared.sweeps.cancel_all();
@@ -244,6 +290,9 @@ pub async fn run_with(
         ended = tokio::time::timeout(GRACE, &mut serving).await.ok();
     }
     expiry.abort();
+    if let Some(overseer) = overseer {
+        overseer.abort();
+    }
     ended.unwrap_or(Ok(())).map_err(|error| transport(&error))
 }
 
@@ -259,8 +308,11 @@ pub fn run_until_signal(options: ServeOptions) -> Result<(), ServeError> {
     let filter = wanted.unwrap_or_else(|| Targets::new().with_default(LevelFilter::WARN));
     // A host program that logs already goes on as it does.
     let ansi = std::io::stderr().is_terminal();
-    let log = tracing_subscriber::fmt().with_max_level(LevelFilter::TRACE).with_ansi(ansi).with_writer(|| Lines);
-    let _ = log.finish().with(filter).try_init();
+    let log = tracing_subscriber::fmt().with_max_level(LevelFilter::TRACE).with_writer(|| Lines);
+    let _ = match options.log_json {
+        true => log.json().flatten_event(true).with_span_list(false).finish().with(filter).try_init(),
+        false => log.with_ansi(ansi).finish().with(filter).try_init(),
+    };
     let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build().map_err(ServeError::Runtime)?;
     let outcome = runtime.block_on(async {
         use tokio::signal::unix::{SignalKind, signal};
@@ -301,6 +353,25 @@ async fn input_ends(asked: bool) {
         let _ = end.await;
     } else {
         std::future::pending::<()>().await;
+    }
+}
+
+/// Tells by the health service whether this server is ready for more.
+async fn watch_over(health: HealthReporter, overseen: Overseen) {
+    let mut ticks = tokio::time::interval(LOOK);
+    let mut told = None;
+    loop {
+        ticks.tick().await;
+        let busy = busy(&overseen.shared, &overseen.gate);
+        if told == Some(busy.is_none()) {
+            continue;
+        }
+        told = Some(busy.is_none());
+        if let Some(why) = &busy {
+            tracing::warn!(why, "not ready for more");
+        }
+        let status = if busy.is_none() { ServingStatus::Serving } else { ServingStatus::NotServing };
+        health.set_service_status(READY, status).await;
     }
 }
 

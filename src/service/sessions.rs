@@ -313,11 +313,17 @@ impl Session {
     fn close(&self) {
         self.closed.store(true, Ordering::Relaxed);
         let Some(keeper) = self.keeper.clone() else { return };
-        // whoever keeps at this moment is waited for, and then finds it closed
-        let forget = move || keeper.lock().unwrap_or_else(PoisonError::into_inner).forget();
+        let forget = move || forget(&keeper);
         match tokio::runtime::Handle::try_current() {
             Ok(runtime) => drop(runtime.spawn_blocking(forget)),
             Err(_) => forget(),
+        }
+    }
+
+    /// Removes what is kept of a closed session. Waits for the disk.
+    pub(super) fn forget(&self) {
+        if let Some(keeper) = &self.keeper {
+            forget(keeper);
         }
     }
 
@@ -343,6 +349,11 @@ impl Session {
     fn idle(&self) -> Duration {
         Duration::from_millis(self.age_ms().saturating_sub(self.used_ms.load(Ordering::Relaxed)))
     }
+}
+
+/// Whoever keeps at this moment is waited for, and then finds the session closed.
+fn forget(keeper: &Mutex<Keeper>) {
+    keeper.lock().unwrap_or_else(PoisonError::into_inner).forget();
 }
 
 fn small_signal(
@@ -460,10 +471,10 @@ impl Sessions {
         found.cloned().ok_or_else(|| status::not_found("session", id))
     }
 
-    /// Forgets a session; whether there was one.
-    pub(super) fn close(&self, id: &str) -> bool {
+    /// Forgets a session, if there is one; what is kept of it goes soon after.
+    pub(super) fn close(&self, id: &str) -> Option<Arc<Session>> {
         let session = self.open.lock().unwrap_or_else(PoisonError::into_inner).remove(id);
-        session.inspect(|session| session.close()).is_some()
+        session.inspect(|session| session.close())
     }
 
     /// Forgets sessions that were not used for long; how many.

@@ -7,7 +7,7 @@ use super::guard::GuardFiles;
 use super::limits::{LIMITS, Limits};
 use super::proto;
 use super::server::ServeOptions;
-use super::written::{File, Flag, Places, Written};
+use super::written::{File, Flag, Place, Places, Written};
 use std::collections::BTreeMap;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
@@ -73,6 +73,12 @@ settings! {
 
     /// Tokens, a line for each client, TOKEN or NAME TOKEN: every call over TCP must show one.
     token_file: File = None;
+
+    /// Where metrics and readiness are told by plain HTTP: /metrics (Prometheus), /ready, /live. Nobody is asked for a token there.
+    metrics: Place = None;
+
+    /// Log as JSON, an object a line, with the id, the name and the client of each request.
+    log_json: Flag = false;
 
     /// Folder for accepted states of sessions, which then outlive the server: a client goes on where it was.
     state_dir: File = None;
@@ -282,6 +288,8 @@ impl Settings {
             },
             insecure: self.insecure,
             limits: self.limits.clone(),
+            metrics: self.metrics.clone(),
+            log_json: self.log_json,
             state_dir: self.state_dir.clone(),
             state_unsynced: self.state_unsynced,
             settings: Some(self),

@@ -69,6 +69,19 @@ struct Entry {
     asleep: Option<Instant>,
 }
 
+/// What a server would find in a folder of states, in words. Nothing of it is removed.
+///
+/// # Errors
+/// [`StoreError`].
+pub fn look_at(folder: &Path) -> Result<String, StoreError> {
+    let store = Store::open(folder, false, usize::MAX, Duration::MAX)?;
+    let probe = folder.join("probe");
+    let written = private().open(&probe).and_then(|mut file| file.write_all(HEAD));
+    let removed = written.and_then(|()| fs::remove_file(probe));
+    removed.map_err(|reason| StoreError::Folder { path: folder.to_owned(), reason })?;
+    Ok(format!("{} sessions, {} kB, can be written", store.len(), store.used() >> 10))
+}
+
 /// What is kept of a session.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Kept {
@@ -116,21 +129,22 @@ impl Store {
             let age = SystemTime::now().duration_since(found.modified()?).unwrap_or_default();
             let name = entry.file_name().to_string_lossy().into_owned();
             let ids = name.rsplit_once('.').and_then(|(ids, _)| ids.split_once('-'));
-            match ids.filter(|(id, model)| is_id(id) && is_id(model) && age < forget) {
-                Some((id, model)) => {
-                    bytes += usize::try_from(found.len()).unwrap_or(usize::MAX);
-                    let entry = Entry { model: model.to_owned(), asleep: Some(Instant::now()) };
-                    sessions.insert(id.to_owned(), entry);
-                }
-                None => drop(fs::remove_file(entry.path())),
+            // what is not ours is left alone
+            let Some((id, model)) = ids.filter(|(id, model)| is_id(id) && is_id(model)) else { continue };
+            if age >= forget {
+                let _ = fs::remove_file(entry.path());
+                continue;
             }
+            bytes += usize::try_from(found.len()).unwrap_or(usize::MAX);
+            let entry = Entry { model: model.to_owned(), asleep: Some(Instant::now()) };
+            sessions.insert(id.to_owned(), entry);
         }
         for entry in fs::read_dir(self.folder.join("models"))? {
             let entry = entry?;
-            let name = entry.file_name();
-            if sessions.values().any(|session: &Entry| *session.model == *name) {
+            let name = entry.file_name().to_string_lossy().into_owned();
+            if sessions.values().any(|session: &Entry| session.model == name) {
                 bytes += usize::try_from(entry.metadata()?.len()).unwrap_or(usize::MAX);
-            } else {
+            } else if name.split('.').next().is_some_and(is_id) {
                 let _ = fs::remove_file(entry.path());
             }
         }

@@ -16,6 +16,7 @@ use proto::device_request::Kind as RequestKind;
 use std::future::Future;
 use std::pin::Pin;
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::task::{Context, Poll, ready};
 use tokio_stream::Stream;
 use tokio_util::sync::WaitForCancellationFutureOwned;
@@ -60,6 +61,7 @@ impl TrialStream {
 
     /// Starts on a request: a reply at once, none (an accept), or a thread in `running`.
     fn take(&mut self, request: proto::DeviceRequest) -> Option<ReplyKind> {
+        self.shared.metrics.trials.fetch_add(1, Ordering::Relaxed);
         let question = match request.kind {
             Some(RequestKind::Open(open)) => {
                 return self.enter(&open).map_or_else(|s| Some(refused(&s)), |()| self.ask(Question::Open(open)));

@@ -93,6 +93,11 @@ impl Sweeps {
         Self { kept: Mutex::default(), turn, ids: Ids::default(), runtime: Handle::current() }
     }
 
+    /// Sweeps kept, running or finished.
+    pub(super) fn len(&self) -> usize {
+        self.kept.lock().unwrap_or_else(PoisonError::into_inner).len()
+    }
+
     /// Starts a sweep; its id and its points.
     pub(super) fn submit(
         &self,

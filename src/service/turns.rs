@@ -74,6 +74,12 @@ impl Turns {
         waits.await.unwrap_or(Place { turns: None, client })
     }
 
+    /// How many wait for a place.
+    pub(super) fn waiting(&self) -> usize {
+        let state = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        state.waiting.iter().map(|(_, own)| own.iter().filter(|sender| !sender.is_closed()).count()).sum()
+    }
+
     /// Gives a place to the next client that still waits.
     fn pass_on(self: Arc<Self>) {
         let mut state = self.0.lock().unwrap_or_else(PoisonError::into_inner);

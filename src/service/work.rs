@@ -28,6 +28,11 @@ impl Work {
         Self { places, timeout: limits.request_timeout, allowance: allowance(limits), shutdown }
     }
 
+    /// How many computations wait for a place.
+    pub(super) fn waiting(&self) -> usize {
+        self.places.waiting()
+    }
+
     /// Waits for a place, in the turn of the client at hand.
     pub(super) async fn place(&self) -> Result<Place, Status> {
         tokio::select! {
@@ -68,9 +73,10 @@ impl Work {
         let deadline = Some(Instant::now() + self.timeout);
         let budget = Budget::new(Allowance { deadline, ..self.allowance.clone() });
         let guard = CancelOnDrop(budget.clone());
+        let span = tracing::Span::current();
         let running = tokio::task::spawn_blocking(move || {
             let _place = place;
-            job(&budget)
+            span.in_scope(|| job(&budget))
         });
         tokio::select! {
             answer = running => answer.unwrap_or_else(|_| Err(status::fault())).map_err(|status| self.told(status)),

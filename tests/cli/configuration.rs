@@ -53,6 +53,16 @@ fn options_before_the_environment_before_a_file() {
     }
 }
 
+/// The example's settings are settings.
+#[test]
+fn the_example_is_read() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/serve/serve.toml");
+    let mut settings = Settings::default();
+    settings.read_file(std::path::Path::new(path)).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(settings.limits.sessions, 1000);
+    assert!(settings.tls_cert.is_some_and(|path| path.ends_with("examples/serve/server.pem")));
+}
+
 /// What means nothing is refused with its place and what was expected, before anything is listened on.
 #[test]
 fn mistakes_are_named_by_place() {

@@ -184,6 +184,32 @@ fn what_is_not_enough_is_refused() {
     refused("192.0.2.1:9", &access(&bench, Some("alice")), "InvalidArgument", "not sent unencrypted");
 }
 
+/// The doctor looks at what a file of settings names: good ones are told, an expired certificate and a folder that cannot be made
+/// are errors with a remedy.
+#[test]
+fn the_doctor_looks_at_settings() {
+    let bench = bench();
+    let settings = |certificate: &str, folder: &str| {
+        let (certificate, key) = (tls(&format!("{certificate}.pem")), tls(&format!("{certificate}.key")));
+        let text = format!(
+            "tls_cert = \"{}\"\ntls_key = \"{}\"\ntoken_file = \"tokens\"\nstate_dir = \"{folder}\"\n",
+            certificate.display(),
+            key.display()
+        );
+        std::fs::write(bench.path("serve.toml"), text).expect("written");
+        bench.run("doctor --config serve.toml")
+    };
+    let good = settings("server", "states");
+    assert_eq!(good.status, 0, "{}{}", good.stdout, good.stderr);
+    assert!(good.stdout.contains("more days; 2 tokens"), "{}", good.stdout);
+    assert!(good.stdout.contains("ok       states   0 sessions"), "{}", good.stdout);
+    let expired = settings("expired", "tokens/states");
+    assert_eq!(expired.status, 1);
+    for said in ["missing  access   certificate ", "it has expired", "missing  states   state folder "] {
+        assert!(expired.stdout.contains(said), "{}", expired.stdout);
+    }
+}
+
 /// A client that begins a handshake and says no more holds nobody up, and loses its connection in time.
 #[test]
 fn an_unfinished_handshake_ends() {

@@ -40,6 +40,18 @@ impl Server {
         }
     }
 
+    /// The next line that holds all of these.
+    pub(crate) fn line_with(&mut self, parts: &[&str]) -> String {
+        loop {
+            let mut line = String::new();
+            let read = self.words.read_line(&mut line).expect("readable");
+            assert_ne!(read, 0, "it ended before it said {parts:?}");
+            if parts.iter().all(|part| line.contains(part)) {
+                return line;
+            }
+        }
+    }
+
     /// Its process.
     pub(crate) fn id(&self) -> u32 {
         self.child.id()

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import grpc
 
 from .channel import Channel
-from .errors import BimorphError, InvalidRequest, NotFound, StepFailed, Unavailable, from_rpc
+from .errors import BimorphError, InvalidRequest, LimitExceeded, NotFound, StepFailed, Unavailable, from_rpc
 from .results import NodeMotion, TrialReply
 from .v1 import device_pb2
 
@@ -26,6 +26,17 @@ _SHORTEST = 1e-9
 
 _LOOK = 0.2
 """While a call waits, it looks this often whether the stream is over [s]."""
+
+
+_REFUSED: dict[int, type[BimorphError]] = {
+    code.value[0]: kind
+    for code, kind in (
+        (grpc.StatusCode.NOT_FOUND, NotFound),
+        (grpc.StatusCode.RESOURCE_EXHAUSTED, LimitExceeded),
+        (grpc.StatusCode.UNAVAILABLE, Unavailable),
+    )
+}
+"""Errors of requests that a stream refused, by code."""
 
 
 @dataclass(frozen=True)
@@ -326,7 +337,8 @@ class Session:
             reply = self._answer(question)
         if reply.WhichOneof("kind") == "fault":
             kind = reply.fault.WhichOneof("kind")
-            raise (NotFound if kind == "unknown_token" else InvalidRequest)(reply.fault.message)
+            code = reply.fault.refused.code if kind == "refused" else 0
+            raise (NotFound if kind == "unknown_token" else _REFUSED.get(code, InvalidRequest))(reply.fault.message)
         return reply
 
     def _answer(self, question: _Question) -> Any:

@@ -1,0 +1,201 @@
+//! `serve --state-dir`: accepted states outlive a server that is killed at any moment; none is lost and none doubled.
+
+use crate::bench::{Bench, PLATE};
+use crate::serving::Server;
+use bimorph::netlist::Bundle;
+use bimorph::service::convert::model::bundle_to_wire;
+use bimorph::service::proto;
+use proto::bimorph_client::BimorphClient;
+use proto::device_reply::Kind as Reply;
+use proto::device_request::Kind as Ask;
+use std::process::Command;
+use std::time::Duration;
+use tokio::sync::mpsc;
+use tokio_stream::wrappers::ReceiverStream;
+use tonic::transport::{Channel, Endpoint};
+use tonic::{Status, Streaming};
+
+/// Length of a step [s].
+const DT: f64 = 1e-7;
+/// Longest life of a server that is to be killed, from where its fate is decided [µs].
+const LONGEST_LIFE: u64 = 4000;
+
+/// What the circuit gives in a step [V].
+fn voltages(step: usize) -> Vec<f64> {
+    vec![1.0 + (step % 7) as f64]
+}
+
+/// One stream of a session.
+struct Stream {
+    requests: mpsc::Sender<proto::DeviceRequest>,
+    replies: Streaming<proto::DeviceReply>,
+}
+
+impl Stream {
+    async fn start(client: &mut BimorphClient<Channel>, first: Ask) -> Result<(Self, proto::OpenResponse), Status> {
+        let (requests, queue) = mpsc::channel(4);
+        let replies = client.trial(ReceiverStream::new(queue)).await?.into_inner();
+        let mut stream = Self { requests, replies };
+        match stream.ask(first).await? {
+            Reply::Opened(opened) => Ok((stream, opened)),
+            other => Err(Status::not_found(format!("{other:?}"))),
+        }
+    }
+
+    async fn ask(&mut self, kind: Ask) -> Result<Reply, Status> {
+        let gone = || Status::unavailable("the stream has ended");
+        self.requests.send(proto::DeviceRequest { kind: Some(kind) }).await.map_err(|_| gone())?;
+        self.replies.message().await?.and_then(|reply| reply.kind).ok_or_else(gone)
+    }
+
+    /// One step from a state: tried and accepted. The reply, and whether the state is kept.
+    async fn step(&mut self, step: usize, parent: u64) -> Result<(proto::TrialReply, bool), Status> {
+        let mode = proto::Mode::Transient.into();
+        let trial = proto::TrialRequest { mode, parent, t: 0.0, dt: DT, voltages: voltages(step) };
+        let Reply::Trial(reply) = self.ask(Ask::Trial(trial)).await? else { panic!("a trial has a reply") };
+        assert_eq!(reply.status(), proto::trial_reply::Status::Ok, "the plate takes such steps");
+        let accept = proto::Accept { token: reply.token, answer: true };
+        match self.ask(Ask::Accept(accept)).await? {
+            Reply::Accepted(accepted) => Ok((reply, accepted.kept)),
+            other => panic!("{other:?}"),
+        }
+    }
+}
+
+async fn client(address: &str) -> BimorphClient<Channel> {
+    let endpoint = Endpoint::from_shared(address.to_owned()).expect("a uri");
+    BimorphClient::new(endpoint.connect().await.expect("the server listens"))
+}
+
+async fn compiled(client: &mut BimorphClient<Channel>) -> String {
+    let bundle = Some(bundle_to_wire(&Bundle::from_text("plate.net", PLATE)));
+    let answer = client.compile(proto::CompileRequest { bundle, options: None }).await.expect("compiles");
+    answer.into_inner().model.expect("a model").id
+}
+
+/// Numbers without chance: SplitMix64 (Steele, Lea, Flood 2014).
+struct Numbers(u64);
+
+impl Numbers {
+    fn below(&mut self, most: u64) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        (z ^ (z >> 31)) % most
+    }
+}
+
+/// Kills a process that soon does not live any more.
+fn kill_after(id: u32, life: Duration) {
+    std::thread::spawn(move || {
+        std::thread::sleep(life);
+        let _ = Command::new("kill").args(["-KILL", &id.to_string()]).status();
+    });
+}
+
+/// A run through so many killed servers has the bits of one without kills: what was answered as kept is there again, with the
+/// state before it, and each step is in the run once. Told: kills that came between a step and the answer to its accept.
+async fn killed(kills: usize) {
+    let bench = Bench::new(&[]);
+    let options = format!("--listen unix://{} --state-dir states", bench.path("s").display());
+    let mut server = Server::start(&bench, &options);
+    let mut wire = client(&server.address).await;
+    let model = compiled(&mut wire).await;
+    let request = proto::OpenRequest { model, ports: vec![], signals: vec!["m.x".into()], noise: None };
+
+    let session = wire.open(request.clone()).await.expect("opens").into_inner();
+    assert!(session.kept && session.accepted == 0);
+    let attach = || Ask::Attach(proto::Attach { session: session.session.clone() });
+    let (mut stream, _) = Stream::start(&mut wire, attach()).await.expect("attaches");
+    let (mut numbers, mut parent, mut between) = (Numbers(12), 0, 0);
+    let mut done: Vec<proto::TrialReply> = Vec::new();
+    for round in 0..=kills {
+        if round < kills {
+            kill_after(server.id(), Duration::from_micros(numbers.below(LONGEST_LIFE)));
+        }
+        let last = done.len() + 20;
+        while round < kills || done.len() < last {
+            match stream.step(done.len(), parent).await {
+                Ok((reply, kept)) => {
+                    assert!(kept);
+                    parent = reply.token;
+                    done.push(reply);
+                }
+                Err(_) if round < kills => break,
+                Err(status) => panic!("{status}"),
+            }
+        }
+        if round == kills {
+            break;
+        }
+        assert_eq!(server.signal("-KILL"), None);
+        server = Server::start(&bench, &options);
+        wire = client(&server.address).await;
+        let (again, opened) = Stream::start(&mut wire, attach()).await.expect("it is kept");
+        stream = again;
+        if opened.accepted != parent {
+            // accepted, and killed before it was told: the step is taken again, to the same state
+            between += 1;
+            let (reply, _) = stream.step(done.len(), parent).await.expect("the state before is kept as well");
+            assert_eq!(reply.token, opened.accepted);
+            parent = reply.token;
+            done.push(reply);
+        }
+    }
+    let (mut whole, opened) = Stream::start(&mut wire, Ask::Open(request)).await.expect("the model is here");
+    assert!(!opened.kept, "a session of a stream ends with it");
+    let (mut expected, mut parent) = (Vec::new(), 0);
+    for step in 0..done.len() {
+        let (reply, kept) = whole.step(step, parent).await.expect("steps");
+        assert!(!kept);
+        parent = reply.token;
+        expected.push(reply);
+    }
+    assert_eq!(done, expected);
+    println!("{kills} kills, {} steps, {between} kills between a state and the word of it", done.len());
+}
+
+fn run(kills: usize) {
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a runtime");
+    runtime.block_on(killed(kills));
+}
+
+/// Three kills.
+#[test]
+fn three_kills() {
+    run(3);
+}
+
+/// A hundred: `make soak`.
+#[test]
+#[ignore = "a minute; make soak"]
+fn soak_kills() {
+    run(100);
+}
+
+/// Steps of a kept session with and without waiting for the disk, beside one that is not kept: `make soak` tells them.
+#[test]
+#[ignore = "a measurement; make soak"]
+fn soak_cost_of_keeping() {
+    const STEPS: u32 = 2000;
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a runtime");
+    for options in ["", "--state-dir states --state-unsynced", "--state-dir states"] {
+        let bench = Bench::new(&[]);
+        let server = Server::start(&bench, &format!("--listen unix://{} {options}", bench.path("s").display()));
+        let per_step = runtime.block_on(async {
+            let mut wire = client(&server.address).await;
+            let model = compiled(&mut wire).await;
+            let request = proto::OpenRequest { model, ports: vec![], signals: vec![], noise: None };
+            let session = wire.open(request).await.expect("opens").into_inner().session;
+            let attach = Ask::Attach(proto::Attach { session });
+            let (mut stream, _) = Stream::start(&mut wire, attach).await.expect("attaches");
+            let (start, mut parent) = (std::time::Instant::now(), 0);
+            for step in 0..STEPS {
+                parent = stream.step(step as usize, parent).await.expect("steps").0.token;
+            }
+            start.elapsed() / STEPS
+        });
+        println!("{per_step:?} a step with an accept that is answered, serve {options}");
+    }
+}
