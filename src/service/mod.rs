@@ -5,7 +5,7 @@
 //! is built with the feature `remote` alone, and shows what [`access`] says; `tls` is for both ends. The rest is the feature `server`: [`server`] listens and stops
 //! (`sockets`, `connection`, `shutdown`), [`guard`] and `tokens` ask who comes, `intake` counts what comes in, `rpc` answers calls, `stream` is the Newton loop,
 //! `models`, `sessions` and `sweeps` keep what clients can name, under `ids` that nobody guesses, `snapshots` puts sessions
-//! into bytes, [`store`] keeps those that outlive the server, `work` computes, in the `turns` of clients, `chunks` sends what is long, `status` says what went wrong, [`log`]
+//! into bytes, [`store`] and `keeper` hold those that outlive the server, `work` computes, in the `turns` of clients, `chunks` sends what is long, `status` says what went wrong, [`log`]
 //! says it without waiting, [`limits`] is what clients may ask for, and [`settings`] all
 //! that a server is told, in whichever way it is [`written`].
 
@@ -20,11 +20,15 @@ mod chunks;
 #[cfg(feature = "server")]
 mod connection;
 #[cfg(feature = "server")]
+mod framing;
+#[cfg(feature = "server")]
 pub mod guard;
 #[cfg(feature = "server")]
 mod ids;
 #[cfg(feature = "server")]
 mod intake;
+#[cfg(feature = "server")]
+mod keeper;
 #[cfg(feature = "server")]
 pub mod limits;
 #[cfg(feature = "server")]

@@ -2,11 +2,12 @@
 
 use super::convert::device as wire;
 use super::ids::Ids;
+use super::keeper::{Keeper, Kept};
 use super::limits::Limits;
 use super::models::Model;
 use super::server::MakeDevice;
 use super::snapshots;
-use super::store::{Keeper, Kept, Store};
+use super::store::Store;
 use super::work::caught;
 use super::{proto, status};
 use crate::budget::{self, Allowance, Budget, Stopped};

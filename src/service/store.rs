@@ -7,8 +7,8 @@
 //!
 //! What is here is bounded: two files a session, and `state_bytes` in all.
 
+use super::keeper::{HEAD, Kept};
 use super::proto;
-use super::snapshots::checksum;
 use prost::Message;
 use std::collections::BTreeMap;
 use std::fs::{self, DirBuilder, File, OpenOptions};
@@ -16,14 +16,9 @@ use std::io::{self, Write};
 use std::os::unix::fs::{DirBuilderExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant, SystemTime};
 use thiserror::Error;
-
-/// What a file begins with.
-const HEAD: &[u8; 16] = b"bimorph states 1";
-/// Head, checksum, sequence number, token, length.
-const BEFORE: usize = 16 + 16 + 3 * 8;
 
 /// Why states cannot be kept.
 #[derive(Debug, Error)]
@@ -48,13 +43,13 @@ pub enum StoreError {
 /// The folder of a server.
 #[derive(Debug)]
 pub(super) struct Store {
-    folder: PathBuf,
+    pub(super) folder: PathBuf,
     /// Held as long as the server runs.
     _lock: File,
     /// Whether to wait for the disk.
-    sync: bool,
+    pub(super) sync: bool,
     most: usize,
-    used: AtomicUsize,
+    pub(super) used: AtomicUsize,
     /// Every session that is kept.
     sessions: Mutex<BTreeMap<String, Entry>>,
     /// Held while models are written or removed, and while a session is woken.
@@ -63,10 +58,10 @@ pub(super) struct Store {
 
 /// A session that is kept.
 #[derive(Debug)]
-struct Entry {
-    model: String,
+pub(super) struct Entry {
+    pub(super) model: String,
     /// Since when it waits for somebody to ask for it; none: it is in use.
-    asleep: Option<Instant>,
+    pub(super) asleep: Option<Instant>,
 }
 
 /// What a server would find in a folder of states, in words. Nothing of it is removed.
@@ -74,22 +69,15 @@ struct Entry {
 /// # Errors
 /// [`StoreError`].
 pub fn look_at(folder: &Path) -> Result<String, StoreError> {
-    let store = Store::open(folder, false, usize::MAX, Duration::MAX)?;
+    let store = match Store::open(folder, false, usize::MAX, Duration::MAX) {
+        Err(StoreError::InUse { .. }) => return Ok("in use by a running server".to_owned()),
+        opened => opened?,
+    };
     let probe = folder.join("probe");
     let written = private().open(&probe).and_then(|mut file| file.write_all(HEAD));
     let removed = written.and_then(|()| fs::remove_file(probe));
     removed.map_err(|reason| StoreError::Folder { path: folder.to_owned(), reason })?;
     Ok(format!("{} sessions, {} kB, can be written", store.len(), store.used() >> 10))
-}
-
-/// What is kept of a session.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Kept {
-    sequence: u64,
-    /// The last accepted state; 0: none yet.
-    pub(super) accepted: u64,
-    /// States in their envelope.
-    pub(super) sealed: Vec<u8>,
 }
 
 impl Store {
@@ -153,7 +141,7 @@ impl Store {
         Ok(())
     }
 
-    fn entries(&self) -> MutexGuard<'_, BTreeMap<String, Entry>> {
+    pub(super) fn entries(&self) -> MutexGuard<'_, BTreeMap<String, Entry>> {
         self.sessions.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -217,12 +205,12 @@ impl Store {
         }
     }
 
-    fn session(&self, id: &str, model: &str, slot: u64) -> PathBuf {
+    pub(super) fn session(&self, id: &str, model: &str, slot: u64) -> PathBuf {
         self.folder.join("sessions").join(format!("{id}-{model}.{slot}"))
     }
 
     /// Keeps the netlist and the options of a model, once.
-    fn keep_model(&self, id: &str, source: &proto::CompileRequest) -> io::Result<()> {
+    pub(super) fn keep_model(&self, id: &str, source: &proto::CompileRequest) -> io::Result<()> {
         let path = self.folder.join("models").join(id);
         if path.exists() {
             return Ok(());
@@ -253,7 +241,7 @@ impl Store {
     }
 
     /// Whether `more` bytes may be kept in place of `old`.
-    fn room(&self, old: usize, more: usize) -> io::Result<()> {
+    pub(super) fn room(&self, old: usize, more: usize) -> io::Result<()> {
         let used = self.used().saturating_sub(old).saturating_add(more);
         if used > self.most {
             let text = format!("state_bytes: at most {} in all, got {used}; Info lists the limits", self.most);
@@ -263,104 +251,14 @@ impl Store {
     }
 }
 
-/// Keeps the states of one session.
-#[derive(Debug)]
-pub(super) struct Keeper {
-    store: Arc<Store>,
-    id: String,
-    model: String,
-    sequence: u64,
-    /// The last accepted state; 0: none yet.
-    pub(super) accepted: u64,
-}
-
-impl Keeper {
-    /// Of a new session of a model.
-    ///
-    /// # Errors
-    /// What the system said, or the bound.
-    pub(super) fn new(store: &Arc<Store>, id: &str, model: &str, source: &proto::CompileRequest) -> io::Result<Self> {
-        let _hold = store.hold();
-        store.keep_model(model, source)?;
-        Ok(Self::of(store, id, model, 0, 0))
-    }
-
-    /// Of one that goes on.
-    pub(super) fn after(store: &Arc<Store>, id: &str, model: &str, kept: &Kept) -> Self {
-        Self::of(store, id, model, kept.sequence, kept.accepted)
-    }
-
-    fn of(store: &Arc<Store>, id: &str, model: &str, sequence: u64, accepted: u64) -> Self {
-        store.entries().insert(id.to_owned(), Entry { model: model.to_owned(), asleep: None });
-        Self { store: Arc::clone(store), id: id.to_owned(), model: model.to_owned(), sequence, accepted }
-    }
-
-    /// Keeps `sealed`, whose last accepted state is `accepted`. When this returns it is on the disk, or, where nobody waits
-    /// for the disk, with the system.
-    ///
-    /// # Errors
-    /// What the system said, or the bound; what was kept before is still there.
-    pub(super) fn keep(&mut self, accepted: u64, sealed: &[u8]) -> io::Result<()> {
-        let sequence = self.sequence + 1;
-        let path = self.store.session(&self.id, &self.model, sequence % 2);
-        let bytes = Kept::write(sequence, accepted, sealed);
-        let old = size(&path);
-        self.store.room(old, bytes.len())?;
-        let mut file = private().open(&path)?;
-        file.write_all(&bytes)?;
-        file.set_len(bytes.len() as u64)?;
-        if self.store.sync {
-            file.sync_data()?;
-            if sequence <= 2 {
-                // the name of a new file is kept by its folder
-                File::open(self.store.folder.join("sessions"))?.sync_all()?;
-            }
-        }
-        self.store.used.fetch_add(bytes.len(), Ordering::Relaxed);
-        self.store.used.fetch_sub(old, Ordering::Relaxed);
-        (self.sequence, self.accepted) = (sequence, accepted);
-        Ok(())
-    }
-
-    /// Removes what is kept.
-    pub(super) fn forget(&self) {
-        self.store.forget(&self.id);
-    }
-}
-
-impl Kept {
-    fn write(sequence: u64, accepted: u64, sealed: &[u8]) -> Vec<u8> {
-        let mut out = Vec::with_capacity(BEFORE + sealed.len());
-        out.extend(HEAD);
-        out.extend([0; 16]);
-        for word in [sequence, accepted, sealed.len() as u64] {
-            out.extend(word.to_le_bytes());
-        }
-        out.extend(sealed);
-        let sum = checksum(&out[32..]);
-        out[16..32].copy_from_slice(&sum.to_le_bytes());
-        out
-    }
-
-    /// None for a file that is not whole: the server ended while it was written.
-    fn read(bytes: &[u8]) -> Option<Self> {
-        let (head, rest) = bytes.split_at_checked(32)?;
-        let word = |k: usize| rest.get(8 * k..8 * k + 8).and_then(|b| b.try_into().ok()).map(u64::from_le_bytes);
-        let [sequence, accepted, length] = [word(0)?, word(1)?, word(2)?];
-        let whole = rest.get(..usize::try_from(length).ok()?.checked_add(24)?)?;
-        let good = head.starts_with(HEAD) && head[16..] == checksum(whole).to_le_bytes();
-        good.then(|| Self { sequence, accepted, sealed: whole[24..].to_vec() })
-    }
-}
-
 /// Opens for writing what nobody else may read.
-fn private() -> OpenOptions {
+pub(super) fn private() -> OpenOptions {
     let mut options = OpenOptions::new();
     options.write(true).create(true).truncate(false).mode(0o600);
     options
 }
 
-fn size(path: &Path) -> usize {
+pub(super) fn size(path: &Path) -> usize {
     fs::metadata(path).map_or(0, |found| usize::try_from(found.len()).unwrap_or(usize::MAX))
 }
 
@@ -372,7 +270,9 @@ fn is_id(text: &str) -> bool {
 #[cfg(test)]
 mod tests {
     //! What was kept is found again, and a file that is not whole gives way to the one before it.
+    use super::super::keeper::Keeper;
     use super::*;
+    use std::sync::Arc;
 
     const ID: &str = "0123456789abcdef0123456789abcdef";
     const MODEL: &str = "00000000000000000000000000000000";

@@ -1,0 +1,114 @@
+//! What is kept of one session: two files in turn, each with a checksum, of which one is whole at any moment.
+
+use super::proto;
+use super::snapshots::checksum;
+use super::store::{Entry, Store, private, size};
+use std::fs::File;
+use std::io::{self, Write};
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
+/// What a file begins with.
+pub(super) const HEAD: &[u8; 16] = b"bimorph states 1";
+/// Head, checksum, sequence number, token, length.
+const BEFORE: usize = 16 + 16 + 3 * 8;
+
+/// What is kept of a session.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Kept {
+    pub(super) sequence: u64,
+    /// The last accepted state; 0: none yet.
+    pub(super) accepted: u64,
+    /// States in their envelope.
+    pub(super) sealed: Vec<u8>,
+}
+
+/// Keeps the states of one session.
+#[derive(Debug)]
+pub(super) struct Keeper {
+    store: Arc<Store>,
+    id: String,
+    model: String,
+    sequence: u64,
+    /// The last accepted state; 0: none yet.
+    pub(super) accepted: u64,
+}
+
+impl Keeper {
+    /// Of a new session of a model.
+    ///
+    /// # Errors
+    /// What the system said, or the bound.
+    pub(super) fn new(store: &Arc<Store>, id: &str, model: &str, source: &proto::CompileRequest) -> io::Result<Self> {
+        let _hold = store.hold();
+        store.keep_model(model, source)?;
+        Ok(Self::of(store, id, model, 0, 0))
+    }
+
+    /// Of one that goes on.
+    pub(super) fn after(store: &Arc<Store>, id: &str, model: &str, kept: &Kept) -> Self {
+        Self::of(store, id, model, kept.sequence, kept.accepted)
+    }
+
+    fn of(store: &Arc<Store>, id: &str, model: &str, sequence: u64, accepted: u64) -> Self {
+        store.entries().insert(id.to_owned(), Entry { model: model.to_owned(), asleep: None });
+        Self { store: Arc::clone(store), id: id.to_owned(), model: model.to_owned(), sequence, accepted }
+    }
+
+    /// Keeps `sealed`, whose last accepted state is `accepted`. When this returns it is on the disk, or, where nobody waits
+    /// for the disk, with the system.
+    ///
+    /// # Errors
+    /// What the system said, or the bound; what was kept before is still there.
+    pub(super) fn keep(&mut self, accepted: u64, sealed: &[u8]) -> io::Result<()> {
+        let sequence = self.sequence + 1;
+        let path = self.store.session(&self.id, &self.model, sequence % 2);
+        let bytes = Kept::write(sequence, accepted, sealed);
+        let old = size(&path);
+        self.store.room(old, bytes.len())?;
+        let mut file = private().open(&path)?;
+        file.write_all(&bytes)?;
+        file.set_len(bytes.len() as u64)?;
+        if self.store.sync {
+            file.sync_data()?;
+            if sequence <= 2 {
+                // the name of a new file is kept by its folder
+                File::open(self.store.folder.join("sessions"))?.sync_all()?;
+            }
+        }
+        self.store.used.fetch_add(bytes.len(), Ordering::Relaxed);
+        self.store.used.fetch_sub(old, Ordering::Relaxed);
+        (self.sequence, self.accepted) = (sequence, accepted);
+        Ok(())
+    }
+
+    /// Removes what is kept.
+    pub(super) fn forget(&self) {
+        self.store.forget(&self.id);
+    }
+}
+
+impl Kept {
+    fn write(sequence: u64, accepted: u64, sealed: &[u8]) -> Vec<u8> {
+        let mut out = Vec::with_capacity(BEFORE + sealed.len());
+        out.extend(HEAD);
+        out.extend([0; 16]);
+        for word in [sequence, accepted, sealed.len() as u64] {
+            out.extend(word.to_le_bytes());
+        }
+        out.extend(sealed);
+        let sum = checksum(&out[32..]);
+        out[16..32].copy_from_slice(&sum.to_le_bytes());
+        out
+    }
+
+    /// None for a file that is not whole: the server ended while it was written.
+    pub(super) fn read(bytes: &[u8]) -> Option<Self> {
+        let (head, rest) = bytes.split_at_checked(32)?;
+        let word = |k: usize| rest.get(8 * k..8 * k + 8).and_then(|b| b.try_into().ok()).map(u64::from_le_bytes);
+        let [sequence, accepted, length] = [word(0)?, word(1)?, word(2)?];
+        let whole = rest.get(..usize::try_from(length).ok()?.checked_add(24)?)?;
+        let good = head.starts_with(HEAD) && head[16..] == checksum(whole).to_le_bytes();
+        good.then(|| Self { sequence, accepted, sealed: whole[24..].to_vec() })
+    }
+}
