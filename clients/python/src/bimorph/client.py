@@ -54,8 +54,8 @@ class Client:
         client_cert: str | os.PathLike[str] | None = None,
         client_key: str | os.PathLike[str] | None = None,
     ) -> None:
-        files = (None if file is None else os.fspath(file) for file in (ca, token_file, client_cert, client_key))
-        self._channel = Channel(address, timeout, Access(*files, token=token))
+        files = [None if file is None else os.fspath(file) for file in (ca, token_file, client_cert, client_key)]
+        self._channel = Channel(address, timeout, Access(files[0], files[1], files[2], files[3], token))
 
     @property
     def address(self) -> str:
