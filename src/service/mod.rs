@@ -44,6 +44,8 @@ mod rpc;
 #[cfg(feature = "server")]
 pub mod server;
 #[cfg(feature = "server")]
+mod serving;
+#[cfg(feature = "server")]
 mod sessions;
 #[cfg(feature = "server")]
 pub mod settings;

@@ -2,31 +2,28 @@
 
 use super::address::Address;
 use super::connection::Connections;
-use super::guard::{Guard, GuardError, GuardFiles};
+use super::guard::Guard;
 use super::intake::{Gate, Intake};
 use super::limits::Limits;
 use super::log::{self, Lines};
 use super::metrics::{Overseen, busy};
 use super::models::Models;
 use super::overseer;
-use super::proto::{DESCRIPTORS, bimorph_server::BimorphServer};
+use super::proto::{DESCRIPTORS, ServerSetting, bimorph_server::BimorphServer};
 use super::rpc::{Calls, Shared};
+pub use super::serving::{MakeDevice, Ready, ServeError, ServeOptions};
 use super::sessions::Sessions;
-use super::settings::Settings;
 use super::shutdown::{GRACE, Shutdown};
 use super::sockets::Listener;
-use super::store::{Store, StoreError};
+use super::store::Store;
 use super::sweeps::Sweeps;
 use super::work::Work;
-use crate::compile::Compiled;
-use crate::device::Device;
 use crate::device::local::LocalDevice;
 use std::future::Future;
 use std::io::IsTerminal;
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
-use thiserror::Error;
+use tokio::net::TcpListener;
 use tokio::sync::{Semaphore, mpsc};
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::transport::Server;
@@ -44,120 +41,6 @@ const READY: &str = "ready";
 const LOOK: Duration = Duration::from_millis(250);
 /// How long the last log lines may take to be written.
 const LAST_WORDS: Duration = Duration::from_millis(200);
-
-/// What a server may be told.
-pub struct ServeOptions {
-    /// Addresses to listen on; at least one. See [`Address`].
-    pub listen: Vec<Address>,
-    /// What is asked of who comes over TCP.
-    pub guard: GuardFiles,
-    /// Allow TCP addresses that other machines can reach without TLS, or without tokens and certificates of clients.
-    pub insecure: bool,
-    /// What clients may ask for.
-    pub limits: Limits,
-    /// Address of metrics and readiness (HTTP/1.1, TCP): `/metrics`, `/ready`, `/live`; none: nowhere.
-    pub metrics: Option<Address>,
-    /// Log as JSON, an object a line.
-    pub log_json: bool,
-    /// Where accepted states are kept, to outlive the server; none: nowhere.
-    pub state_dir: Option<PathBuf>,
-    /// Do not wait for the disk: states outlive the server, not the machine.
-    pub state_unsynced: bool,
-    /// What all this comes from, for `Info`; none: the limits alone are told.
-    pub settings: Option<Settings>,
-    /// Whether [`run_until_signal`] also ends when standard input does: a program that starts a server for itself holds the
-    /// other end of a pipe, which the system closes however that program ends.
-    pub while_stdin: bool,
-    /// Called once, when every address accepts connections, with the addresses as bound (port 0 replaced), that of metrics last.
-    pub ready: Ready,
-}
-
-/// Told the addresses of a server as bound.
-pub type Ready = Box<dyn FnOnce(&[Address]) + Send>;
-
-/// Makes the device of a session.
-pub type MakeDevice = fn(Arc<Compiled>) -> Box<dyn Device>;
-
-impl Default for ServeOptions {
-    fn default() -> Self {
-        Self {
-            listen: Vec::new(),
-            guard: GuardFiles::default(),
-            insecure: false,
-            limits: Limits::default(),
-            metrics: None,
-            log_json: false,
-            state_dir: None,
-            state_unsynced: false,
-            settings: None,
-            while_stdin: false,
-            ready: Box::new(|_| {}),
-        }
-    }
-}
-
-/// Why a server does not run.
-#[derive(Debug, Error)]
-#[non_exhaustive]
-pub enum ServeError {
-    /// Nothing to listen on.
-    #[error("no address to listen on; expected unix:///path or 127.0.0.1:50051")]
-    NoAddress,
-    /// A TCP address beyond this machine, without [`ServeOptions::insecure`].
-    #[error(
-        "{address} can be reached from other machines: that takes TLS (--tls-cert, --tls-key) and a token for each client \
-         (--token-file) or an authority of their certificates (--tls-client-ca); or listen on 127.0.0.1 or a Unix socket, \
-         or pass --insecure if the network is trusted"
-    )]
-    NotLoopback {
-        /// The address.
-        address: Address,
-    },
-    /// An `https://` address without a certificate.
-    #[error("{address} asks for TLS, which takes a certificate and its key: --tls-cert and --tls-key")]
-    NoTls {
-        /// The address.
-        address: Address,
-    },
-    /// Metrics over something else than TCP.
-    #[error("--metrics {address}: expected host:port, which is plain HTTP")]
-    Metrics {
-        /// The address.
-        address: Address,
-    },
-    /// States cannot be kept.
-    #[error(transparent)]
-    Store(#[from] StoreError),
-    /// Certificates, keys or tokens cannot be used.
-    #[error(transparent)]
-    Guard(#[from] GuardError),
-    /// A live server already has this Unix socket.
-    #[error("{address} is in use by a running server; stop it or choose another path")]
-    InUse {
-        /// The address.
-        address: Address,
-    },
-    /// The path of a Unix socket is something else.
-    #[error("{address} exists and is not a socket; choose another path")]
-    NotASocket {
-        /// The address.
-        address: Address,
-    },
-    /// The system refused.
-    #[error("cannot listen on {address}: {reason}")]
-    Bind {
-        /// The address.
-        address: Address,
-        /// What it said.
-        reason: std::io::Error,
-    },
-    /// No asynchronous runtime.
-    #[error("cannot start the server's threads: {0}")]
-    Runtime(std::io::Error),
-    /// The transport failed while serving.
-    #[error("the server stopped: {0}")]
-    Transport(String),
-}
 
 /// Serves until `shutdown` resolves, then drains for [`Limits::drain`] and cuts what is left.
 ///
@@ -195,19 +78,7 @@ pub async fn run_with(
     let guard = Arc::new(Guard::read(&guard)?);
     let open = |folder| Store::open(folder, !state_unsynced, limits.state_bytes, limits.stream_idle);
     let store = state_dir.as_deref().map(open).transpose()?.map(Arc::new);
-    let mut listeners = Vec::with_capacity(listen.len());
-    for address in &listen {
-        listeners.push(Listener::bind(address, insecure, &guard).await?);
-    }
-    let mut bound: Vec<Address> = listeners.iter().map(Listener::address).collect();
-    let overseer = match &metrics {
-        Some(address) => {
-            let (listener, address) = overseer::bind(address).await?;
-            bound.push(address);
-            Some(listener)
-        }
-        None => None,
-    };
+    let (listeners, overseer, bound) = open_all(&listen, metrics.as_ref(), insecure, &guard).await?;
     let signals = Shutdown::default();
     let (sender, incoming) = mpsc::channel(16);
     let connections = Arc::new(Connections::new(&limits, &signals.cutting));
@@ -217,22 +88,8 @@ pub async fn run_with(
     }
     drop(sender);
 
-    let shared = Arc::new(Shared {
-        work: Work::new(limits.analyses, &limits, signals.clone()),
-        desk: Work::new(limits.analyses, &limits, signals.clone()),
-        trials: Work::new(2 * limits.analyses, &limits, signals.clone()),
-        results: Arc::new(Semaphore::new(limits.result_streams)),
-        told: settings.map(|settings| settings.told()).unwrap_or_default(),
-        limits,
-        make,
-        models: Models::default(),
-        sessions: Sessions::default(),
-        sweeps: Sweeps::new(),
-        store,
-        connections,
-        metrics: Arc::default(),
-        shutdown: signals.clone(),
-    });
+    let told = settings.map(|settings| settings.told()).unwrap_or_default();
+    let shared = share(limits, told, (make, store, connections), &signals);
     let calls = BimorphServer::new(Calls(Arc::clone(&shared)))
         .max_decoding_message_size(shared.limits.message_bytes)
         .max_encoding_message_size(shared.limits.message_bytes);
@@ -294,6 +151,50 @@ pub async fn run_with(
         overseer.abort();
     }
     ended.unwrap_or(Ok(())).map_err(|error| transport(&error))
+}
+
+/// Opens every address: those of calls, that of metrics, and all as bound.
+async fn open_all(
+    listen: &[Address],
+    metrics: Option<&Address>,
+    insecure: bool,
+    guard: &Guard,
+) -> Result<(Vec<Listener>, Option<TcpListener>, Vec<Address>), ServeError> {
+    let mut listeners = Vec::with_capacity(listen.len());
+    for address in listen {
+        listeners.push(Listener::bind(address, insecure, guard).await?);
+    }
+    let mut bound: Vec<Address> = listeners.iter().map(Listener::address).collect();
+    let Some(address) = metrics else { return Ok((listeners, None, bound)) };
+    let (overseer, address) = overseer::bind(address).await?;
+    bound.push(address);
+    Ok((listeners, Some(overseer), bound))
+}
+
+/// What all calls share.
+fn share(
+    limits: Limits,
+    told: Vec<ServerSetting>,
+    (make, store, connections): (MakeDevice, Option<Arc<Store>>, Arc<Connections>),
+    signals: &Shutdown,
+) -> Arc<Shared> {
+    let places = |count| Work::new(count, &limits, signals.clone());
+    Arc::new(Shared {
+        work: places(limits.analyses),
+        desk: places(limits.analyses),
+        trials: places(2 * limits.analyses),
+        results: Arc::new(Semaphore::new(limits.result_streams)),
+        told,
+        make,
+        models: Models::default(),
+        sessions: Sessions::default(),
+        sweeps: Sweeps::new(),
+        store,
+        connections,
+        metrics: Arc::default(),
+        shutdown: signals.clone(),
+        limits,
+    })
 }
 
 /// [`run`] on threads of its own, until SIGINT or SIGTERM, or the end of standard input where
