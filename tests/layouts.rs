@@ -192,3 +192,20 @@ fn what_cuts_itself_too_often_is_refused() {
     }
     assert!(read(cif(bars(20))).is_ok());
 }
+
+/// A rigid body of any outline is a lumped mass in a drawing of ours, and keeps mass, inertia and the drag of its gas film: A = 1e-8 m²,
+/// Ip = 2e-17 m⁴, 2 µm of 2300 kg/m³ over 2 µm of air.
+#[test]
+fn a_body_keeps_its_mass_and_its_drag() {
+    let text = "process p = [Youngsmodulus=165e9 density=2300 h=2u viscosity=1.78e-5 fluid=2u]\nanchor p [root] []\n\
+                beam2d p [root c] [l=100u w=2u]\nbody2d p [c] [A=1e-8 Ip=2e-17]\n";
+    let structure = load(&Bundle::from_text("body.net", text), &[]).unwrap().structure;
+    let drawn = mask(&structure, &polymumps(), Format::Gds, "body.gds").unwrap();
+    assert!(!drawn.notes.iter().any(|note| note.contains("drag")), "{:?}", drawn.notes);
+    let source = from_bytes(&drawn.bytes, "body.gds", None, None).unwrap();
+    let back = load(&source.bundle, &[]).unwrap().structure.masses.remove(0);
+    let want = [2300.0 * 2e-6 * 1e-8, 2300.0 * 2e-6 * 2e-17, 8.9 * 1e-8, 8.9 * 2e-17];
+    for (got, want) in [back.mass, back.inertia, back.drag[0], back.drag[1]].iter().zip(want) {
+        assert!((got / want - 1.0).abs() < 1e-12, "{got} instead of {want}");
+    }
+}

@@ -5,6 +5,7 @@ use super::boxes::Boxes;
 use super::joints::{self, Joint, Kind, Parts};
 use super::medial::Medial;
 use super::moments::Moments;
+use super::pads::Pad;
 
 /// A free end beyond an anchor shorter than this many widths is part of the anchor [1].
 const STUMP: f64 = 1.5;
@@ -35,14 +36,6 @@ pub(super) struct Model {
     pub(super) held: f64,
     /// Area of beams, bodies and what is held.
     pub(super) area: f64,
-}
-
-/// An area that is held.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Pad {
-    pub(super) nodes: Vec<usize>,
-    /// Outlines of what it consists of.
-    pub(super) outlines: Vec<Vec<[f64; 2]>>,
 }
 
 /// A straight beam, perhaps with a width that changes along it.
@@ -176,21 +169,21 @@ impl Cells {
     }
 }
 
-struct Builder<'a> {
-    model: Model,
-    axis: &'a Medial,
+pub(super) struct Builder<'a> {
+    pub(super) model: Model,
+    pub(super) axis: &'a Medial,
     /// Lower left corner of the part's box.
-    origin: [f64; 2],
-    parts: &'a Parts,
+    pub(super) origin: [f64; 2],
+    pub(super) parts: &'a Parts,
     rule: &'a Rule,
     /// For each node, whether it is held.
-    anchored: Vec<bool>,
+    pub(super) anchored: Vec<bool>,
     /// For each joint, the node that stands for it.
     bodies: Vec<Option<usize>>,
     /// For each joint, the pad that it is part of.
-    pad_of: Vec<Option<usize>>,
+    pub(super) pad_of: Vec<Option<usize>>,
     /// Joints and pads that adjoin them.
-    adjoining: Vec<(usize, usize)>,
+    pub(super) adjoining: Vec<(usize, usize)>,
     taps: Vec<Tap>,
     cells: Cells,
     /// Area of the holes in each limb, and holes in each joint.
@@ -283,16 +276,7 @@ impl Builder<'_> {
         };
         // of a free body its own node, made last; else the first made
         let made = self.model.nodes.len();
-        let held: Vec<usize> = (first..made).filter(|n| self.anchored[*n]).collect();
-        if !held.is_empty() {
-            let (axis, origin) = (self.axis, self.origin);
-            let cells = joint.edges.iter().map(|e| {
-                let edge = &axis.edges[*e as usize];
-                axis.outline(edge.ends, edge.sites).map(|p| [p[0] + origin[0], p[1] + origin[1]]).to_vec()
-            });
-            self.pad_of[j] = Some(self.model.pads.len());
-            self.model.pads.push(Pad { nodes: held, outlines: cells.collect() });
-        }
+        self.joint_pad(j, first..made);
         let own = self.model.bodies.last().filter(|b| b.node >= first).map(|b| b.node);
         self.bodies[j] = own.or((made > first).then_some(first));
         ends
@@ -362,31 +346,6 @@ impl Builder<'_> {
         self.model.taps[k] = tap;
     }
 
-    /// Makes one pad of those that adjoin or share a node.
-    fn join_pads(&mut self) {
-        let mut sets = crate::sets::Sets::new(self.model.pads.len());
-        for (joint, pad) in &self.adjoining {
-            sets.join(*self.pad_of[*joint].get_or_insert(*pad), *pad);
-        }
-        let mut of_node = vec![None; self.model.nodes.len()];
-        for (k, pad) in self.model.pads.iter().enumerate() {
-            pad.nodes.iter().for_each(|n| {
-                sets.join(*of_node[*n].get_or_insert(k), k);
-            });
-        }
-        let mut joined: std::collections::BTreeMap<usize, Pad> = std::collections::BTreeMap::new();
-        for (k, pad) in std::mem::take(&mut self.model.pads).into_iter().enumerate() {
-            let whole = joined.entry(sets.first(k)).or_default();
-            whole.nodes.extend(pad.nodes);
-            whole.outlines.extend(pad.outlines);
-        }
-        self.model.pads = joined.into_values().collect();
-        for pad in &mut self.model.pads {
-            pad.nodes.sort_unstable();
-            pad.nodes.dedup();
-        }
-    }
-
     /// A limb between two nodes, less what lies over anchors.
     fn limb(&mut self, k: usize, a: usize, b: usize) {
         let limb = &self.parts.limbs[k];
@@ -402,14 +361,7 @@ impl Builder<'_> {
             Rule::Pads if self.parts.limbs.len() == 1 && loose(0) && loose(1) => vec![[0.0, 1.0]],
             _ => Vec::new(),
         };
-        // what is held of it, with the nodes at its ends
-        let mut held: Vec<([f64; 2], Vec<usize>)> = covered
-            .iter()
-            .map(|t| {
-                let ends = [(t[0] == 0.0, a), (t[1] == 1.0, b)];
-                (*t, ends.into_iter().filter(|(there, n)| *there && self.anchored[*n]).map(|(_, n)| n).collect())
-            })
-            .collect();
+        let mut held = self.held(&covered, a, b);
         let mut free = Vec::new();
         let mut from = 0.0;
         for [t0, t1] in covered.into_iter().chain([[1.0, 1.0]]) {
@@ -481,16 +433,7 @@ impl Builder<'_> {
                 over.into_iter().for_each(|(_, nodes)| nodes.push(node));
             }
         }
-        let n = [-(q[1] - p[1]) / long, (q[0] - p[0]) / long];
-        let joints = self.parts.at[k];
-        for ([t0, t1], nodes) in held {
-            let corner = |t: f64, s: f64| [at(t)[0] + s * width(t) * n[0], at(t)[1] + s * width(t) * n[1]];
-            let outline = vec![corner(t0, -0.5), corner(t1, -0.5), corner(t1, 0.5), corner(t0, 0.5)];
-            let reached = [(t0 == 0.0, joints[0]), (t1 == 1.0, joints[1])];
-            let pad = self.model.pads.len();
-            self.adjoining.extend(reached.into_iter().filter(|(there, _)| *there).map(|(_, joint)| (joint, pad)));
-            self.model.pads.push(Pad { nodes, outlines: vec![outline] });
-        }
+        self.stretches(k, [p, q], held);
         let area = limb.cell.area - self.limb_holes[k];
         self.model.area += area;
         self.model.held += (1.0 - kept) * area;

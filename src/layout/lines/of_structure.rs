@@ -181,10 +181,9 @@ impl<'a> OfStructure<'a> {
             if mass.inertia != 0.0 {
                 parameters.push(("J", mass.inertia));
             }
+            let drag = ["b", "brz"].into_iter().zip(mass.drag);
+            parameters.extend(drag.filter(|(_, value)| *value != 0.0));
             self.push(&mass.name, "mass2d", "*", &[mass.node], &parameters);
-            if mass.drag != [0.0; 2] {
-                self.left.push(format!("the gas drag of `{}`", mass.name));
-            }
         }
     }
 

@@ -55,16 +55,10 @@ pub(super) fn body2d(site: &mut Site<'_, '_>) -> Result<(), Reported> {
 pub(super) fn mass2d(site: &mut Site<'_, '_>) -> Result<(), Reported> {
     let mass = site.positive("m")?;
     let inertia = site.non_negative_or("J", 0.0)?;
+    let drag = [site.non_negative_or("b", 0.0)?, site.non_negative_or("brz", 0.0)?];
     let node = site.node(0);
     site.drawing.place(site.instance.span, &[node], &[[0.0; 2]]);
-    site.drawing.structure.masses.push(Mass {
-        name: site.name(),
-        node,
-        mass,
-        inertia,
-        drag: [0.0; 2],
-        outline: [0.0; 3],
-    });
+    site.drawing.structure.masses.push(Mass { name: site.name(), node, mass, inertia, drag, outline: [0.0; 3] });
     Ok(())
 }
 
