@@ -133,10 +133,3 @@ impl Cosim {
         drawn
     }
 }
-
-/// What ngspice said before it failed, where it was kept and the message alone does not tell.
-pub(crate) fn last_words(error: &CosimError) -> Option<String> {
-    let (CosimError::Failed { output, .. } | CosimError::Stopped { output, .. }) = error else { return None };
-    let lines: Vec<&str> = output.lines().filter(|line| !line.trim().is_empty()).collect();
-    (!lines.is_empty()).then(|| lines[lines.len().saturating_sub(6)..].join("\n"))
-}

@@ -1,6 +1,6 @@
 //! Why a command did not finish, and with which exit status.
 
-use super::merge::MergeError;
+use super::merge_error::MergeError;
 use bimorph::analysis::AnalysisError;
 use bimorph::analysis::chart::ChartError;
 use bimorph::compile::CompileError;
@@ -143,7 +143,7 @@ impl Failure {
             _ if self.is_broken_pipe() => {}
             Self::Cosim(error) => {
                 eprintln!("error: {}", error.to_string().trim_end());
-                if let Some(words) = super::cosim::last_words(error) {
+                if let Some(words) = last_words(error) {
                     eprintln!("ngspice's last words:\n{words}");
                 }
             }
@@ -165,4 +165,11 @@ impl Failure {
     fn is_broken_pipe(&self) -> bool {
         matches!(self, Self::Stdout(e) if e.kind() == io::ErrorKind::BrokenPipe)
     }
+}
+
+/// What ngspice said before it failed, where it was kept and the message alone does not tell.
+fn last_words(error: &CosimError) -> Option<String> {
+    let (CosimError::Failed { output, .. } | CosimError::Stopped { output, .. }) = error else { return None };
+    let lines: Vec<&str> = output.lines().filter(|line| !line.trim().is_empty()).collect();
+    (!lines.is_empty()).then(|| lines[lines.len().saturating_sub(6)..].join("\n"))
 }

@@ -1,16 +1,13 @@
 //! `bimorph merge`: the shards of a sweep put together.
 
 use super::failure::Failure;
+use super::merge_error::{LAST, MergeError};
 use super::output::{check_folder, print};
 use bimorph::results::{atomic, csv::field};
 use clap::Args;
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 use std::path::PathBuf;
-use thiserror::Error;
-
-/// Columns behind the results.
-const LAST: [&str; 3] = ["estimated_error [1]", "warning", "error"];
 
 /// Put the tables of a sweep's shards together: the bytes of the sweep in one run.
 ///
@@ -29,27 +26,6 @@ pub(crate) struct Merge {
     /// Write the table to a .csv file [default: standard output]
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-}
-
-/// Why tables are not the shards of one sweep.
-#[derive(Debug, Error)]
-pub(crate) enum MergeError {
-    #[error("{}: {source}", path.display())]
-    Csv { path: PathBuf, source: csv::Error },
-    #[error(
-        "{} is no table of `bimorph sweep`: its first line has to begin with \"point\" and end with \"{}\"",
-        path.display(),
-        LAST.join(",")
-    )]
-    NoTable { path: PathBuf },
-    #[error("{} is of another sweep than {}: their parameters differ", path.display(), first.display())]
-    Other { path: PathBuf, first: PathBuf },
-    #[error("{}: \"{got}\" is no number of a point", path.display())]
-    NoNumber { path: PathBuf, got: String },
-    #[error("point {point} is in {} and in {}", first.display(), second.display())]
-    Twice { point: usize, first: PathBuf, second: PathBuf },
-    #[error("{missing} points are in none of the tables, the first of them point {first}: is a shard left out?")]
-    Missing { missing: usize, first: usize },
 }
 
 /// A row: the table it is of, and its fields.

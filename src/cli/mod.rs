@@ -21,6 +21,7 @@ mod failure;
 mod interrupt;
 mod layout;
 mod merge;
+mod merge_error;
 mod model;
 mod modes;
 mod options;

@@ -3,6 +3,8 @@
 //! At junctions the ends are [`End`]s: the beam proper, which is cut, runs from one offset to the other, the rods in between
 //! belong to the bodies of the nodes, and the springs' compliance is added to that of the first and the last joint.
 
+use super::bar::shear_flexibility;
+pub use super::bar::{SHEAR_COEFFICIENT, bar};
 use super::junction_springs::End;
 use super::rigid::{Assembly, Lump};
 use super::scheme::{Bar, Cut};
@@ -12,31 +14,6 @@ use crate::options::{CompileOptions, Junctions, Scheme};
 use crate::structure::Beam;
 use nalgebra::{Matrix3, Vector2};
 use std::sync::Arc;
-
-/// Shear coefficient of a rectangular section: G·As = κ·G·A.
-pub const SHEAR_COEFFICIENT: f64 = 5.0 / 6.0;
-
-/// What the options leave of a beam: an Euler–Bernoulli beam unless shear or rotary inertia are asked for.
-pub fn bar(beam: &Beam, shear: bool, rotary: bool) -> Bar {
-    let m = &beam.material;
-    let area = beam.width * beam.thickness;
-    let inertia = beam.thickness * beam.width.powi(3) / 12.0;
-    Bar {
-        length: beam.length,
-        ea: m.youngs_modulus * area,
-        ei: m.youngs_modulus * inertia,
-        shear: if shear { shear_flexibility(beam) } else { 0.0 },
-        line_mass: m.density * beam.width * beam.thickness,
-        rotary: if rotary { beam.width * beam.width / 12.0 } else { 0.0 },
-    }
-}
-
-/// Shear flexibility 1/(G·As) of a beam's section [1/N].
-fn shear_flexibility(beam: &Beam) -> f64 {
-    let m = &beam.material;
-    let shear_modulus = m.youngs_modulus / (2.0 * (1.0 + m.poisson));
-    1.0 / (SHEAR_COEFFICIENT * shear_modulus * beam.width * beam.thickness)
-}
 
 /// Joints of the model in the making.
 #[derive(Debug, Clone, Default)]

@@ -13,7 +13,7 @@
 //! Reference: J. S. Przemieniecki, "Theory of Matrix Structural Analysis" (1968), §5.6 and §11.3, for the element; J. V.
 //! Clark et al., "Addressing the needs of complex MEMS design", MEMS 2002, for SUGAR.
 
-use super::beam::bar;
+use super::bar::bar;
 use super::rigid::Assembly;
 use super::{DiscretizeError, cubic, lay_spring, order};
 use crate::gaps::Point;

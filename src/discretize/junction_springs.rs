@@ -11,7 +11,7 @@
 //!
 //! Source of the numbers: [`super::junction_table`].
 
-use super::beam::bar;
+use super::bar::bar;
 use super::junction_table::{self as table, Row};
 use super::scheme::Bar;
 use crate::structure::Beam;

@@ -22,6 +22,7 @@
 //! | [`gap`] | combs, plates and facing beams → gap functions |
 //! | [`ports`] | resistors, heaters, sources and ports → network and quadratic forms of temperature |
 
+pub(crate) mod bar;
 pub mod beam;
 pub mod cubic;
 pub mod frame;

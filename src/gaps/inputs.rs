@@ -11,34 +11,11 @@
 
 use super::approach::Point;
 use super::drive::Drive;
+pub use super::input::Input;
 use super::system::System;
 use crate::multibody::planar::{self, Pose};
 use crate::multibody::{BlockMatrix, BodyId};
 use nalgebra::Vector2;
-
-/// A quantity that is given to a mechanism beside its voltages.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Input {
-    /// A force along global x (0) or y (1) [N], or a moment about z (2) [N·m], on a point.
-    Force {
-        /// Where it acts.
-        point: Point,
-        /// Which it is.
-        direction: usize,
-    },
-    /// Heat into a beam, spread evenly along it as that of its own current [W].
-    Heat {
-        /// Index of the heater.
-        heater: usize,
-    },
-    /// Acceleration of the frame along global x (0) or y (1) [m/s²].
-    Acceleration {
-        /// Which it is.
-        axis: usize,
-    },
-    /// Rate of the frame about z [rad/s].
-    Rate,
-}
 
 /// Motion of the frame, or a change of it.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -49,13 +26,6 @@ pub struct Frame {
     pub rate: f64,
     /// Rate of change of the rate [rad/s²].
     pub turning: f64,
-}
-
-impl Input {
-    /// Whether it moves the frame.
-    fn moves_frame(&self) -> bool {
-        matches!(self, Self::Acceleration { .. } | Self::Rate)
-    }
 }
 
 impl System {

@@ -21,7 +21,7 @@
 //! | [`thermal`] | mean temperature rise of beams that carry current |
 //! | [`lag`] | how a rise lags behind its steady value |
 //! | [`drive`] | ports → gap voltages and free strains, at a time within a step |
-//! | [`inputs`] | forces at points, heat into beams, the motion of the frame |
+//! | [`inputs`] | forces at points, heat into beams, the motion of the frame: what they do; `input`: which there are |
 //! | [`energy`] | the potential of it all, and the energy that an undamped motion keeps |
 //! | [`stop`] | how a stop bears |
 //! | `touching` | which gaps touch, and the energy in contacts |
@@ -36,6 +36,7 @@ pub mod energy;
 pub mod facing;
 mod facing_ends;
 mod gap;
+mod input;
 pub mod inputs;
 pub mod lag;
 mod laplacian;
@@ -48,6 +49,6 @@ pub mod thermal;
 mod touching;
 
 pub use drive::{Drive, Ramp};
-pub use inputs::Input;
+pub use input::Input;
 pub use lag::Lags;
 pub use system::{Gap, Load, Point, System};

@@ -13,7 +13,7 @@
 //!
 //! With a time constant the rise follows its steady value: [`super::lag`].
 
-use super::inputs::Input;
+use super::input::Input;
 use super::laplacian::Laplacian;
 use super::network::Potentials;
 use crate::sets::Sets;

@@ -33,7 +33,7 @@
 
 use super::reference::{Compared, Pencil, compare};
 use super::span::{Span, spans};
-use crate::discretize::beam::bar;
+use crate::discretize::bar::bar;
 use crate::discretize::frame::{Elements, Frame, FrameOptions, assemble};
 use crate::discretize::{Discretized, cubic, order};
 use crate::multibody::linear_system::LinearSystem;

@@ -3,7 +3,7 @@
 //! Directions along and across a beam are those of the drawing, also about an equilibrium: right as long as beams turn by
 //! small angles.
 
-use crate::discretize::beam::bar;
+use crate::discretize::bar::bar;
 use crate::discretize::cubic;
 use crate::discretize::scheme::{Bar, Part};
 use crate::gaps::Point;

@@ -13,6 +13,8 @@ pub mod dense;
 pub mod dense_unpivoted;
 pub mod frame_modes;
 pub mod frame_motion;
+mod kind;
+mod plain;
 pub mod sparse;
 
 use super::linear::{LinearSolver, Recursion};
@@ -21,51 +23,11 @@ use crate::multibody::planar::{DOF, Pose};
 use crate::multibody::{BlockMatrix, Pattern};
 use dense::Dense;
 use dense_unpivoted::DenseUnpivoted;
-use faer::dyn_stack::MemBuffer;
+pub use kind::{SolverKind, TooLarge};
 use sparse::Sparse;
-use thiserror::Error;
-
-/// Names of the linear solvers.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
-pub enum SolverKind {
-    /// The block recursion.
-    #[default]
-    Recursion,
-    /// Dense elimination without exchanges.
-    DenseUnpivoted,
-    /// Dense LU with partial pivoting.
-    Dense,
-    /// Sparse L·D·Lᵀ.
-    Sparse,
-}
-
-impl SolverKind {
-    /// All of them, the recursion first.
-    pub const ALL: [Self; 4] = [Self::Recursion, Self::DenseUnpivoted, Self::Dense, Self::Sparse];
-
-    /// Its name on the command line and in results.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Recursion => "recursion",
-            Self::DenseUnpivoted => "dense-unpivoted",
-            Self::Dense => "dense",
-            Self::Sparse => "sparse",
-        }
-    }
-}
 
 /// Dense baselines refuse more unknowns than this: their square would be larger than 1.2 GB.
 const MOST_DENSE: usize = 12_000;
-
-/// A factor that is too large to hold.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
-#[error("the {solver} factor of {unknowns} unknowns is too large to hold")]
-pub struct TooLarge {
-    /// Name of the solver.
-    pub solver: &'static str,
-    /// Scalar unknowns, held directions included.
-    pub unknowns: usize,
-}
 
 /// A linear solver chosen at run time: one comparison for each factorization or solve.
 #[derive(Debug)]
@@ -133,48 +95,6 @@ impl LinearSolver for Solver {
             Self::Dense(s) => s.solve(pattern, matrix, b),
             Self::Sparse(s) => s.solve(pattern, matrix, b),
         }
-    }
-}
-
-/// Visits every entry of the lower triangle that a matrix stores: row, column, value.
-pub(crate) fn spread(pattern: &Pattern, matrix: &BlockMatrix<f64, 3>, mut visit: impl FnMut(usize, usize, f64)) {
-    for j in 0..pattern.bodies() {
-        for c in 0..DOF {
-            for r in c..DOF {
-                visit(DOF * j + r, DOF * j + c, matrix.diagonal[j][(r, c)]);
-            }
-        }
-        for k in pattern.column(j) {
-            for c in 0..DOF {
-                for r in 0..DOF {
-                    visit(DOF * pattern.row(k) + r, DOF * j + c, matrix.below[k][(r, c)]);
-                }
-            }
-        }
-    }
-}
-
-/// A right-hand side and working memory: a solve needs both, and changes nothing that can be seen.
-struct Scratch {
-    flat: Vec<f64>,
-    memory: MemBuffer,
-}
-
-impl std::fmt::Debug for Scratch {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Scratch").field("flat", &self.flat).finish_non_exhaustive()
-    }
-}
-
-fn flatten(b: &[Pose], flat: &mut [f64]) {
-    for (to, from) in flat.chunks_exact_mut(DOF).zip(b) {
-        to.copy_from_slice(from.as_slice());
-    }
-}
-
-fn unflatten(flat: &[f64], b: &mut [Pose]) {
-    for (to, from) in b.iter_mut().zip(flat.chunks_exact(DOF)) {
-        to.copy_from_slice(from);
     }
 }
 

@@ -7,8 +7,8 @@
 
 use super::error::relative_error;
 use super::runs::Progress;
+use super::spec::{Chart, ChartError, ChartPoint, ChartSpec, Formulation, Measured, Part};
 use super::variant::Variant;
-use super::{Chart, ChartError, ChartPoint, ChartSpec, Formulation, Measured, Part};
 use crate::analysis::integrator::Integrator;
 use crate::analysis::mesh::fitted_in_time;
 use crate::analysis::modes::modes_fitted;

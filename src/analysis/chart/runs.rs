@@ -1,8 +1,8 @@
 //! The runs of the precision and order parts, each with its reference.
 
 use super::error::relative_error;
+use super::spec::{Chart, ChartError, ChartPoint, ChartSpec, Formulation, Measured, Part};
 use super::variant::{Models, Variant};
-use super::{Chart, ChartError, ChartPoint, ChartSpec, Formulation, Measured, Part};
 use crate::analysis::formulation::Formulation as Joints;
 use crate::analysis::frame::{frame, frame_transient};
 use crate::analysis::integrator::Integrator;

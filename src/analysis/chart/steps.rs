@@ -4,8 +4,8 @@
 //! from the beginning of the motion, and the time is the median over the repeats.
 
 use super::runs::{Request, median};
+use super::spec::{ChartPoint, Formulation, Measured, Part};
 use super::variant::Variant;
-use super::{ChartPoint, Formulation, Measured, Part};
 use crate::analysis::AnalysisError;
 use crate::analysis::integrator::Integrator;
 use crate::analysis::statics::{operating_point, source_vector};

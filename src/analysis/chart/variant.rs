@@ -1,6 +1,6 @@
 //! The mechanism of a chart at one model order, held and let go.
 
-use super::{ChartError, Formulation};
+use super::spec::{ChartError, Formulation};
 use crate::analysis::AnalysisError;
 use crate::compile::{CompileOptions, Compiled, compile};
 use crate::netlist::{Bundle, Setting};

@@ -1,6 +1,6 @@
 //! The electrical side of a mechanism, and what it makes of source voltages at one time.
 
-use super::super::inputs::Input;
+use super::super::input::Input;
 use super::super::lag::Lags;
 use super::super::thermal::Heating;
 use crate::multibody::forces::RestStrain;

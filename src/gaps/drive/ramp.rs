@@ -1,6 +1,6 @@
 //! Voltages, strains and inputs over the time of one step or run, from a start to an end.
 
-use super::super::inputs::Input;
+use super::super::input::Input;
 use super::super::lag::Lags;
 use super::electrics::{Drive, Electrics};
 use crate::multibody::planar::Pose;

@@ -20,12 +20,14 @@ pub mod forces;
 pub mod joint;
 pub mod matrix;
 pub mod model;
+mod number;
 mod wide;
 
 pub use super::rcr::Real;
 pub use matrix::LaneMatrix;
 pub use model::LaneModel;
-pub use wide::{Eight, Kernel, LANES, Number, Wide, across, add, load, store};
+pub use number::Number;
+pub use wide::{Eight, Kernel, LANES, Wide, across, add, load, store};
 
 /// Displacement, rate or force of a body in each variant: x, y, θ.
 pub type LanePose<T = Eight> = [T; 3];

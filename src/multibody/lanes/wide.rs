@@ -5,6 +5,7 @@
 //! operations, which took half of the time. (For the same reason there are loops here, and no closures over arrays: those are not always
 //! inlined, and a call of one vector instruction costs more than it.) Operations are those of `f64`, lane by lane; none is fused.
 
+use super::number::Number;
 use crate::multibody::rcr::Lanes;
 use crate::multibody::sine;
 use pulp::{Arch, Simd, WithSimd};
@@ -14,30 +15,6 @@ use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 pub const LANES: usize = 8;
 /// A number in each lane, in memory.
 pub type Eight = Lanes<LANES>;
-
-/// What formulas are written in: a number, or one in every lane.
-pub trait Number:
-    Copy
-    + Add<Output = Self>
-    + Sub<Output = Self>
-    + Mul<Output = Self>
-    + Div<Output = Self>
-    + Neg<Output = Self>
-    + AddAssign
-    + SubAssign
-    + Add<f64, Output = Self>
-    + Mul<f64, Output = Self>
-{
-    /// `x`, in as many lanes as this has.
-    fn like(self, x: f64) -> Self;
-}
-
-impl Number for f64 {
-    #[inline(always)]
-    fn like(self, x: f64) -> Self {
-        x
-    }
-}
 
 /// A number in every lane, in registers.
 pub trait Wide: Number {

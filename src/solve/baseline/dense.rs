@@ -8,7 +8,7 @@
 //!
 //! Reference: G. H. Golub, C. F. Van Loan, "Matrix Computations" (2013), §3.4.
 
-use super::{Scratch, flatten, spread, unflatten};
+use super::plain::{Scratch, flatten, spread, unflatten};
 use crate::multibody::factor::ZeroPivot;
 use crate::multibody::planar::{DOF, Pose};
 use crate::multibody::{BlockMatrix, Pattern};

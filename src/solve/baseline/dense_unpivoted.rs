@@ -10,7 +10,7 @@
 //!
 //! Reference: G. H. Golub, C. F. Van Loan, "Matrix Computations" (2013), algorithm 3.2.1 (outer product LU).
 
-use super::spread;
+use super::plain::spread;
 use crate::multibody::factor::ZeroPivot;
 use crate::multibody::planar::{DOF, Pose};
 use crate::multibody::{BlockMatrix, Pattern};

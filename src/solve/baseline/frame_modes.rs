@@ -70,7 +70,7 @@ pub fn lowest_consistent_modes(system: &LinearSystem, count: usize) -> Result<Co
 
 fn full(pattern: &Pattern, matrix: &BlockMatrix<f64, 3>) -> Mat<f64> {
     let mut dense = Mat::zeros(DOF * pattern.bodies(), DOF * pattern.bodies());
-    super::spread(pattern, matrix, |i, j, value| {
+    super::plain::spread(pattern, matrix, |i, j, value| {
         dense[(i, j)] = value;
         dense[(j, i)] = value;
     });

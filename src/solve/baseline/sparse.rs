@@ -9,7 +9,8 @@
 //! Reference: P. R. Amestoy, T. A. Davis, I. S. Duff, "An approximate minimum degree ordering algorithm", SIAM J. Matrix
 //! Anal. Appl. 17 (1996).
 
-use super::{Scratch, SolverKind, TooLarge, flatten, unflatten};
+use super::kind::{SolverKind, TooLarge};
+use super::plain::{Scratch, flatten, unflatten};
 use crate::multibody::factor::ZeroPivot;
 use crate::multibody::planar::{DOF, Pose};
 use crate::multibody::{BlockMatrix, Pattern};

@@ -14,6 +14,8 @@
 
 use super::inverse_iteration::{self, Block};
 use super::lanczos::{self, CLOSED, Pairs};
+pub use super::mass::mass_product;
+use super::mass::shifted;
 use super::refined::{ROUNDING, Refined};
 use super::subspace;
 use crate::gaps::{Drive, System};
@@ -177,19 +179,6 @@ fn massive_directions(model: &Model) -> usize {
         .sum()
 }
 
-/// K − σM, held directions projected.
-pub(super) fn shifted(model: &Model, stiffness: &BlockMatrix<f64, 3>, sigma: f64) -> BlockMatrix<f64, 3> {
-    let mut a = stiffness.clone();
-    for (j, block) in a.diagonal.iter_mut().enumerate() {
-        let m = model.mass(j);
-        for i in 0..3 {
-            block[(i, i)] -= sigma * m[i];
-        }
-    }
-    model.project_matrix(&mut a);
-    a
-}
-
 /// Smallest ratio of a body's stiffness to its mass [rad²/s²].
 fn typical(model: &Model, k: &BlockMatrix<f64, 3>) -> f64 {
     (0..k.diagonal.len())
@@ -198,11 +187,6 @@ fn typical(model: &Model, k: &BlockMatrix<f64, 3>) -> f64 {
         .filter(|&r| r > 0.0)
         .fold(f64::INFINITY, f64::min)
         .min(1e18)
-}
-
-/// xᵀMy.
-pub fn mass_product(model: &Model, x: &[Pose], y: &[Pose]) -> f64 {
-    x.iter().zip(y).enumerate().map(|(j, (x, y))| x.dot(&model.mass(j).component_mul(y))).sum()
 }
 
 /// The largest eigenvalues of an operator from all of its columns.

@@ -9,7 +9,7 @@
 //!
 //! Reference: K.-J. Bathe, "Finite Element Procedures" (2014), §11.6.
 
-use super::eigen::{mass_product, shifted};
+use super::mass::{mass_product, shifted};
 use super::refined::Refined;
 use super::subspace::{columns, ritz};
 use crate::multibody::planar::Pose;

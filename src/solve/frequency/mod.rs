@@ -20,6 +20,7 @@ pub mod harmonic;
 pub mod inverse_iteration;
 pub mod lanczos;
 pub mod mac;
+mod mass;
 pub mod pole;
 pub mod refined;
 pub mod subspace;

@@ -179,7 +179,7 @@ impl<'a> Refined<'a> {
 
 /// Size in the mass norm.
 fn size_of(model: &Model, x: &[Pose]) -> f64 {
-    super::eigen::mass_product(model, x, x).sqrt()
+    super::mass::mass_product(model, x, x).sqrt()
 }
 
 fn size(model: &Model, x: &[Pose]) -> f64 {

@@ -21,7 +21,7 @@ mod stages;
 mod tableau;
 
 use super::method::{Method, Motion, StepFailure, Work};
-use super::rodas4::{ALPHA, GAMMA, GAMMA_I, moves_on};
+use super::rodas4::tableau::{ALPHA, GAMMA, GAMMA_I, moves_on};
 use crate::equations::Joints;
 use crate::gaps::{Drive, Ramp, System};
 use crate::multibody::forces;

@@ -5,7 +5,7 @@ use super::tableau::TABLEAU;
 use crate::multibody::planar::Pose;
 use crate::multibody::relative::{JointMatrix, Tree};
 use crate::solve::time::method::Motion;
-use crate::solve::time::rodas4::{A, GAMMA};
+use crate::solve::time::rodas4::tableau::{A, GAMMA};
 
 /// Coordinates, rates and accelerations of one body's joint, or their changes.
 #[derive(Debug, Clone, Copy, PartialEq)]

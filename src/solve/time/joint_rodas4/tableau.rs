@@ -11,7 +11,7 @@
 //! r₁/(γh) + r₂              t_i·z + s_i·v/h + Σ S_ik·u_k/h²
 //! ```
 
-use crate::solve::time::rodas4::{A, C, GAMMA};
+use crate::solve::time::rodas4::tableau::{A, C, GAMMA};
 
 type Rows = [[f64; 6]; 6];
 

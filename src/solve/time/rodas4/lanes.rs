@@ -13,7 +13,7 @@ pub use storage::{Lane, LaneRodas4};
 
 use kernels::{Task, Work};
 
-use super::{ALPHA, moves_on};
+use super::tableau::{ALPHA, moves_on};
 use crate::gaps::{Lags, Ramp, System};
 use crate::multibody::lanes::{LANES, Real, across};
 use crate::solve::time::method::Motion;

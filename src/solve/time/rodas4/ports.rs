@@ -1,7 +1,7 @@
 //! Sensitivities with respect to final source voltages: the same stages with the exact tangent of each.
 
-use super::GAMMA;
 use super::stages::Stages;
+use super::tableau::GAMMA;
 use crate::gaps::{Drive, Ramp, System};
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, Model, Pattern};

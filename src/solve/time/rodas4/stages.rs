@@ -6,7 +6,7 @@
 //!
 //! Signs: forces are summed as they stand in M·q̈ + C·q̇ + r = 0, so the solve finds minus the increment.
 
-use super::{A, C, GAMMA, GAMMA_I};
+use super::tableau::{A, C, GAMMA, GAMMA_I};
 use crate::multibody::planar::Pose;
 use crate::multibody::{Body, Model, forces};
 use crate::solve::method::Motion;

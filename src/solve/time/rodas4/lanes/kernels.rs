@@ -3,7 +3,7 @@
 // blocks of fixed size are indexed as the formulas are written
 #![allow(clippy::needless_range_loop)]
 
-use super::super::{A, C, GAMMA, GAMMA_I};
+use super::super::tableau::{A, C, GAMMA, GAMMA_I};
 use super::motion::{Norms, mass_norm};
 use super::storage::{Change, IN_PLACE, LaneRodas4};
 use crate::multibody::lanes::forces::{self, LaneRest};

@@ -1,0 +1,28 @@
+//! Why tables are not the shards of one sweep.
+
+use std::path::PathBuf;
+use thiserror::Error;
+
+/// Columns behind the results.
+pub(super) const LAST: [&str; 3] = ["estimated_error [1]", "warning", "error"];
+
+/// Why tables are not the shards of one sweep.
+#[derive(Debug, Error)]
+pub(crate) enum MergeError {
+    #[error("{}: {source}", path.display())]
+    Csv { path: PathBuf, source: csv::Error },
+    #[error(
+        "{} is no table of `bimorph sweep`: its first line has to begin with \"point\" and end with \"{}\"",
+        path.display(),
+        LAST.join(",")
+    )]
+    NoTable { path: PathBuf },
+    #[error("{} is of another sweep than {}: their parameters differ", path.display(), first.display())]
+    Other { path: PathBuf, first: PathBuf },
+    #[error("{}: \"{got}\" is no number of a point", path.display())]
+    NoNumber { path: PathBuf, got: String },
+    #[error("point {point} is in {} and in {}", first.display(), second.display())]
+    Twice { point: usize, first: PathBuf, second: PathBuf },
+    #[error("{missing} points are in none of the tables, the first of them point {first}: is a shard left out?")]
+    Missing { missing: usize, first: usize },
+}

@@ -1,0 +1,27 @@
+//! What formulas are written in.
+
+use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+
+/// What formulas are written in: a number, or one in every lane.
+pub trait Number:
+    Copy
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+    + AddAssign
+    + SubAssign
+    + Add<f64, Output = Self>
+    + Mul<f64, Output = Self>
+{
+    /// `x`, in as many lanes as this has.
+    fn like(self, x: f64) -> Self;
+}
+
+impl Number for f64 {
+    #[inline(always)]
+    fn like(self, x: f64) -> Self {
+        x
+    }
+}
