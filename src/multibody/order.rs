@@ -51,6 +51,8 @@ struct Remaining {
     degree: Vec<u32>,
     ground: Vec<bool>,
     gone: Vec<bool>,
+    /// The vertex that last had each one among its neighbours, while a front is coupled.
+    beside: Vec<u32>,
 }
 
 impl Remaining {
@@ -67,7 +69,7 @@ impl Remaining {
         for &vertex in grounded {
             ground[vertex] = true;
         }
-        Self { neighbours, degree, ground, gone: vec![false; count] }
+        Self { neighbours, degree, ground, gone: vec![false; count], beside: vec![u32::MAX; count] }
     }
 
     /// Neighbours that are left, ground counted as one.
@@ -87,8 +89,15 @@ impl Remaining {
         }
         for (i, &u) in front.iter().enumerate() {
             crate::budget::check();
+            // a hub's list is not read for the few that are left beside one of its leaves
+            let read = self.neighbours[u as usize].len() <= READ * i;
+            if read {
+                for &w in &self.neighbours[u as usize] {
+                    self.beside[w as usize] = u;
+                }
+            }
             for &w in &front[..i] {
-                if !self.coupled(u, w) {
+                if !(if read { self.beside[w as usize] == u } else { self.coupled(u, w) }) {
                     for (from, to) in [(u, w), (w, u)] {
                         self.neighbours[from as usize].push(to);
                         self.degree[from as usize] += 1;
@@ -109,6 +118,9 @@ impl Remaining {
         if a.len() <= b.len() { a.contains(&w) } else { b.contains(&u) }
     }
 }
+
+/// A list of neighbours is read once where it is at most so many times as long as what is looked for in it.
+const READ: usize = 8;
 
 /// Depth-first numbering, leaves first. Roots stand on ground, or are the far ends of breadth-first sweeps where nothing
 /// does; neighbours come in ascending order.
