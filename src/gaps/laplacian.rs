@@ -51,7 +51,7 @@ impl Laplacian {
         for edge in &mut edges {
             *edge = (turn[edge.0], turn[edge.1]);
         }
-        let pattern = Pattern::new(size, &edges);
+        let pattern = Pattern::without_targets(size, &edges);
         let mut between = vec![0.0; pattern.off_blocks()];
         for ((a, b), g) in edges.iter().zip(conductances) {
             between[pattern.block(*a.max(b), *a.min(b))?] += g;
@@ -67,12 +67,16 @@ impl Laplacian {
             if !(sum[j] > 0.0 && sum[j].is_finite()) {
                 return None;
             }
-            let mut target = pattern.targets(j).iter();
             for (k, &row) in column.clone().zip(pattern.rows(j)) {
                 let share = between[k] / sum[j];
                 ground[row as usize] += share * ground[j];
-                for (i, &at) in (column.start..k).zip(target.by_ref()) {
-                    between[at as usize] += share * between[i];
+                // the rows below are among those of this row's own column: both ascend
+                let own = &mut pattern.column(row as usize).zip(pattern.rows(row as usize));
+                for i in k + 1..column.end {
+                    let below = pattern.row(i) as u32;
+                    if let Some((at, _)) = own.find(|(_, at)| **at == below) {
+                        between[at] += share * between[i];
+                    }
                 }
             }
         }

@@ -28,6 +28,13 @@ impl Pattern {
     /// The pattern of `count` bodies coupled by `edges` (pairs in elimination order; order within a pair and repetitions
     /// do not matter). Cost: O(blocks of the factor).
     pub fn new(count: usize, edges: &[(usize, usize)]) -> Self {
+        let mut pattern = Self::without_targets(count, edges);
+        pattern.schedule();
+        pattern
+    }
+
+    /// The same without the targets of updates, for one elimination that finds them on its way.
+    pub(crate) fn without_targets(count: usize, edges: &[(usize, usize)]) -> Self {
         let (edge_start, later) = by_earlier_body(count, edges);
         // bodies whose first later neighbour is k pass their other rows on to k: a linked list for each k
         let (mut first_child, mut sibling) = (vec![NONE; count], vec![NONE; count]);
@@ -65,7 +72,6 @@ impl Pattern {
                 pattern.fill[block] = false;
             }
         }
-        pattern.schedule();
         pattern
     }
 
