@@ -17,7 +17,7 @@ demo:
 	@examples/bank/demo
 
 test:
-	@scripts/setup ngspice versions python
+	@scripts/setup ngspice versions
 	@scripts/check
 
 soak:
