@@ -22,7 +22,6 @@ const LONG_FILES: &[&str] = &[
     "src/netlist/sugar3/builtins.rs",
     "src/netlist/sugar3/evaluate.rs",
     "src/service/rpc.rs",
-    "src/service/sessions.rs",
     "tests/netlist_library.rs",
     "tests/service/attacks.rs",
 ];

@@ -12,7 +12,7 @@ use bimorph::service::address::Address;
 use bimorph::service::client::Client;
 use bimorph::service::server::{self, ServeOptions};
 use bimorph::service::settings::Settings;
-use bimorph::service::{guard, store};
+use bimorph::service::{guard, survey};
 use clap::Args;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -77,7 +77,7 @@ impl Doctor {
         line("access", &found, "docs/service.md says what a server asks of its clients, and of its files")?;
         let mut good = found.is_ok();
         if let Some(folder) = &options.state_dir {
-            let found = store::look_at(folder).map_err(|error| error.to_string());
+            let found = survey::look_at(folder).map_err(|error| error.to_string());
             good &= found.is_ok();
             line("states", &found, "name a folder of this server's own in state_dir, which its user can write")?;
         }

@@ -146,6 +146,10 @@ impl Device for LocalDevice {
         }
     }
 
+    fn parent(&self, token: Token) -> Option<Token> {
+        self.session.as_ref()?.states.parent(token)
+    }
+
     fn load(&mut self, bytes: &[u8]) -> Result<Description, DeviceError> {
         let (opened, states) = saved::read(bytes)?;
         let (mut session, description) = Session::open(&self.compiled, &opened)?;

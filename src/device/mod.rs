@@ -262,6 +262,12 @@ pub trait Device: Send {
         Err(saved::refused("a device that can be saved", "another kind"))
     }
 
+    /// The state that a state was tried from; none: the model at rest, or a state that is not held.
+    fn parent(&self, token: Token) -> Option<Token> {
+        let _ = token;
+        None
+    }
+
     /// Starts an epoch with the states of [`Device::save`] in place of none. Returns what was opened.
     ///
     /// # Errors

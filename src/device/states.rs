@@ -52,6 +52,11 @@ impl States {
         Some(state)
     }
 
+    /// The state that one of those held was tried from; none: the model at rest.
+    pub(super) fn parent(&self, token: Token) -> Option<Token> {
+        self.held.get(&token).and_then(|(parent, _)| *parent)
+    }
+
     /// Stores the outcome of a request under the request's token.
     pub fn insert(&mut self, request: &Trial<'_>, snapshot: Snapshot) -> Token {
         let token = name(request);

@@ -2,11 +2,10 @@
 
 use super::proto;
 use super::snapshots::checksum;
-use super::store::{Entry, Store, private, size};
+use super::store::{Store, private};
 use std::fs::File;
 use std::io::{self, Write};
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 
 /// What a file begins with.
 pub(super) const HEAD: &[u8; 16] = b"bimorph states 1";
@@ -40,18 +39,16 @@ impl Keeper {
     /// # Errors
     /// What the system said, or the bound.
     pub(super) fn new(store: &Arc<Store>, id: &str, model: &str, source: &proto::CompileRequest) -> io::Result<Self> {
-        let _hold = store.hold();
-        store.keep_model(model, source)?;
+        store.begin(id, model, source)?;
         Ok(Self::of(store, id, model, 0, 0))
     }
 
-    /// Of one that goes on.
+    /// Of one that goes on; it sleeps until [`Store::wake`].
     pub(super) fn after(store: &Arc<Store>, id: &str, model: &str, kept: &Kept) -> Self {
         Self::of(store, id, model, kept.sequence, kept.accepted)
     }
 
     fn of(store: &Arc<Store>, id: &str, model: &str, sequence: u64, accepted: u64) -> Self {
-        store.entries().insert(id.to_owned(), Entry { model: model.to_owned(), asleep: None });
         Self { store: Arc::clone(store), id: id.to_owned(), model: model.to_owned(), sequence, accepted }
     }
 
@@ -64,22 +61,26 @@ impl Keeper {
         let sequence = self.sequence + 1;
         let path = self.store.session(&self.id, &self.model, sequence % 2);
         let bytes = Kept::write(sequence, accepted, sealed);
-        let old = size(&path);
-        self.store.room(old, bytes.len())?;
-        let mut file = private().open(&path)?;
-        file.write_all(&bytes)?;
-        file.set_len(bytes.len() as u64)?;
-        if self.store.sync {
-            file.sync_data()?;
-            if sequence <= 2 {
-                // the name of a new file is kept by its folder
-                File::open(self.store.folder.join("sessions"))?.sync_all()?;
+        self.store.counted(&path, bytes.len(), || {
+            let mut file = private().open(&path)?;
+            file.write_all(&bytes)?;
+            file.set_len(bytes.len() as u64)?;
+            if self.store.sync {
+                file.sync_data()?;
+                if sequence <= 2 {
+                    // the name of a new file is kept by its folder
+                    File::open(self.store.folder.join("sessions"))?.sync_all()?;
+                }
             }
-        }
-        self.store.used.fetch_add(bytes.len(), Ordering::Relaxed);
-        self.store.used.fetch_sub(old, Ordering::Relaxed);
+            Ok(())
+        })?;
         (self.sequence, self.accepted) = (sequence, accepted);
         Ok(())
+    }
+
+    /// What is kept waits for somebody to ask for it.
+    pub(super) fn sleep(&self) {
+        self.store.sleep(&self.id);
     }
 
     /// Removes what is kept.

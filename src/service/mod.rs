@@ -4,8 +4,9 @@
 //! [`proto`] is what travels and [`convert`] the only place that knows both it and the library's own types. [`client`]
 //! is built with the feature `remote` alone, and shows what [`access`] says; `tls` is for both ends. The rest is the feature `server`: [`server`] listens and stops
 //! (`sockets`, `connection`, `shutdown`), [`guard`] and `tokens` ask who comes, `intake` counts what comes in, `rpc` answers calls, `stream` is the Newton loop,
-//! `models`, `sessions` and `sweeps` keep what clients can name, under `ids` that nobody guesses, `snapshots` puts sessions
-//! into bytes, [`store`] and `keeper` hold those that outlive the server, `work` computes, in the `turns` of clients, `chunks` sends what is long, `status` says what went wrong, [`log`]
+//! `models`, `sessions` and `sweeps` keep what clients can name, under `ids` that nobody guesses; a `session` has its `usage` and its
+//! `spectra`, `snapshots` puts it into bytes, `store` and `keeper` hold what outlives the server, which `waking` goes on with and
+//! [`survey`] looks at, `work` computes, in the `turns` of clients, `chunks` sends what is long, `status` says what went wrong, [`log`]
 //! says it without waiting, [`limits`] is what clients may ask for, and [`settings`] all
 //! that a server is told, in whichever way it is [`written`].
 
@@ -46,6 +47,8 @@ pub mod server;
 #[cfg(feature = "server")]
 mod serving;
 #[cfg(feature = "server")]
+mod session;
+#[cfg(feature = "server")]
 mod sessions;
 #[cfg(feature = "server")]
 pub mod settings;
@@ -56,11 +59,15 @@ mod snapshots;
 #[cfg(feature = "server")]
 mod sockets;
 #[cfg(feature = "server")]
+mod spectra;
+#[cfg(feature = "server")]
 mod status;
 #[cfg(feature = "server")]
-pub mod store;
+mod store;
 #[cfg(feature = "server")]
 mod stream;
+#[cfg(feature = "server")]
+pub mod survey;
 #[cfg(feature = "server")]
 mod sweeps;
 #[cfg(feature = "tls")]
@@ -69,6 +76,10 @@ pub mod tls;
 pub mod tokens;
 #[cfg(feature = "server")]
 mod turns;
+#[cfg(feature = "server")]
+mod usage;
+#[cfg(feature = "server")]
+mod waking;
 #[cfg(feature = "server")]
 mod work;
 #[cfg(feature = "server")]

@@ -9,7 +9,8 @@ use super::limits::Limits;
 use super::metrics::Metrics;
 use super::models::{Model, Models, check_size};
 use super::server::MakeDevice;
-use super::sessions::{Question, Session, Sessions};
+use super::session::Question;
+use super::sessions::Sessions;
 use super::shutdown::Shutdown;
 use super::store::Store;
 use super::stream::{TrialStream, answerable};
@@ -56,49 +57,6 @@ pub(super) struct Shared {
     /// Places for results that are being sent.
     pub(super) results: Arc<Semaphore>,
     pub(super) shutdown: Shutdown,
-}
-
-impl Shared {
-    /// A session that outlives streams, and the server where states are kept.
-    fn created(&self, model: &Model) -> Result<Arc<Session>, Status> {
-        match &self.store {
-            Some(store) => self.sessions.create_kept(store, model, self.make, &self.limits),
-            None => self.sessions.create(model, self.make, &self.limits),
-        }
-    }
-
-    /// A session with the states of a snapshot.
-    fn restored(&self, model: &Model, snapshot: &[u8]) -> Result<proto::OpenResponse, Status> {
-        let session = self.created(model)?;
-        let opened = session.restore(snapshot).and_then(|opened| session.keep_all().map(|()| opened));
-        opened.inspect_err(|_| {
-            self.sessions.close(session.id());
-        })
-    }
-
-    /// The session of that id, here or kept by an earlier server.
-    pub(super) async fn session(self: &Arc<Self>, id: &str) -> Result<Arc<Session>, Status> {
-        let here = self.sessions.get(id);
-        let Some(store) = self.store.clone().filter(|store| here.is_err() && store.asleep(id).is_some()) else {
-            return here;
-        };
-        let (shared, id) = (Arc::clone(self), id.to_owned());
-        self.desk.run(move || shared.wake(&store, &id)).await
-    }
-
-    /// Goes on with what an earlier server kept of a session, whose model is compiled again where it is not here.
-    fn wake(&self, store: &Arc<Store>, id: &str) -> Result<Arc<Session>, Status> {
-        let _hold = store.hold();
-        let Some(name) = store.asleep(id) else { return self.sessions.get(id) };
-        let kept = store.load(id, &name).ok_or_else(|| gone(id))?;
-        let model = self.models.get(&name).or_else(|_| {
-            let source = store.model(&name).ok_or_else(|| status::not_found("model", &name))?;
-            let bundle = text::bundle_from_wire(source.bundle).map_err(status::violation)?;
-            let options = options_wire::options_from_wire(source.options).map_err(status::violation)?;
-            self.models.compile(bundle, options, &self.limits, self.make)
-        })?;
-        self.sessions.wake((store, id, &kept), &model, self.make, &self.limits)
-    }
 }
 
 /// The service.
@@ -193,15 +151,11 @@ impl proto::bimorph_server::Bimorph for Calls {
         let model = shared.models.get(&request.model)?;
         answerable(&request, model.compiled.parts.system.electrics.ports, &shared.limits)?;
         let job = move |budget: &Budget| {
-            let session = shared.created(&model)?;
-            match session.answer(&Question::Open(request), budget) {
+            shared.created(&model, |session| match session.answer(&Question::Open(request), budget) {
                 Some(ReplyKind::Opened(opened)) => Ok(opened),
-                Some(ReplyKind::Fault(fault)) => {
-                    shared.sessions.close(session.id());
-                    Err(refusal(fault))
-                }
+                Some(ReplyKind::Fault(fault)) => Err(refusal(fault)),
                 _ => Err(status::fault()),
-            }
+            })
         };
         self.0.desk.run_with(job).await.map(Response::new)
     }
@@ -248,11 +202,10 @@ impl proto::bimorph_server::Bimorph for Calls {
     async fn fork(&self, request: Request<proto::ForkRequest>) -> Reply<proto::OpenResponse> {
         let shared = Arc::clone(&self.0);
         let session = shared.session(&request.get_ref().session).await?;
-        let model = shared.models.get(session.model())?;
         let turn = session.turn().await?;
         let job = move || {
             let _turn = turn;
-            shared.restored(&model, &session.snapshot(None)?)
+            shared.restored(session.model(), &session.snapshot(None)?)
         };
         self.0.desk.run(job).await.map(Response::new)
     }
@@ -263,30 +216,12 @@ impl proto::bimorph_server::Bimorph for Calls {
         let (limits, none) = (&self.0.limits, lease_s == 0.0);
         let lease_s = if none { limits.idle.as_secs_f64() } else { lease_s.min(limits.stream_idle.as_secs_f64()) };
         let lease_s = convert::number("lease_s", lease_s, true).map_err(status::violation)?;
-        session.lease((!none).then(|| Duration::from_secs_f64(lease_s)));
+        session.usage.lease((!none).then(|| Duration::from_secs_f64(lease_s)));
         Ok(Response::new(proto::KeepAliveResponse { lease_s }))
     }
 
     async fn close(&self, request: Request<proto::CloseRequest>) -> Reply<proto::CloseResponse> {
-        let id = &request.get_ref().session;
-        let asleep = self.0.store.clone().filter(|store| store.asleep(id).is_some());
-        if let Some(store) = asleep {
-            let id = id.clone();
-            let forgotten = self.0.desk.run(move || {
-                store.forget(&id);
-                Ok(())
-            });
-            let forgotten = forgotten.await;
-            return forgotten.map(|()| Response::new(proto::CloseResponse {}));
-        }
-        let Some(session) = self.0.sessions.close(id) else { return Err(gone(id)) };
-        if self.0.store.is_some() {
-            let forget = move || {
-                session.forget();
-                Ok(())
-            };
-            self.0.desk.run(forget).await?;
-        }
+        self.0.close(&request.get_ref().session).await?;
         Ok(Response::new(proto::CloseResponse {}))
     }
 
@@ -526,10 +461,6 @@ fn refusal(fault: proto::Fault) -> Status {
         Some(proto::fault::Kind::Refused(proto::Refused { code })) => Status::new(code.into(), fault.message),
         _ => status::device(&convert::device::fault_from_wire(fault, "here")),
     }
-}
-
-fn gone(session: &str) -> Status {
-    status::not_found("session", session)
 }
 
 fn check(bundle: &Bundle, options: &CompileOptions) -> proto::CheckResponse {

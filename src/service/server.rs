@@ -76,7 +76,7 @@ pub async fn run_with(
         return Err(ServeError::NoAddress);
     }
     let guard = Arc::new(Guard::read(&guard)?);
-    let open = |folder| Store::open(folder, !state_unsynced, limits.state_bytes, limits.stream_idle);
+    let open = |folder| Store::open(folder, !state_unsynced, limits.state_bytes);
     let store = state_dir.as_deref().map(open).transpose()?.map(Arc::new);
     let (listeners, overseer, bound) = open_all(&listen, metrics.as_ref(), insecure, &guard).await?;
     let signals = Shutdown::default();

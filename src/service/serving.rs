@@ -4,7 +4,7 @@ use super::address::Address;
 use super::guard::{GuardError, GuardFiles};
 use super::limits::Limits;
 use super::settings::Settings;
-use super::store::StoreError;
+use super::survey::StoreError;
 use crate::compile::Compiled;
 use crate::device::Device;
 use std::path::PathBuf;

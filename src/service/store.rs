@@ -7,8 +7,9 @@
 //!
 //! What is here is bounded: two files a session, and `state_bytes` in all.
 
-use super::keeper::{HEAD, Kept};
+use super::keeper::Kept;
 use super::proto;
+use super::survey::{StoreError, Survey};
 use prost::Message;
 use std::collections::BTreeMap;
 use std::fs::{self, DirBuilder, File, OpenOptions};
@@ -17,28 +18,7 @@ use std::os::unix::fs::{DirBuilderExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::time::{Duration, Instant, SystemTime};
-use thiserror::Error;
-
-/// Why states cannot be kept.
-#[derive(Debug, Error)]
-#[non_exhaustive]
-pub enum StoreError {
-    /// The folder cannot be used.
-    #[error("state folder {path}: {reason}", path = path.display())]
-    Folder {
-        /// The folder.
-        path: PathBuf,
-        /// What the system said.
-        reason: io::Error,
-    },
-    /// Another server uses it.
-    #[error("state folder {path}: another server uses it; give each its own", path = path.display())]
-    InUse {
-        /// The folder.
-        path: PathBuf,
-    },
-}
+use std::time::{Duration, Instant};
 
 /// The folder of a server.
 #[derive(Debug)]
@@ -49,46 +29,46 @@ pub(super) struct Store {
     /// Whether to wait for the disk.
     pub(super) sync: bool,
     most: usize,
-    pub(super) used: AtomicUsize,
+    used: AtomicUsize,
     /// Every session that is kept.
     sessions: Mutex<BTreeMap<String, Entry>>,
-    /// Held while models are written or removed, and while a session is woken.
+    /// Held while models are written or removed.
     files: Mutex<()>,
 }
 
 /// A session that is kept.
 #[derive(Debug)]
-pub(super) struct Entry {
-    pub(super) model: String,
+struct Entry {
+    model: String,
     /// Since when it waits for somebody to ask for it; none: it is in use.
-    pub(super) asleep: Option<Instant>,
+    asleep: Option<Instant>,
 }
 
-/// What a server would find in a folder of states, in words. Nothing of it is removed.
-///
-/// # Errors
-/// [`StoreError`].
-pub fn look_at(folder: &Path) -> Result<String, StoreError> {
-    let store = match Store::open(folder, false, usize::MAX, Duration::MAX) {
-        Err(StoreError::InUse { .. }) => return Ok("in use by a running server".to_owned()),
-        opened => opened?,
-    };
-    let probe = folder.join("probe");
-    let written = private().open(&probe).and_then(|mut file| file.write_all(HEAD));
-    let removed = written.and_then(|()| fs::remove_file(probe));
-    removed.map_err(|reason| StoreError::Folder { path: folder.to_owned(), reason })?;
-    Ok(format!("{} sessions, {} kB, can be written", store.len(), store.used() >> 10))
+/// A session that waits for somebody to ask for it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Asleep {
+    /// The id of its model.
+    pub(super) model: String,
+    since: Instant,
 }
 
 impl Store {
-    /// Opens or makes the folder, and finds what an earlier server left there. What was not touched for `forget` is removed.
+    /// Opens or makes the folder, and finds what an earlier server left there. It stays, however old it is: the time without use
+    /// counts from here.
     ///
     /// # Errors
     /// [`StoreError`].
-    pub(super) fn open(folder: &Path, sync: bool, most: usize, forget: Duration) -> Result<Self, StoreError> {
+    pub(super) fn open(folder: &Path, sync: bool, most: usize) -> Result<Self, StoreError> {
         let wrong = |reason| StoreError::Folder { path: folder.to_owned(), reason };
         for path in [folder.to_owned(), folder.join("sessions"), folder.join("models")] {
             DirBuilder::new().recursive(true).mode(0o700).create(path).map_err(wrong)?;
+        }
+        if sync {
+            // the names of new folders are kept by those that they are in
+            let above = folder.parent().filter(|path| !path.as_os_str().is_empty()).unwrap_or(Path::new("."));
+            for path in [folder, above] {
+                File::open(path).and_then(|folder| folder.sync_all()).map_err(wrong)?;
+            }
         }
         let lock = private().open(folder.join("lock")).map_err(wrong)?;
         match lock.try_lock() {
@@ -96,63 +76,56 @@ impl Store {
             Err(fs::TryLockError::WouldBlock) => return Err(StoreError::InUse { path: folder.to_owned() }),
             Err(fs::TryLockError::Error(reason)) => return Err(wrong(reason)),
         }
-        let store = Self {
+        let found = Survey::of(folder).map_err(wrong)?;
+        for path in found.left {
+            let _ = fs::remove_file(path);
+        }
+        let asleep = Some(Instant::now());
+        let sessions = found.sessions.into_iter().map(|(id, model)| (id, Entry { model, asleep })).collect();
+        Ok(Self {
             folder: folder.to_owned(),
             _lock: lock,
             sync,
             most,
-            used: AtomicUsize::new(0),
-            sessions: Mutex::default(),
+            used: AtomicUsize::new(found.bytes),
+            sessions: Mutex::new(sessions),
             files: Mutex::default(),
-        };
-        store.look_around(forget).map_err(wrong)?;
-        Ok(store)
+        })
     }
 
-    fn look_around(&self, forget: Duration) -> io::Result<()> {
-        let (mut sessions, mut bytes) = (BTreeMap::new(), 0);
-        for entry in fs::read_dir(self.folder.join("sessions"))? {
-            let entry = entry?;
-            let found = entry.metadata()?;
-            let age = SystemTime::now().duration_since(found.modified()?).unwrap_or_default();
-            let name = entry.file_name().to_string_lossy().into_owned();
-            let ids = name.rsplit_once('.').and_then(|(ids, _)| ids.split_once('-'));
-            // what is not ours is left alone
-            let Some((id, model)) = ids.filter(|(id, model)| is_id(id) && is_id(model)) else { continue };
-            if age >= forget {
-                let _ = fs::remove_file(entry.path());
-                continue;
-            }
-            bytes += usize::try_from(found.len()).unwrap_or(usize::MAX);
-            let entry = Entry { model: model.to_owned(), asleep: Some(Instant::now()) };
-            sessions.insert(id.to_owned(), entry);
-        }
-        for entry in fs::read_dir(self.folder.join("models"))? {
-            let entry = entry?;
-            let name = entry.file_name().to_string_lossy().into_owned();
-            if sessions.values().any(|session: &Entry| session.model == name) {
-                bytes += usize::try_from(entry.metadata()?.len()).unwrap_or(usize::MAX);
-            } else if name.split('.').next().is_some_and(is_id) {
-                let _ = fs::remove_file(entry.path());
-            }
-        }
-        self.used.store(bytes, Ordering::Relaxed);
-        *self.entries() = sessions;
-        Ok(())
-    }
-
-    pub(super) fn entries(&self) -> MutexGuard<'_, BTreeMap<String, Entry>> {
+    fn entries(&self) -> MutexGuard<'_, BTreeMap<String, Entry>> {
         self.sessions.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Held by who writes or removes models, or wakes a session.
-    pub(super) fn hold(&self) -> MutexGuard<'_, ()> {
+    /// Held by who writes or removes models.
+    fn hold(&self) -> MutexGuard<'_, ()> {
         self.files.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The model of a session of an earlier run that nobody has asked for yet.
-    pub(super) fn asleep(&self, id: &str) -> Option<String> {
-        self.entries().get(id).filter(|entry| entry.asleep.is_some()).map(|entry| entry.model.clone())
+    /// Whether a session waits for somebody to ask for it.
+    pub(super) fn asleep(&self, id: &str) -> Option<Asleep> {
+        let entries = self.entries();
+        let Entry { model, asleep } = entries.get(id)?;
+        asleep.map(|since| Asleep { model: model.clone(), since })
+    }
+
+    /// Ends the sleep of a session that still sleeps as it did, where `admit` has room for it; none: it woke or ended meanwhile.
+    pub(super) fn wake<T, E>(
+        &self,
+        id: &str,
+        as_it_did: &Asleep,
+        admit: impl FnOnce() -> Result<T, E>,
+    ) -> Option<Result<T, E>> {
+        let mut entries = self.entries();
+        let entry = entries.get_mut(id).filter(|entry| entry.asleep == Some(as_it_did.since))?;
+        Some(admit().inspect(|_| entry.asleep = None))
+    }
+
+    /// A session waits from now on for somebody to ask for it.
+    pub(super) fn sleep(&self, id: &str) {
+        if let Some(entry) = self.entries().get_mut(id) {
+            entry.asleep = Some(Instant::now());
+        }
     }
 
     /// Sessions that are kept.
@@ -165,19 +138,12 @@ impl Store {
         self.used.load(Ordering::Relaxed)
     }
 
-    /// A session that could not be woken waits on.
-    pub(super) fn sleep(&self, id: &str) {
-        if let Some(entry) = self.entries().get_mut(id) {
-            entry.asleep = Some(Instant::now());
-        }
-    }
-
-    /// Forgets sessions of an earlier run that nobody asked for in `time`; how many.
+    /// Forgets sessions that nobody asked for in `time`; how many.
     pub(super) fn expire(&self, time: Duration) -> usize {
         let is_old = |entry: &Entry| entry.asleep.is_some_and(|since| since.elapsed() >= time);
         let old: Vec<String> = self.entries().iter().filter(|(_, e)| is_old(e)).map(|(id, _)| id.clone()).collect();
-        old.iter().for_each(|id| self.forget(id));
-        old.len()
+        // somebody may ask for one of them just now
+        old.iter().filter(|id| self.forget_where(id, is_old)).count()
     }
 
     /// What is kept of a session: the newer of its files that is whole.
@@ -188,20 +154,36 @@ impl Store {
 
     /// Removes what is kept of a session, and its model where no other session has it.
     pub(super) fn forget(&self, id: &str) {
+        self.forget_where(id, |_| true);
+    }
+
+    /// The same of a session that is asleep; whether it was.
+    pub(super) fn forget_asleep(&self, id: &str) -> bool {
+        self.forget_where(id, |entry| entry.asleep.is_some())
+    }
+
+    fn forget_where(&self, id: &str, wanted: impl FnOnce(&Entry) -> bool) -> bool {
         let _hold = self.hold();
-        let Some(Entry { model, .. }) = self.entries().remove(id) else { return };
+        let mut entries = self.entries();
+        if !entries.get(id).is_some_and(wanted) {
+            return false;
+        }
+        let Some(Entry { model, .. }) = entries.remove(id) else { return false };
+        let is_last = !entries.values().any(|entry| entry.model == model);
+        drop(entries);
         for slot in [0, 1] {
             self.remove(&self.session(id, &model, slot));
         }
-        if !self.entries().values().any(|entry| entry.model == model) {
+        if is_last {
             self.remove(&self.folder.join("models").join(model));
         }
+        true
     }
 
     fn remove(&self, path: &Path) {
         let bytes = size(path);
         if fs::remove_file(path).is_ok() {
-            self.used.fetch_sub(bytes, Ordering::Relaxed);
+            self.count(bytes, 0);
         }
     }
 
@@ -209,27 +191,34 @@ impl Store {
         self.folder.join("sessions").join(format!("{id}-{model}.{slot}"))
     }
 
-    /// Keeps the netlist and the options of a model, once.
-    pub(super) fn keep_model(&self, id: &str, source: &proto::CompileRequest) -> io::Result<()> {
-        let path = self.folder.join("models").join(id);
-        if path.exists() {
+    /// A new session of a model, whose netlist and options are kept, once.
+    pub(super) fn begin(&self, id: &str, model: &str, source: &proto::CompileRequest) -> io::Result<()> {
+        let _hold = self.hold();
+        self.keep_model(model, source)?;
+        self.entries().insert(id.to_owned(), Entry { model: model.to_owned(), asleep: None });
+        Ok(())
+    }
+
+    fn keep_model(&self, id: &str, source: &proto::CompileRequest) -> io::Result<()> {
+        let models = self.folder.join("models");
+        let path = models.join(id);
+        let bytes = source.encode_to_vec();
+        // one that the machine left half written when it lost its power is not what it should be
+        if fs::read(&path).is_ok_and(|held| held == bytes) {
             return Ok(());
         }
-        let bytes = source.encode_to_vec();
-        self.room(0, bytes.len())?;
         let unfinished = path.with_extension(format!("{}.new", std::process::id()));
-        let written = (|| {
+        let written = self.counted(&path, bytes.len(), || {
             let mut file = private().open(&unfinished)?;
             file.write_all(&bytes)?;
             if self.sync {
                 file.sync_all()?;
             }
-            fs::rename(&unfinished, &path)
-        })();
+            fs::rename(&unfinished, &path)?;
+            if self.sync { File::open(models)?.sync_all() } else { Ok(()) }
+        });
         if written.is_err() {
             let _ = fs::remove_file(unfinished);
-        } else {
-            self.used.fetch_add(bytes.len(), Ordering::Relaxed);
         }
         written
     }
@@ -240,14 +229,23 @@ impl Store {
         proto::CompileRequest::decode(&*bytes).ok()
     }
 
-    /// Whether `more` bytes may be kept in place of `old`.
-    pub(super) fn room(&self, old: usize, more: usize) -> io::Result<()> {
-        let used = self.used().saturating_sub(old).saturating_add(more);
+    /// Writes a file that is to have so many bytes, where there is room for them; counted is what it has in the end, also when
+    /// that fails.
+    pub(super) fn counted(&self, path: &Path, bytes: usize, write: impl FnOnce() -> io::Result<()>) -> io::Result<()> {
+        let before = size(path);
+        let used = self.used().saturating_sub(before).saturating_add(bytes);
         if used > self.most {
             let text = format!("state_bytes: at most {} in all, got {used}; Info lists the limits", self.most);
             return Err(io::Error::new(io::ErrorKind::StorageFull, text));
         }
-        Ok(())
+        let written = write();
+        self.count(before, size(path));
+        written
+    }
+
+    fn count(&self, before: usize, after: usize) {
+        let change = |used: usize| Some(used.saturating_add(after).saturating_sub(before));
+        let _ = self.used.fetch_update(Ordering::Relaxed, Ordering::Relaxed, change);
     }
 }
 
@@ -258,13 +256,8 @@ pub(super) fn private() -> OpenOptions {
     options
 }
 
-pub(super) fn size(path: &Path) -> usize {
+fn size(path: &Path) -> usize {
     fs::metadata(path).map_or(0, |found| usize::try_from(found.len()).unwrap_or(usize::MAX))
-}
-
-/// Whether this is a name that [`super::ids`] makes; no other becomes a path.
-fn is_id(text: &str) -> bool {
-    text.len() == 32 && text.bytes().all(|byte| byte.is_ascii_hexdigit())
 }
 
 #[cfg(test)]
@@ -282,7 +275,7 @@ mod tests {
     }
 
     fn store(folder: &Path, most: usize) -> Result<Store, StoreError> {
-        Store::open(folder, false, most, Duration::from_secs(60))
+        Store::open(folder, false, most)
     }
 
     #[test]
@@ -328,7 +321,7 @@ mod tests {
         let used = first.used();
         drop((keeper, first));
         let second = store(folder.path(), 200).expect("the first is gone");
-        assert_eq!((second.asleep(ID).as_deref(), second.used()), (Some(MODEL), used));
+        assert_eq!((second.asleep(ID).map(|asleep| asleep.model).as_deref(), second.used()), (Some(MODEL), used));
         second.forget(ID);
         assert_eq!((second.used(), second.len(), file.exists()), (0, 0, false));
     }

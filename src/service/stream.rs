@@ -7,7 +7,7 @@
 
 use super::limits::Limits;
 use super::rpc::Shared;
-use super::sessions::{Question, Session, refused};
+use super::session::{Question, Session, refused};
 use super::turns::{CLIENT, client};
 use super::{proto, status};
 use crate::budget::Budget;
@@ -100,15 +100,16 @@ impl TrialStream {
         let shared = Arc::clone(&self.shared);
         let limits = &shared.limits;
         answerable(open, 0, limits)?;
-        let alive = |session: &Arc<Session>| session.model() == open.model && !session.is_closed();
+        let alive = |session: &Arc<Session>| session.model().id() == open.model && !session.is_closed();
         if self.session.as_ref().is_some_and(alive) {
             return Ok(());
         }
         self.leave();
         let model = shared.models.get(&open.model)?;
         answerable(open, model.compiled.parts.system.electrics.ports, limits)?;
-        let session = self.shared.sessions.create(&model, self.shared.make, &self.shared.limits)?;
-        session.hold();
+        let session = Session::new(shared.sessions.id(limits)?, None, &model, shared.make, limits)?;
+        let session = shared.sessions.admit(session, limits)?;
+        session.usage.hold();
         self.session = Some(session);
         self.owned = true;
         Ok(())
@@ -131,7 +132,7 @@ impl TrialStream {
             Ok(session) => {
                 self.leave();
                 let opened = session.opened();
-                session.hold();
+                session.usage.hold();
                 self.session = Some(session);
                 ReplyKind::Opened(opened)
             }
@@ -141,7 +142,7 @@ impl TrialStream {
 
     fn leave(&mut self) {
         if let Some(session) = self.session.take() {
-            session.release();
+            session.usage.release();
             if self.owned {
                 self.shared.sessions.close(session.id());
             }
@@ -150,19 +151,24 @@ impl TrialStream {
     }
 }
 
-/// Checks that the answers of a device with these ports (none: the model's `own`) and signals are messages that may be sent:
-/// derivatives are as many as the square of the ports.
+/// Checks that the answers of a device with these ports (none: the model's `own`) and signals are messages that may be sent.
 ///
 /// # Errors
 /// RESOURCE_EXHAUSTED.
 pub(super) fn answerable(open: &proto::OpenRequest, own: usize, limits: &Limits) -> Result<(), Status> {
-    let signals = open.signals.len();
-    for (what, got) in [("ports", open.ports.len()), ("signals", signals)] {
+    bounded(if open.ports.is_empty() { own } else { open.ports.len() }, open.signals.len(), limits)
+}
+
+/// The same of so many ports and signals: derivatives are as many as the square of the ports.
+///
+/// # Errors
+/// RESOURCE_EXHAUSTED.
+pub(super) fn bounded(ports: usize, signals: usize, limits: &Limits) -> Result<(), Status> {
+    for (what, got) in [("ports", ports), ("signals", signals)] {
         if got > limits.signals {
             return Err(status::limit(what, limits.signals, got));
         }
     }
-    let ports = if open.ports.is_empty() { own } else { open.ports.len() };
     let bytes = size_of::<f64>().saturating_mul(ports).saturating_mul(2 * ports + signals);
     if bytes > limits.message_bytes {
         let got = format!("{bytes} for the derivatives of {ports} ports and {signals} signals");

@@ -1,77 +1,15 @@
 //! `serve --state-dir`: accepted states outlive a server that is killed at any moment; none is lost and none doubled.
 
-use crate::bench::{Bench, PLATE};
+use crate::bench::Bench;
 use crate::serving::Server;
-use bimorph::netlist::Bundle;
-use bimorph::service::convert::model::bundle_to_wire;
+use crate::stepping::{Stream, client, compiled};
 use bimorph::service::proto;
-use proto::bimorph_client::BimorphClient;
-use proto::device_reply::Kind as Reply;
 use proto::device_request::Kind as Ask;
 use std::process::Command;
 use std::time::Duration;
-use tokio::sync::mpsc;
-use tokio_stream::wrappers::ReceiverStream;
-use tonic::transport::{Channel, Endpoint};
-use tonic::{Status, Streaming};
 
-/// Length of a step [s].
-const DT: f64 = 1e-7;
 /// Longest life of a server that is to be killed, from where its fate is decided [µs].
 const LONGEST_LIFE: u64 = 4000;
-
-/// What the circuit gives in a step [V].
-fn voltages(step: usize) -> Vec<f64> {
-    vec![1.0 + (step % 7) as f64]
-}
-
-/// One stream of a session.
-struct Stream {
-    requests: mpsc::Sender<proto::DeviceRequest>,
-    replies: Streaming<proto::DeviceReply>,
-}
-
-impl Stream {
-    async fn start(client: &mut BimorphClient<Channel>, first: Ask) -> Result<(Self, proto::OpenResponse), Status> {
-        let (requests, queue) = mpsc::channel(4);
-        let replies = client.trial(ReceiverStream::new(queue)).await?.into_inner();
-        let mut stream = Self { requests, replies };
-        match stream.ask(first).await? {
-            Reply::Opened(opened) => Ok((stream, opened)),
-            other => Err(Status::not_found(format!("{other:?}"))),
-        }
-    }
-
-    async fn ask(&mut self, kind: Ask) -> Result<Reply, Status> {
-        let gone = || Status::unavailable("the stream has ended");
-        self.requests.send(proto::DeviceRequest { kind: Some(kind) }).await.map_err(|_| gone())?;
-        self.replies.message().await?.and_then(|reply| reply.kind).ok_or_else(gone)
-    }
-
-    /// One step from a state: tried and accepted. The reply, and whether the state is kept.
-    async fn step(&mut self, step: usize, parent: u64) -> Result<(proto::TrialReply, bool), Status> {
-        let mode = proto::Mode::Transient.into();
-        let trial = proto::TrialRequest { mode, parent, t: 0.0, dt: DT, voltages: voltages(step) };
-        let Reply::Trial(reply) = self.ask(Ask::Trial(trial)).await? else { panic!("a trial has a reply") };
-        assert_eq!(reply.status(), proto::trial_reply::Status::Ok, "the plate takes such steps");
-        let accept = proto::Accept { token: reply.token, answer: true };
-        match self.ask(Ask::Accept(accept)).await? {
-            Reply::Accepted(accepted) => Ok((reply, accepted.kept)),
-            other => panic!("{other:?}"),
-        }
-    }
-}
-
-async fn client(address: &str) -> BimorphClient<Channel> {
-    let endpoint = Endpoint::from_shared(address.to_owned()).expect("a uri");
-    BimorphClient::new(endpoint.connect().await.expect("the server listens"))
-}
-
-async fn compiled(client: &mut BimorphClient<Channel>) -> String {
-    let bundle = Some(bundle_to_wire(&Bundle::from_text("plate.net", PLATE)));
-    let answer = client.compile(proto::CompileRequest { bundle, options: None }).await.expect("compiles");
-    answer.into_inner().model.expect("a model").id
-}
 
 /// Numbers without chance: SplitMix64 (Steele, Lea, Flood 2014).
 struct Numbers(u64);

@@ -14,3 +14,5 @@ mod overseen;
 mod secure;
 mod service;
 mod serving;
+mod stepping;
+mod survivors;

@@ -203,6 +203,7 @@ fn the_doctor_looks_at_settings() {
     assert_eq!(good.status, 0, "{}{}", good.stdout, good.stderr);
     assert!(good.stdout.contains("more days; 2 tokens"), "{}", good.stdout);
     assert!(good.stdout.contains("ok       states   0 sessions"), "{}", good.stdout);
+    assert!(!bench.path("states").exists(), "looking makes nothing");
     let expired = settings("expired", "tokens/states");
     assert_eq!(expired.status, 1);
     for said in ["missing  access   certificate ", "it has expired", "missing  states   state folder "] {

@@ -1,10 +1,12 @@
 //! The service from outside: every call over a real socket, on port 0 or a temporary path.
 #![cfg(feature = "server")]
 
+mod attached;
 mod attacks;
 mod calls;
 mod echo;
 mod endings;
+mod kept;
 mod limits;
 mod listening;
 mod random;

@@ -9,6 +9,7 @@ use bimorph::service::limits::Limits;
 use bimorph::service::proto;
 use bimorph::service::server::{MakeDevice, ServeError, ServeOptions, run_with};
 use proto::bimorph_client::BimorphClient;
+use std::path::{Path, PathBuf};
 use std::thread::JoinHandle;
 use std::time::Duration;
 use tokio::sync::oneshot;
@@ -31,11 +32,22 @@ pub(crate) fn start(listen: &str, limits: Limits) -> Running {
 
 /// Starts a server.
 pub(crate) fn start_with(listen: &str, limits: Limits, make: MakeDevice) -> Running {
+    start_in(None, listen, limits, make)
+}
+
+/// Starts a server on port 0 whose states outlive it in a folder.
+pub(crate) fn start_kept(folder: &Path, limits: Limits, make: MakeDevice) -> Running {
+    start_in(Some(folder.to_owned()), "127.0.0.1:0", limits, make)
+}
+
+fn start_in(state_dir: Option<PathBuf>, listen: &str, limits: Limits, make: MakeDevice) -> Running {
     let (stop, stopped) = oneshot::channel::<()>();
     let (ready, bound) = std::sync::mpsc::channel();
     let options = ServeOptions {
         listen: vec![listen.parse().expect("an address")],
         limits,
+        state_dir,
+        state_unsynced: true,
         ready: Box::new(move |addresses| ready.send(addresses[0].clone()).expect("the test waits")),
         ..ServeOptions::default()
     };

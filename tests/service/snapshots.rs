@@ -1,53 +1,19 @@
 //! A session goes on elsewhere with the same bits: from a snapshot at any step, on another server, or as a fork; and not
 //! from one of another model.
 
+use super::attached::Attached;
 use super::running::{Running, block_on, compiled, start_with, wire_bundle};
 use bimorph::device::local::LocalDevice;
 use bimorph::service::limits::Limits;
 use bimorph::service::proto;
 use prost::Message;
 use proto::bimorph_client::BimorphClient;
-use proto::device_reply::Kind as ReplyKind;
-use proto::device_request::Kind as Ask;
 use std::time::Duration;
-use tokio::sync::mpsc;
+use tonic::Code;
 use tonic::transport::Channel;
-use tonic::{Code, Streaming};
 
 fn server(limits: Limits) -> Running {
     start_with("127.0.0.1:0", limits, |compiled| Box::new(LocalDevice::new(compiled)))
-}
-
-/// A stream that is attached to a session.
-struct Attached {
-    requests: mpsc::Sender<proto::DeviceRequest>,
-    replies: Streaming<proto::DeviceReply>,
-}
-
-impl Attached {
-    async fn to(client: &mut BimorphClient<Channel>, session: &str) -> Self {
-        let (requests, queue) = mpsc::channel(4);
-        let replies = client.trial(tokio_stream::wrappers::ReceiverStream::new(queue)).await.expect("a stream");
-        let mut attached = Self { requests, replies: replies.into_inner() };
-        let opened = attached.ask(Ask::Attach(proto::Attach { session: session.to_owned() })).await;
-        assert!(matches!(opened, ReplyKind::Opened(_)), "{opened:?}");
-        attached
-    }
-
-    async fn ask(&mut self, kind: Ask) -> ReplyKind {
-        self.requests.send(proto::DeviceRequest { kind: Some(kind) }).await.expect("sent");
-        let reply = self.replies.message().await.expect("a stream that goes on").expect("a reply");
-        reply.kind.expect("a kind")
-    }
-
-    async fn trial(&mut self, parent: u64, dt: f64, volts: f64) -> proto::TrialReply {
-        let mode = if dt > 0.0 { proto::Mode::Transient } else { proto::Mode::Static };
-        let request = proto::TrialRequest { mode: mode.into(), parent, t: 0.0, dt, voltages: vec![volts] };
-        match self.ask(Ask::Trial(request)).await {
-            ReplyKind::Trial(reply) => reply,
-            other => panic!("{other:?}"),
-        }
-    }
 }
 
 async fn open(client: &mut BimorphClient<Channel>, model: &str) -> String {

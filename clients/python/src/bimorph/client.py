@@ -19,7 +19,7 @@ from .errors import Diagnostic, InvalidRequest, NetlistError, NotFound, Unavaila
 from .netlist import Netlist
 from .options import WIRE, Options
 from .results import FrequencyResponse, ModesResult, NodeMotion, PullInResult, Root, StaticResult, TransientResult
-from .session import Session, Snapshot, Ticket, _resumed
+from .session import Session, Snapshot, Ticket, _opened, _resumed
 from .sweep_handle import Sweep
 from .v1 import analysis_pb2, device_pb2, model_pb2, sweep_pb2
 from .waveforms import Waveform, drive
@@ -195,7 +195,8 @@ class Client:
     def resume(self, ticket: Ticket, timeout: float = 60.0) -> Session:
         """Goes on with a kept session from its :meth:`Session.ticket`, also when the server was started anew.
 
-        Raises :class:`NotFound` when the session is not kept (any more).
+        Raises :class:`NotFound` when the session is not kept (any more), :class:`NoResult` when its states are of another version
+        of the server. Whatever this raises, what is kept stays.
         """
         return _resumed(self._channel, ticket, timeout)
 
@@ -444,7 +445,7 @@ class Model:
         noise = None if seed is None else device_pb2.Agitation(seed=seed, band_hz=noise_band)
         if kept:
             opened = self._call("Open", device_pb2.OpenRequest(model=self.id, ports=ports, signals=signals, noise=noise))
-            return Session(self._channel, self.id, (), (), timeout, opened.session)
+            return _opened(self._channel, self.id, timeout, opened.session)
         return Session(self._channel, self.id, tuple(ports), tuple(signals), timeout, noise=noise)
 
     def restore(self, snapshot: Snapshot, timeout: float = 60.0) -> Session:
@@ -454,7 +455,7 @@ class Model:
         """
         request = device_pb2.RestoreRequest(model=self.id, snapshot=snapshot.states)
         opened = self._call("Restore", request)
-        session = Session(self._channel, self.id, (), (), timeout, opened.session)
+        session = _opened(self._channel, self.id, timeout, opened.session)
         session.accepted, session.t, session._voltages = snapshot.accepted, snapshot.t, dict(snapshot.voltages)
         return session
 

@@ -104,6 +104,18 @@ def from_rpc(error: grpc.RpcError, address: str) -> BimorphError:
     code, text = error.code(), error.details() or ""
     if code == grpc.StatusCode.INVALID_ARGUMENT:
         return InvalidRequest(text, violations(error))
+    return _of_code(code, text, address)
+
+
+def from_fault(number: int, text: str, address: str) -> BimorphError:
+    """The error that a request stands for which a stream refused with this number of a gRPC code."""
+    code = next((code for code in grpc.StatusCode if code.value[0] == number), grpc.StatusCode.UNKNOWN)
+    if code == grpc.StatusCode.INVALID_ARGUMENT:
+        return InvalidRequest(text)
+    return _of_code(code, text, address)
+
+
+def _of_code(code: grpc.StatusCode, text: str, address: str) -> BimorphError:
     kind = _BY_CODE.get(code, BimorphError)
     if kind is Unavailable:
         text = f"server {address}: {text}"

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import grpc
 
 from .channel import Channel
-from .errors import BimorphError, InvalidRequest, LimitExceeded, NotFound, StepFailed, Unavailable, from_rpc
+from .errors import BimorphError, InvalidRequest, NotFound, StepFailed, Unavailable, from_fault, from_rpc
 from .results import NodeMotion, TrialReply
 from .v1 import device_pb2
 
@@ -26,17 +26,6 @@ _SHORTEST = 1e-9
 
 _LOOK = 0.2
 """While a call waits, it looks this often whether the stream is over [s]."""
-
-
-_REFUSED: dict[int, type[BimorphError]] = {
-    code.value[0]: kind
-    for code, kind in (
-        (grpc.StatusCode.NOT_FOUND, NotFound),
-        (grpc.StatusCode.RESOURCE_EXHAUSTED, LimitExceeded),
-        (grpc.StatusCode.UNAVAILABLE, Unavailable),
-    )
-}
-"""Errors of requests that a stream refused, by code."""
 
 
 @dataclass(frozen=True)
@@ -121,6 +110,8 @@ class Session:
         try:
             opened = self._ask(first).opened
         except BaseException:
+            # the session was there before this object: it stays, to be joined again
+            self._joined = False
             self.close()
             raise
         self._session = opened.session
@@ -257,7 +248,7 @@ class Session:
         """Another session that goes on from here by itself; close it as well."""
         with self._lock:
             opened = self._channel.call("Fork", device_pb2.ForkRequest(session=self._session))
-            other = Session(self._channel, self._model, (), (), self._timeout, opened.session)
+            other = _opened(self._channel, self._model, self._timeout, opened.session)
             other.accepted, other.t, other._voltages = self.accepted, self.t, dict(self._voltages)
             return other
 
@@ -269,8 +260,8 @@ class Session:
             return Ticket(self._model, self._session, self.accepted, self.t, dict(self._voltages))
 
     def resume(self) -> Session:
-        """This session on a new connection, when the old one broke or the server was started anew. This object is closed, the
-        session is not.
+        """This session on a new connection, when the old one broke, a call took too long, or the server was started anew. This
+        object is closed, the session is not; if this raises, both are as they were.
         """
         with self._lock:
             ticket = self.ticket()
@@ -282,13 +273,17 @@ class Session:
     def close(self) -> None:
         """Ends the stream; the server forgets the states. Later calls raise."""
         if self._pid == os.getpid():
-            self._over = self._over or BimorphError("the session is closed; open another one")
-            self._requests.put(None)
-            self._call.cancel()
+            self._hang_up(BimorphError("the session is closed; open another one"))
             if self._joined:
                 self._joined = False
                 with contextlib.suppress(BimorphError):
                     self._channel.call("Close", device_pb2.CloseRequest(session=self._session))
+
+    def _hang_up(self, why: BimorphError) -> None:
+        """Ends the stream alone."""
+        self._over = self._over or why
+        self._requests.put(None)
+        self._call.cancel()
 
     def __enter__(self) -> Session:
         return self
@@ -336,9 +331,11 @@ class Session:
             self._put(question)
             reply = self._answer(question)
         if reply.WhichOneof("kind") == "fault":
-            kind = reply.fault.WhichOneof("kind")
-            code = reply.fault.refused.code if kind == "refused" else 0
-            raise (NotFound if kind == "unknown_token" else _REFUSED.get(code, InvalidRequest))(reply.fault.message)
+            fault = reply.fault
+            kind = fault.WhichOneof("kind")
+            if kind == "refused":
+                raise from_fault(fault.refused.code, fault.message, self._channel.address)
+            raise (NotFound if kind == "unknown_token" else InvalidRequest)(fault.message)
         return reply
 
     def _answer(self, question: _Question) -> Any:
@@ -352,8 +349,9 @@ class Session:
                 if self._over is not None and question.replies.empty():
                     raise self._over from None
                 if left <= 0.0:
-                    self._over = Unavailable(f"server {self._channel.address}: no answer within {self._timeout} s")
-                    self.close()
+                    # the server may have done what was asked: a kept session is there, to be resumed
+                    self._hang_up(Unavailable(f"server {self._channel.address}: no answer within {self._timeout} s"))
+                    assert self._over is not None
                     raise self._over from None
 
     def _outgoing(self) -> Iterator[Any]:
@@ -374,6 +372,16 @@ class Session:
         except grpc.RpcError as error:
             over = from_rpc(error, self._channel.address)
         self._over = self._over or over
+
+
+def _opened(channel: Channel, model: str, timeout: float, session: str) -> Session:
+    """Joins a session that was opened just now; it is closed where that fails, as nobody knows of it."""
+    try:
+        return Session(channel, model, (), (), timeout, session)
+    except BaseException:
+        with contextlib.suppress(BimorphError):
+            channel.call("Close", device_pb2.CloseRequest(session=session))
+        raise
 
 
 def _resumed(channel: Channel, ticket: Ticket, timeout: float) -> Session:

@@ -1,0 +1,344 @@
+//! One open device with its states: who may ask it, and what of it is kept.
+
+use super::convert::device as wire;
+use super::keeper::Keeper;
+use super::limits::Limits;
+use super::models::Model;
+use super::server::MakeDevice;
+use super::snapshots;
+use super::spectra::small_signal;
+use super::stream::bounded;
+use super::usage::Usage;
+use super::work::caught;
+use super::{proto, status};
+use crate::budget::{Allowance, Budget, Stopped};
+use crate::device::{Device, DeviceError, Token, TrialReply};
+use proto::device_reply::Kind as ReplyKind;
+use std::panic::catch_unwind;
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
+use std::time::{Duration, Instant};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tonic::{Code, Status};
+
+/// One device with its states.
+pub(super) struct Session {
+    pub(super) id: String,
+    /// Held, so that it is here as long as the session is.
+    model: Arc<Model>,
+    pub(super) device: Mutex<Box<dyn Device>>,
+    pub(super) description: Mutex<proto::DeviceDescription>,
+    /// Whether a trial is likely to be short enough to run where its request arrives.
+    inline: bool,
+    /// Questions that go to a thread before the next try.
+    slow: AtomicU32,
+    /// Held by who works on the device for long.
+    turn: Arc<Semaphore>,
+    pub(super) usage: Usage,
+    closed: AtomicBool,
+    /// Where its accepted states are kept, if they are to outlive the server.
+    keeper: Option<Arc<Mutex<Keeper>>>,
+    /// The last accepted state that is kept; 0: none yet.
+    accepted: AtomicU64,
+    /// An accepted state that could not be kept, of which nobody has heard; 0: none.
+    due: AtomicU64,
+}
+
+/// A question that needs a thread.
+pub(super) struct Later;
+
+/// Longest computation where requests arrive.
+const SLICE: Duration = Duration::from_millis(5);
+/// After one that took longer, so many questions go to a thread at once.
+const AFTER_SLOW: u32 = 64;
+
+/// What a stream asks of its session.
+pub(super) enum Question {
+    Open(proto::OpenRequest),
+    Trial(proto::TrialRequest),
+    Accept(proto::Accept),
+    Linearize(proto::SmallSignalRequest),
+}
+
+impl Question {
+    /// Whether it has no answer.
+    pub(super) fn is_silent(&self) -> bool {
+        matches!(self, Self::Accept(accept) if !accept.answer)
+    }
+}
+
+impl Session {
+    /// A session with a device that is not open yet; with a keeper its accepted states are kept. Nobody finds it before it is
+    /// among [`super::sessions::Sessions`].
+    pub(super) fn new(
+        id: String,
+        keeper: Option<Keeper>,
+        model: &Arc<Model>,
+        make: MakeDevice,
+        limits: &Limits,
+    ) -> Result<Arc<Self>, Status> {
+        let device = catch_unwind(|| make(Arc::clone(&model.compiled))).map_err(|_| status::fault())?;
+        Ok(Arc::new(Self {
+            id,
+            accepted: AtomicU64::new(keeper.as_ref().map_or(0, |keeper| keeper.accepted)),
+            keeper: keeper.map(|keeper| Arc::new(Mutex::new(keeper))),
+            model: Arc::clone(model),
+            device: Mutex::new(device),
+            description: Mutex::default(),
+            slow: AtomicU32::new(0),
+            turn: Arc::new(Semaphore::new(1)),
+            inline: model.unknowns() <= limits.inline_unknowns,
+            usage: Usage::default(),
+            closed: AtomicBool::new(false),
+            due: AtomicU64::new(0),
+        }))
+    }
+
+    pub(super) fn id(&self) -> &str {
+        &self.id
+    }
+
+    pub(super) fn model(&self) -> &Arc<Model> {
+        &self.model
+    }
+
+    /// Answers one question; none for an accept. Waits for the device. A fault inside closes this session and no other;
+    /// what the budget stops is refused, and the session goes on.
+    pub(super) fn answer(&self, question: &Question, budget: &Budget) -> Option<ReplyKind> {
+        let device = self.device.lock().unwrap_or_else(PoisonError::into_inner);
+        self.answer_with(device, question, budget).unwrap_or_else(|why| self.refuse(question, &status::stopped(why)))
+    }
+
+    /// The same where requests arrive, for which nothing may wait: answers only if the device is free and the answer takes
+    /// less than `SLICE`.
+    ///
+    /// # Errors
+    /// [`Later`]: to be asked again with [`Session::answer`], on a thread. Trials are pure, so nothing has happened.
+    pub(super) fn answer_at_once(&self, question: &Question) -> Result<Option<ReplyKind>, Later> {
+        // what waits for the disk waits elsewhere
+        let keeps =
+            matches!(question, Question::Open(_) | Question::Accept(_)) || self.due.load(Ordering::Relaxed) != 0;
+        if keeps && self.keeper.is_some()
+            || !self.inline
+            || self.slow.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |n| n.checked_sub(1)).is_ok()
+        {
+            return Err(Later);
+        }
+        let device = match self.device.try_lock() {
+            Ok(device) => device,
+            Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
+            Err(TryLockError::WouldBlock) => return Err(Later),
+        };
+        let deadline = Some(Instant::now() + SLICE);
+        let slice = Budget::new(Allowance { deadline, ..Allowance::default() });
+        self.answer_with(device, question, &slice).map_err(|_| {
+            self.slow.store(AFTER_SLOW, Ordering::Relaxed);
+            Later
+        })
+    }
+
+    fn answer_with(
+        &self,
+        mut device: MutexGuard<'_, Box<dyn Device>>,
+        question: &Question,
+        budget: &Budget,
+    ) -> Result<Option<ReplyKind>, Stopped> {
+        if self.is_closed() {
+            return Ok(self.refuse(question, &status::not_found("session", &self.id)));
+        }
+        self.usage.touch();
+        match caught(budget, || self.ask(device.as_mut(), question)) {
+            Some(Ok(reply)) => Ok(reply),
+            Some(Err(why)) => {
+                device.recover();
+                Err(why)
+            }
+            None => {
+                self.fault();
+                Ok(self.refuse(question, &status::fault()))
+            }
+        }
+    }
+
+    fn refuse(&self, question: &Question, status: &Status) -> Option<ReplyKind> {
+        (!question.is_silent()).then(|| refused(status))
+    }
+
+    fn ask(&self, device: &mut dyn Device, question: &Question) -> Option<ReplyKind> {
+        if let Err(status) = self.make_up(device, question) {
+            return self.refuse(question, &status);
+        }
+        let answer = match question {
+            Question::Open(request) => {
+                let request = wire::open_from_wire(request);
+                device.open(&request).map(|description| {
+                    let description = wire::description_to_wire(&description);
+                    *self.description.lock().unwrap_or_else(PoisonError::into_inner) = description;
+                    self.keep(device, None).map_or_else(|s| refused(&s), |_| ReplyKind::Opened(self.opened()))
+                })
+            }
+            Question::Trial(request) => {
+                let mut reply = TrialReply::default();
+                wire::trial_from_wire(request)
+                    .and_then(|trial| device.trial(&trial, &mut reply))
+                    .map(|()| ReplyKind::Trial(wire::reply_to_wire(&mut reply)))
+            }
+            Question::Accept(proto::Accept { token, answer }) => {
+                device.accept(Token(*token));
+                let kept = self.keep(device, Some(Token(*token)));
+                if let Err(status) = &kept {
+                    tracing::warn!(session = self.id, reason = status.message(), "an accepted state is not kept");
+                }
+                self.due.store(if kept.is_err() && !answer { *token } else { 0 }, Ordering::Relaxed);
+                let accepted = |kept| ReplyKind::Accepted(proto::Accepted { token: *token, kept });
+                return answer.then(|| kept.map_or_else(|status| refused(&status), accepted));
+            }
+            Question::Linearize(request) => {
+                small_signal(device, Token(request.token), request.omega, request.noise).map(ReplyKind::Linearized)
+            }
+        };
+        Some(answer.unwrap_or_else(|error| ReplyKind::Fault(wire::fault_to_wire(&error))))
+    }
+
+    /// Keeps now what an accept without an answer could not: until that is done its stream has no later reply but the refusal.
+    fn make_up(&self, device: &dyn Device, question: &Question) -> Result<(), Status> {
+        let due = self.due.load(Ordering::Relaxed);
+        if due == 0 || matches!(question, Question::Open(_) | Question::Accept(_)) {
+            return Ok(());
+        }
+        let kept = self.keep(device, Some(Token(due)));
+        // a state that is not held any more never will be kept: this is said once
+        if kept.as_ref().map_or_else(|status| status.code() == Code::NotFound, |_| true) {
+            self.due.store(0, Ordering::Relaxed);
+        }
+        kept.map(|_| ())
+    }
+
+    /// Keeps an accepted state and those that a client may go back to which has not heard of it, where states are kept; without
+    /// a token all that are held. Whether it did.
+    fn keep(&self, device: &dyn Device, token: Option<Token>) -> Result<bool, Status> {
+        let Some(keeper) = &self.keeper else { return Ok(false) };
+        let mut keeper = keeper.lock().unwrap_or_else(PoisonError::into_inner);
+        if self.is_closed() {
+            return Err(status::not_found("session", &self.id));
+        }
+        let states = match token {
+            None => device.save(None),
+            Some(token) => with_those_before(device, token, Token(keeper.accepted)),
+        };
+        let states = states.map_err(|error| status::device(&error))?;
+        let sealed = snapshots::seal(self.model.id(), &states);
+        let accepted = token.map_or(0, |token| token.0);
+        keeper.keep(accepted, &sealed).map_err(|error| status::not_kept(&error))?;
+        self.accepted.store(accepted, Ordering::Relaxed);
+        Ok(true)
+    }
+
+    /// Keeps all states that are held, where states are kept.
+    pub(super) fn keep_all(&self) -> Result<(), Status> {
+        let device = self.lock()?;
+        self.keep(&**device, None).map(|_| ())
+    }
+
+    /// Its states as a sealed snapshot.
+    pub(super) fn snapshot(&self, only: Option<Token>) -> Result<Vec<u8>, Status> {
+        self.usage.touch();
+        let states =
+            self.lock()?.save(only.as_ref().map(std::slice::from_ref)).map_err(|error| status::device(&error))?;
+        Ok(snapshots::seal(self.model.id(), &states))
+    }
+
+    /// Starts with the states of a sealed snapshot.
+    pub(super) fn restore(&self, sealed: &[u8], limits: &Limits) -> Result<proto::OpenResponse, Status> {
+        let states = snapshots::open(self.model.id(), sealed)?;
+        let described = self.lock()?.load(states).map_err(|error| status::device(&error))?;
+        bounded(described.ports.len(), described.signals.len(), limits)?;
+        *self.description.lock().unwrap_or_else(PoisonError::into_inner) = wire::description_to_wire(&described);
+        Ok(self.opened())
+    }
+
+    fn lock(&self) -> Result<MutexGuard<'_, Box<dyn Device>>, Status> {
+        if self.is_closed() {
+            return Err(status::not_found("session", &self.id));
+        }
+        Ok(self.device.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    /// Waits for this session's turn, without a thread: who works on its device for long holds it.
+    pub(super) async fn turn(&self) -> Result<OwnedSemaphorePermit, Status> {
+        Arc::clone(&self.turn).acquire_owned().await.map_err(|_| status::fault())
+    }
+
+    /// What the last open said; an empty description before any.
+    pub(super) fn opened(&self) -> proto::OpenResponse {
+        let device = self.description.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        proto::OpenResponse {
+            session: self.id.clone(),
+            device: Some(device),
+            kept: self.keeper.is_some(),
+            accepted: self.accepted.load(Ordering::Relaxed),
+        }
+    }
+
+    pub(super) fn is_closed(&self) -> bool {
+        self.closed.load(Ordering::Relaxed)
+    }
+
+    /// Closes after a panic: its states may be half made. What is kept of it stays, and sleeps until somebody asks for it.
+    pub(super) fn fault(&self) {
+        tracing::error!(session = self.id, model = self.model.id(), "internal fault: the session is closed");
+        self.closed.store(true, Ordering::Relaxed);
+        if let Some(keeper) = &self.keeper {
+            keeper.lock().unwrap_or_else(PoisonError::into_inner).sleep();
+        }
+    }
+
+    /// Closes it; what is kept of it goes soon after.
+    pub(super) fn close(&self) {
+        self.closed.store(true, Ordering::Relaxed);
+        let Some(keeper) = self.keeper.clone() else { return };
+        let forget = move || forget(&keeper);
+        match tokio::runtime::Handle::try_current() {
+            Ok(runtime) => drop(runtime.spawn_blocking(forget)),
+            Err(_) => forget(),
+        }
+    }
+
+    /// Removes what is kept of a closed session. Waits for the disk.
+    pub(super) fn forget(&self) {
+        if let Some(keeper) = &self.keeper {
+            forget(keeper);
+        }
+    }
+}
+
+/// A state as bytes, with those that a client may go back to: the one it was tried from, and the one accepted `before`. A client
+/// that was not told of an accept takes its step again, or another one, from the state that it knows.
+fn with_those_before(device: &dyn Device, token: Token, before: Token) -> Result<Vec<u8>, DeviceError> {
+    let mut tokens = vec![token];
+    for other in [device.parent(token), Some(before)].into_iter().flatten() {
+        if other.0 != 0 && !tokens.contains(&other) {
+            tokens.insert(0, other);
+        }
+    }
+    loop {
+        match device.save(Some(&tokens)) {
+            // one that is not held any more
+            Err(DeviceError::UnknownToken(unknown)) if unknown != token && tokens.contains(&unknown) => {
+                tokens.retain(|token| *token != unknown);
+            }
+            saved => return saved,
+        }
+    }
+}
+
+/// Whoever keeps at this moment is waited for, and then finds the session closed.
+fn forget(keeper: &Mutex<Keeper>) {
+    keeper.lock().unwrap_or_else(PoisonError::into_inner).forget();
+}
+
+/// A status as a fault on a stream that goes on.
+pub(super) fn refused(status: &Status) -> ReplyKind {
+    let kind = proto::fault::Kind::Refused(proto::Refused { code: status.code() as i32 });
+    ReplyKind::Fault(proto::Fault { kind: Some(kind), message: status.message().to_owned() })
+}

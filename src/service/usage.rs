@@ -1,0 +1,66 @@
+//! When a session was used last, and for how long it is kept without use.
+
+use super::limits::Limits;
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
+
+/// The use of a session.
+pub(super) struct Usage {
+    started: Instant,
+    used_ms: AtomicU64,
+    /// 0: none was asked for.
+    lease_ms: AtomicU64,
+    /// Streams that hold it.
+    streams: AtomicUsize,
+}
+
+impl Default for Usage {
+    fn default() -> Self {
+        Self {
+            started: Instant::now(),
+            used_ms: AtomicU64::new(0),
+            lease_ms: AtomicU64::new(0),
+            streams: AtomicUsize::new(0),
+        }
+    }
+}
+
+impl Usage {
+    /// It is used now.
+    pub(super) fn touch(&self) {
+        self.used_ms.store(self.age_ms(), Ordering::Relaxed);
+    }
+
+    /// A stream takes hold of it.
+    pub(super) fn hold(&self) {
+        self.streams.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// A stream lets go of it.
+    pub(super) fn release(&self) {
+        self.touch();
+        self.streams.fetch_sub(1, Ordering::Relaxed);
+    }
+
+    /// Keeps it for `lease` without use, or for as long as the server keeps any.
+    pub(super) fn lease(&self, lease: Option<Duration>) {
+        self.touch();
+        let millis = lease.map_or(0, |lease| u64::try_from(lease.as_millis()).unwrap_or(u64::MAX).max(1));
+        self.lease_ms.store(millis, Ordering::Relaxed);
+    }
+
+    /// Whether it was not used for longer than it is kept.
+    pub(super) fn is_over(&self, limits: &Limits) -> bool {
+        let kept = match self.lease_ms.load(Ordering::Relaxed) {
+            _ if self.streams.load(Ordering::Relaxed) > 0 => limits.stream_idle,
+            0 => limits.idle,
+            lease => Duration::from_millis(lease),
+        };
+        let idle = Duration::from_millis(self.age_ms().saturating_sub(self.used_ms.load(Ordering::Relaxed)));
+        idle >= kept
+    }
+
+    fn age_ms(&self) -> u64 {
+        u64::try_from(self.started.elapsed().as_millis()).unwrap_or(u64::MAX)
+    }
+}
