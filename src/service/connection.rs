@@ -6,9 +6,9 @@
 //! The HTTP layer waits for its clients when it shuts down; one that never answers would hold the server for as long as
 //! it likes. So the socket itself listens for the order to cut: reads and writes then fail, and the layer above gives up.
 
-use super::guard::{Guard, Voice};
+use super::guard::{Guard, Voice, Who};
 use super::limits::Limits;
-use std::fmt;
+use socket2::{SockRef, TcpKeepalive};
 use std::future::Future;
 use std::io;
 use std::pin::Pin;
@@ -31,32 +31,6 @@ enum Socket {
     Tcp(TcpStream),
     Tls(Box<TlsStream<TcpStream>>),
     Unix(UnixStream),
-}
-
-/// Who is at the other end.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum Who {
-    /// The owner of this server, over a Unix socket.
-    Local,
-    /// Anybody.
-    Unknown,
-    /// Somebody who speaks plain HTTP/2 where TLS is spoken.
-    Plain,
-    /// The owner of a certificate, by its SHA-256.
-    Certified([u8; 32]),
-    /// The owner of a token.
-    Named(Arc<str>),
-}
-
-impl fmt::Display for Who {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Local => f.write_str("local"),
-            Self::Unknown | Self::Plain => f.write_str("unknown"),
-            Self::Certified(hash) => hash[..8].iter().try_for_each(|byte| write!(f, "{byte:02x}")),
-            Self::Named(name) => f.write_str(name),
-        }
-    }
 }
 
 static NUMBERS: AtomicU64 = AtomicU64::new(1);
@@ -129,13 +103,26 @@ pub(super) struct Connections {
     places: Arc<Semaphore>,
     open: Mutex<Vec<Weak<Presence>>>,
     handshake: Duration,
+    keepalive: Duration,
     cutting: CancellationToken,
 }
 
 impl Connections {
     pub(super) fn new(limits: &Limits, cutting: &CancellationToken) -> Self {
-        let places = Arc::new(Semaphore::new(limits.connections));
-        Self { places, open: Mutex::default(), handshake: limits.handshake, cutting: cutting.clone() }
+        let places = Arc::new(Semaphore::new(limits.connections.min(Semaphore::MAX_PERMITS)));
+        let Limits { handshake, keepalive, .. } = *limits;
+        Self { places, open: Mutex::default(), handshake, keepalive, cutting: cutting.clone() }
+    }
+
+    /// Sets a socket so that its replies do not wait for others, and a peer that is gone is noticed.
+    pub(super) fn prepare(&self, socket: &TcpStream) -> io::Result<()> {
+        // Without this, replies wait for the peer's delayed acknowledgement: 40 ms a trial.
+        socket.set_nodelay(true)?;
+        // Asked by the system and not by HTTP/2: a circuit that is paused, whose program runs none of its threads, still answers.
+        let (first, next) = (self.keepalive, self.keepalive / QUESTIONS);
+        let second = Duration::from_secs(1);
+        let asked = TcpKeepalive::new().with_time(first.max(second)).with_interval(next.max(second));
+        SockRef::from(socket).set_tcp_keepalive(&asked.with_retries(QUESTIONS - 1))
     }
 
     /// A place for one more: a free one, or that of the connection without calls that was idle for longest.
@@ -152,7 +139,8 @@ impl Connections {
         open.retain(|presence| presence.strong_count() > 0);
         let idle = open.iter().filter_map(Weak::upgrade).filter(|presence| !presence.cut.is_cancelled());
         idle.filter_map(|presence| presence.idle().map(|time| (time, presence)))
-            .max_by_key(|(time, _)| *time)
+            // among those that never greeted, the one that is there for longest
+            .max_by_key(|(time, presence)| (*time, presence.opened.elapsed()))
             .map(|(_, p)| p)
     }
 
@@ -212,6 +200,9 @@ impl Connections {
         Connection { socket, cut, presence, greeting, read: 0, _place: place }
     }
 }
+
+/// Parts of the time of silence; a question is asked after each but the last of a second such time.
+const QUESTIONS: u32 = 6;
 
 /// How long a connection may take to let go of its place.
 const LETTING_GO: Duration = Duration::from_secs(1);
@@ -316,5 +307,25 @@ impl AsyncWrite for Connection {
             Socket::Tls(socket) => Pin::new(socket).poll_shutdown(cx),
             Socket::Unix(socket) => Pin::new(socket).poll_shutdown(cx),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! Of those that never greeted, the one that came first makes room.
+    use super::*;
+
+    #[test]
+    fn the_oldest_silent_connection_makes_room() {
+        let connections = Connections::new(&Limits::default(), &CancellationToken::new());
+        let silent = [(); 3].map(|()| connections.welcome());
+        let greeted = connections.welcome();
+        greeted.greeted.store(true, Ordering::Relaxed);
+        for expected in &silent {
+            let found = connections.longest_idle().expect("one is silent");
+            assert_eq!(found.number(), expected.number());
+            found.cut.cancel();
+        }
+        assert_eq!(connections.longest_idle().map(|found| found.number()), Some(greeted.number()));
     }
 }

@@ -2,9 +2,10 @@
 //!
 //! A Unix socket asks for nothing: its mode lets in its owner alone.
 
-use super::connection::{Presence, Who};
+use super::connection::Presence;
 use super::tls::{ALPN, Pair, PemError, authorities, certificates, provider, validity};
 use super::tokens::{TokenError, Tokens, is_open, sha256};
+use std::fmt;
 use std::io;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -139,10 +140,17 @@ impl Guard {
         self.tls.is_some() && (self.certified || self.tokens.is_some())
     }
 
-    /// Who asks, if that is known to the server.
-    pub(super) fn admit(&self, presence: &Presence, headers: &HeaderMap) -> Result<Who, Status> {
+    /// Who is there, if it speaks as this address does.
+    pub(super) fn hear(&self, presence: &Presence) -> Result<Who, Status> {
         match presence.who() {
             Who::Plain => Err(Status::unauthenticated("this address speaks TLS: connect with https://")),
+            known => Ok(known),
+        }
+    }
+
+    /// Who asks, if that is known to the server.
+    pub(super) fn admit(&self, presence: &Presence, headers: &HeaderMap) -> Result<Who, Status> {
+        match self.hear(presence)? {
             Who::Local => Ok(Who::Local),
             known => match &self.tokens {
                 Some(tokens) => tokens.who(headers).map(Who::Named),
@@ -173,6 +181,32 @@ impl Guard {
                 say_goodbye(socket).await;
                 Err(error)
             }
+        }
+    }
+}
+
+/// Who is at the other end.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Who {
+    /// The owner of this server, over a Unix socket.
+    Local,
+    /// Anybody.
+    Unknown,
+    /// Somebody who speaks plain HTTP/2 where TLS is spoken.
+    Plain,
+    /// The owner of a certificate, by its SHA-256.
+    Certified([u8; 32]),
+    /// The owner of a token.
+    Named(Arc<str>),
+}
+
+impl fmt::Display for Who {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Local => f.write_str("local"),
+            Self::Unknown | Self::Plain => f.write_str("unknown"),
+            Self::Certified(hash) => hash[..8].iter().try_for_each(|byte| write!(f, "{byte:02x}")),
+            Self::Named(name) => f.write_str(name),
         }
     }
 }

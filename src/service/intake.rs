@@ -4,30 +4,28 @@
 //! the server can hold. So every call enters here: it counts among the calls of the server and of its connection, its
 //! bytes count from the first (those of a stream until each message is whole, those of a unary request until it is
 //! answered), and a message that was begun must go on. Who may not ask is refused here; whether the server is well may be
-//! asked by everybody.
+//! asked by everybody, in a few small places of its own, so that nobody is in the way of others by asking that.
 
+use super::bodies::{Answering, Received};
 use super::connection::Presence;
-use super::framing::Framing;
 use super::guard::Guard;
 use super::ids::Ids;
 use super::limits::Limits;
 use super::metrics::{self, Metrics};
 use super::status;
 use super::turns::CLIENT;
-use http_body::{Frame, SizeHint};
 use std::convert::Infallible;
 use std::future::Future;
 use std::pin::Pin;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicI32, AtomicU64, AtomicUsize, Ordering};
 use std::task::{Context, Poll};
-use std::time::{Duration, Instant as Moment};
-use tokio::time::{Instant, Sleep};
+use std::time::{Duration, Instant};
 use tonic::body::Body;
-use tonic::codegen::{Bytes, Service, http};
+use tonic::codegen::{Service, http};
 use tonic::server::NamedService;
 use tonic::{Code, Status};
-use tracing::{Instrument, Span};
+use tracing::Instrument;
 
 /// Calls whose requests are streams: silence between two messages is no pause.
 const STREAMS: [&str; 2] = ["/Trial", "/ServerReflectionInfo"];
@@ -35,6 +33,8 @@ const STREAMS: [&str; 2] = ["/Trial", "/ServerReflectionInfo"];
 /// Counts for all services of a server.
 pub(super) struct Gate {
     calls: AtomicUsize,
+    /// Calls of health: those that are answered at once, and those that go on.
+    health: [AtomicUsize; 2],
     held: AtomicUsize,
     most_calls: usize,
     most_held: usize,
@@ -53,12 +53,17 @@ const LONGEST_ID: usize = 64;
 
 /// A service without tokens: who watches over servers has none.
 const OPEN: &str = "grpc.health.v1.Health";
+/// Calls of it at once of each kind: `Check`, and `Watch`, which goes on.
+const HEALTH_CALLS: usize = 64;
+/// Bytes of a request of it.
+const HEALTH_BYTES: usize = 1 << 10;
 
 impl Gate {
     pub(super) fn new(limits: &Limits, guard: Arc<Guard>, metrics: Arc<Metrics>) -> Arc<Self> {
         let name = Ids::default().make().map_or_else(|_| "request".to_owned(), |id| id[..8].to_owned());
         Arc::new(Self {
             calls: AtomicUsize::new(0),
+            health: Default::default(),
             held: AtomicUsize::new(0),
             most_calls: limits.calls,
             most_held: limits.held_bytes,
@@ -92,59 +97,95 @@ impl Gate {
         })
     }
 
-    fn enter(self: &Arc<Self>, presence: Option<Arc<Presence>>, path: &str) -> Call {
+    fn enter(self: &Arc<Self>, request: &http::Request<Body>, is_health: bool) -> Call {
+        let path = request.uri().path();
         let call = Call {
             gate: Arc::clone(self),
-            presence,
+            presence: request.extensions().get().cloned(),
+            health: is_health.then(|| usize::from(path.ends_with("/Watch"))),
             held: AtomicUsize::new(0),
             place: metrics::place(path),
-            started: Moment::now(),
+            started: Instant::now(),
             // of who goes away before the end
             code: AtomicI32::new(Code::Cancelled as i32),
         };
-        if let Some(presence) = &call.presence {
+        // a connection that asks for health alone is idle, and makes room for others
+        if let (Some(presence), None) = (&call.presence, call.health) {
             presence.begin();
         }
         // from here the call gives back what it took when it is dropped
-        self.calls.fetch_add(1, Ordering::Relaxed);
+        call.count().fetch_add(1, Ordering::Relaxed);
         call
     }
 
     /// Whether a call may go on, and whose it is.
-    fn admit(&self, call: &Call, request: &http::Request<Body>, open: bool) -> Result<String, Status> {
-        if self.calls() > self.most_calls {
-            return Err(status::limit("calls", self.most_calls, "one more; end some"));
+    fn admit(&self, call: &Call, headers: &http::HeaderMap) -> Result<String, Status> {
+        let presence = call.presence.as_ref().ok_or_else(|| Status::unauthenticated("nobody is known to ask"))?;
+        let (most, name) = if call.is_health() { (HEALTH_CALLS, "health") } else { (self.most_calls, "calls") };
+        if call.count().load(Ordering::Relaxed) > most {
+            return Err(status::limit(name, most, "one more; end some"));
         }
-        match &call.presence {
-            Some(presence) if !open => Ok(self.guard.admit(presence, request.headers())?.to_string()),
-            _ => Ok("unknown".to_owned()),
-        }
+        let known = if call.is_health() { self.guard.hear(presence) } else { self.guard.admit(presence, headers) };
+        known.map(|who| who.to_string())
     }
 }
 
 /// One call, from its first byte until its answer is sent.
-struct Call {
+pub(super) struct Call {
     gate: Arc<Gate>,
     presence: Option<Arc<Presence>>,
+    /// Its kind among those of health; none: any other.
+    health: Option<usize>,
     held: AtomicUsize,
     /// Its place among the calls that are counted.
     place: usize,
-    started: Moment,
+    started: Instant,
     /// How it ended.
     code: AtomicI32,
 }
 
 impl Call {
+    /// The count that it is in.
+    fn count(&self) -> &AtomicUsize {
+        self.health.map_or(&self.gate.calls, |kind| &self.gate.health[kind])
+    }
+
+    /// Whether it asks for the health of this server.
+    pub(super) fn is_health(&self) -> bool {
+        self.health.is_some()
+    }
+
+    /// How long its request may pause.
+    pub(super) fn longest_pause(&self) -> Duration {
+        self.gate.pause
+    }
+
+    /// How it ended, as far as is known.
+    pub(super) fn code(&self) -> Code {
+        Code::from_i32(self.code.load(Ordering::Relaxed))
+    }
+
+    /// How long it has taken so far.
+    pub(super) fn time(&self) -> Duration {
+        self.started.elapsed()
+    }
+
     /// Takes note of the code in headers or trailers.
-    fn hear(&self, headers: &http::HeaderMap) {
+    pub(super) fn hear(&self, headers: &http::HeaderMap) {
         let code = headers.get("grpc-status").and_then(|value| value.to_str().ok()).and_then(|text| text.parse().ok());
         if let Some(code) = code {
             self.code.store(code, Ordering::Relaxed);
         }
     }
 
-    fn hold(&self, bytes: usize) -> Result<(), Status> {
-        self.held.fetch_add(bytes, Ordering::Relaxed);
+    /// More of its request has come.
+    pub(super) fn hold(&self, bytes: usize) -> Result<(), Status> {
+        let own = self.held.fetch_add(bytes, Ordering::Relaxed) + bytes;
+        if self.is_health() {
+            let refused =
+                || Status::resource_exhausted(format!("a request of health has at most {HEALTH_BYTES} bytes"));
+            return if own > HEALTH_BYTES { Err(refused()) } else { Ok(()) };
+        }
         let held = self.gate.held.fetch_add(bytes, Ordering::Relaxed) + bytes;
         if held > self.gate.most_held {
             return Err(status::limit("held_bytes", self.gate.most_held, held));
@@ -152,19 +193,21 @@ impl Call {
         Ok(())
     }
 
-    fn release(&self) {
+    /// What has come is not held any more.
+    pub(super) fn release(&self) {
         let bytes = self.held.swap(0, Ordering::Relaxed);
-        self.gate.held.fetch_sub(bytes, Ordering::Relaxed);
+        if !self.is_health() {
+            self.gate.held.fetch_sub(bytes, Ordering::Relaxed);
+        }
     }
 }
 
 impl Drop for Call {
     fn drop(&mut self) {
         self.release();
-        self.gate.calls.fetch_sub(1, Ordering::Relaxed);
-        let (code, time) = (Code::from_i32(self.code.load(Ordering::Relaxed)), self.started.elapsed());
-        self.gate.metrics.ended(self.place, code, time);
-        if let Some(presence) = &self.presence {
+        self.count().fetch_sub(1, Ordering::Relaxed);
+        self.gate.metrics.ended(self.place, self.code(), self.time());
+        if let (Some(presence), None) = (&self.presence, self.health) {
             presence.end();
         }
     }
@@ -203,9 +246,9 @@ where
     }
 
     fn call(&mut self, request: http::Request<Body>) -> Answer {
-        let call = Arc::new(self.gate.enter(request.extensions().get().cloned(), request.uri().path()));
+        let call = Arc::new(self.gate.enter(&request, S::NAME == OPEN));
         let id = self.gate.request_id(request.headers());
-        let admitted = self.gate.admit(&call, &request, S::NAME == OPEN);
+        let admitted = self.gate.admit(&call, request.headers());
         let name = metrics::name(call.place);
         let span = tracing::error_span!(
             "request",
@@ -223,8 +266,7 @@ where
         let stream = STREAMS.iter().any(|name| request.uri().path().ends_with(name));
         let client = call.presence.as_ref().map_or(0, |presence| presence.number());
         let received = Arc::clone(&call);
-        let request = request
-            .map(|body| Body::new(Received { body, call: received, framing: Framing::default(), stream, pause: None }));
+        let request = request.map(|body| Body::new(Received::new(body, received, stream)));
         let answer = CLIENT.scope(client, self.service.call(request)).instrument(span.clone());
         Box::pin(async move {
             let mut response = answer.await?;
@@ -232,97 +274,5 @@ where
             call.hear(response.headers());
             Ok(response.map(|body| Body::new(Answering { body, call, span })))
         })
-    }
-}
-
-/// The body of a request, counted.
-struct Received {
-    body: Body,
-    call: Arc<Call>,
-    framing: Framing,
-    stream: bool,
-    pause: Option<Pin<Box<Sleep>>>,
-}
-
-impl http_body::Body for Received {
-    type Data = Bytes;
-    type Error = Status;
-
-    fn poll_frame(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<Option<Result<Frame<Bytes>, Status>>> {
-        let this = &mut *self;
-        match Pin::new(&mut this.body).poll_frame(cx) {
-            Poll::Ready(Some(Ok(frame))) => {
-                this.pause = None;
-                if let Some(data) = frame.data_ref() {
-                    this.call.hold(data.len())?;
-                    this.framing.take(data);
-                    if this.stream && this.framing.whole() {
-                        this.call.release();
-                    }
-                }
-                Poll::Ready(Some(Ok(frame)))
-            }
-            Poll::Ready(end) => Poll::Ready(end),
-            Poll::Pending => {
-                if this.stream && this.framing.whole() {
-                    return Poll::Pending;
-                }
-                let longest = this.call.gate.pause;
-                let pause =
-                    this.pause.get_or_insert_with(|| Box::pin(tokio::time::sleep_until(Instant::now() + longest)));
-                if pause.as_mut().poll(cx).is_ready() {
-                    let text = format!("request_pause: a request was begun and did not go on for {longest:?}");
-                    return Poll::Ready(Some(Err(Status::new(Code::DeadlineExceeded, text))));
-                }
-                Poll::Pending
-            }
-        }
-    }
-
-    fn is_end_stream(&self) -> bool {
-        self.body.is_end_stream()
-    }
-
-    fn size_hint(&self) -> SizeHint {
-        self.body.size_hint()
-    }
-}
-
-/// The body of an answer; the call is over when it is dropped.
-struct Answering {
-    body: Body,
-    call: Arc<Call>,
-    span: Span,
-}
-
-impl Drop for Answering {
-    fn drop(&mut self) {
-        let code = Code::from_i32(self.call.code.load(Ordering::Relaxed));
-        let ms = self.call.started.elapsed().as_secs_f64() * 1e3;
-        self.span.in_scope(|| tracing::info!(?code, ms, "answered"));
-    }
-}
-
-impl http_body::Body for Answering {
-    type Data = Bytes;
-    type Error = Status;
-
-    fn poll_frame(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<Option<Result<Frame<Bytes>, Status>>> {
-        let this = &mut *self;
-        let frame = this.span.in_scope(|| Pin::new(&mut this.body).poll_frame(cx));
-        if let Poll::Ready(Some(Ok(frame))) = &frame
-            && let Some(trailers) = frame.trailers_ref()
-        {
-            this.call.hear(trailers);
-        }
-        frame
-    }
-
-    fn is_end_stream(&self) -> bool {
-        self.body.is_end_stream()
-    }
-
-    fn size_hint(&self) -> SizeHint {
-        self.body.size_hint()
     }
 }

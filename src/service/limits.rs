@@ -121,6 +121,11 @@ limits! {
     /// A connection that has not said by then what it speaks is closed.
     handshake: Time = Duration::from_secs(10);
 
+    /// After so long without a word on a TCP connection the system asks the other end whether it is there, and closes the connection after
+    /// five questions a sixth of this apart without an answer: a machine that lost its power or its network gives its place back. A
+    /// program that is paused is there.
+    keepalive: Time = Duration::from_secs(60);
+
     /// Most connections at once. A further one takes the place of the one without calls that was idle for longest; with
     /// none such it is closed as it comes.
     connections: Count = 512;

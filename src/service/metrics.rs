@@ -9,7 +9,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use tonic::Code;
 
 /// Calls that are counted by name; the last stands for all others.
-const CALLS: [&str; 25] = [
+const CALLS: [&str; 26] = [
     "Info",
     "Check",
     "Convert",
@@ -32,7 +32,8 @@ const CALLS: [&str; 25] = [
     "WatchSweep",
     "FetchSweep",
     "CancelSweep",
-    "Watch",
+    "Health/Check",
+    "Health/Watch",
     "ServerReflectionInfo",
     "other",
 ];
@@ -102,7 +103,8 @@ impl Default for Metrics {
 
 /// The place of a call among those that are counted.
 pub(super) fn place(path: &str) -> usize {
-    let name = path.rsplit('/').next().unwrap_or_default();
+    let own = path.strip_prefix("/bimorph.v1.Bimorph/").or_else(|| path.strip_prefix("/grpc.health.v1."));
+    let name = own.or_else(|| path.rsplit('/').next()).unwrap_or_default();
     CALLS.iter().position(|call| *call == name).unwrap_or(CALLS.len() - 1)
 }
 

@@ -130,7 +130,9 @@ pub async fn run_with(
     };
     watching.abort();
     health.set_not_serving::<BimorphServer<Calls>>().await;
-    health.set_service_status(READY, ServingStatus::NotServing).await;
+    for name in ["", READY] {
+        health.set_service_status(name, ServingStatus::NotServing).await;
+    }
     tracing::info!(open = shared.sessions.len(), "stopping");
     signals.draining.cancel();
     shared.sweeps.cancel_all();

@@ -110,8 +110,7 @@ impl Listener {
         match self {
             Self::Tcp(listener, _) => {
                 let (socket, _) = listener.accept().await?;
-                // Without this, replies wait for the peer's delayed acknowledgement: 40 ms a trial.
-                socket.set_nodelay(true)?;
+                connections.prepare(&socket)?;
                 Ok(connections.place().await.map(|place| (Socket::Tcp(socket), place)))
             }
             Self::Unix(listener, _) => {

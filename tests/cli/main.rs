@@ -7,6 +7,7 @@ mod chart;
 mod configuration;
 mod errors;
 mod export;
+mod health;
 mod kept;
 mod layouts;
 mod outputs;

@@ -18,14 +18,14 @@ use tonic_health::pb::health_client::HealthClient;
 const PATIENCE: Duration = Duration::from_secs(30);
 
 /// A server with metrics at an address of their own.
-fn start(bench: &Bench, options: &str) -> (Server, String) {
+pub(crate) fn start(bench: &Bench, options: &str) -> (Server, String) {
     let mut server = Server::start(bench, &format!("--listen 127.0.0.1:0 --metrics 127.0.0.1:0 {options}"));
     let metrics = server.line("metrics on http://").trim_end_matches("/metrics").to_owned();
     (server, metrics)
 }
 
 /// Status and body of an answer.
-fn get(address: &str, what: &str) -> (u16, String) {
+pub(crate) fn get(address: &str, what: &str) -> (u16, String) {
     let mut socket = TcpStream::connect(address).expect("connects");
     socket.set_read_timeout(Some(PATIENCE)).expect("set");
     write!(socket, "GET {what} HTTP/1.1\r\nhost: here\r\n\r\n").expect("sent");
@@ -37,12 +37,13 @@ fn get(address: &str, what: &str) -> (u16, String) {
 }
 
 /// The value of a metric.
-fn value(text: &str, metric: &str) -> f64 {
+pub(crate) fn value(text: &str, metric: &str) -> f64 {
     let line = text.lines().find_map(|line| line.strip_prefix(metric)?.strip_prefix(' '));
     line.unwrap_or_else(|| panic!("no {metric} in {text}")).parse().expect("a number")
 }
 
-async fn channel(address: &str) -> Channel {
+/// A connection.
+pub(crate) async fn channel(address: &str) -> Channel {
     Endpoint::from_shared(format!("http://{address}")).expect("a uri").connect().await.expect("connects")
 }
 
@@ -53,7 +54,8 @@ async fn is_ready(channel: &Channel) -> bool {
     answer.status() == ServingStatus::Serving
 }
 
-fn block_on<T>(future: impl Future<Output = T>) -> T {
+/// Runs a future to its end.
+pub(crate) fn block_on<T>(future: impl Future<Output = T>) -> T {
     tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a runtime").block_on(future)
 }
 

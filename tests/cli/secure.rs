@@ -20,12 +20,13 @@ use tonic_health::pb::health_client::HealthClient;
 const PATIENCE: Duration = Duration::from_secs(30);
 const TOKEN: &str = "0123456789abcdef0123456789abcdef";
 
-fn tls(name: &str) -> PathBuf {
+/// A file of certificates.
+pub(crate) fn tls(name: &str) -> PathBuf {
     PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/tls")).join(name)
 }
 
 /// A folder with two token files: the server's and a wrong one.
-fn bench() -> Bench {
+pub(crate) fn bench() -> Bench {
     Bench::new(&[
         ("tokens", &format!("# who may ask\nalice {TOKEN}\nbob ffffffffffffffff\n")),
         ("alice", TOKEN),
@@ -35,13 +36,13 @@ fn bench() -> Bench {
 }
 
 /// Options of a server with a certificate.
-fn certified(name: &str) -> String {
+pub(crate) fn certified(name: &str) -> String {
     let (certificate, key) = (tls(&format!("{name}.pem")), tls(&format!("{name}.key")));
     format!("--listen 127.0.0.1:0 --tls-cert {} --tls-key {}", certificate.display(), key.display())
 }
 
 /// A client that trusts the authority and shows a token.
-fn access(bench: &Bench, token: Option<&str>) -> Access {
+pub(crate) fn access(bench: &Bench, token: Option<&str>) -> Access {
     Access {
         authority: Some(tls("authority.pem")),
         token_file: token.map(|name| bench.path(name)),
@@ -55,7 +56,7 @@ fn with_certificate(access: Access, name: &str) -> Access {
 }
 
 /// Asks for the version: an error's code and message.
-fn asked(address: &str, access: &Access) -> Result<String, (String, String)> {
+pub(crate) fn asked(address: &str, access: &Access) -> Result<String, (String, String)> {
     Client::connect_with(address, access, PATIENCE)
         .and_then(|mut client| client.version())
         .map_err(|error| (error.code, error.message))

@@ -57,10 +57,15 @@ impl Server {
         self.child.id()
     }
 
-    /// Ends it by a signal; its exit status, if it has one.
-    pub(crate) fn signal(&mut self, signal: &str) -> Option<i32> {
+    /// Sends it a signal.
+    pub(crate) fn tell(&mut self, signal: &str) {
         let id = self.id().to_string();
         assert!(Command::new("kill").args([signal, &id]).status().is_ok_and(|s| s.success()));
+    }
+
+    /// Ends it by a signal; its exit status, if it has one.
+    pub(crate) fn signal(&mut self, signal: &str) -> Option<i32> {
+        self.tell(signal);
         self.child.wait().expect("it ends").code()
     }
 }

@@ -2,6 +2,7 @@
 //! old, and no model that is half written.
 
 use crate::bench::PLATE;
+use crate::overseen::block_on;
 use crate::stepping::Killed;
 use bimorph::netlist::Bundle;
 use bimorph::service::convert::model::bundle_to_wire;
@@ -9,10 +10,6 @@ use bimorph::service::proto;
 use std::fs::{self, File};
 use std::time::{Duration, SystemTime};
 use tonic::Code;
-
-fn block_on<T>(future: impl Future<Output = T>) -> T {
-    tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a runtime").block_on(future)
-}
 
 /// A client that was not told of an accept takes its step again, or another one, from the state that it knows: that one is kept
 /// however it came to be the one before.

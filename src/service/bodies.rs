@@ -1,0 +1,116 @@
+//! The bodies of requests and answers, as they pass the gate: what comes in is counted, and how an answer ends is noted.
+
+use super::framing::Framing;
+use super::intake::Call;
+use http_body::{Frame, SizeHint};
+use std::future::Future;
+use std::pin::Pin;
+use std::sync::Arc;
+use std::task::{Context, Poll};
+use tokio::time::{Instant, Sleep};
+use tonic::body::Body;
+use tonic::codegen::Bytes;
+use tonic::{Code, Status};
+use tracing::Span;
+
+/// The body of a request, counted.
+pub(super) struct Received {
+    body: Body,
+    call: Arc<Call>,
+    framing: Framing,
+    /// Silence between two messages is no pause.
+    stream: bool,
+    pause: Option<Pin<Box<Sleep>>>,
+}
+
+impl Received {
+    pub(super) fn new(body: Body, call: Arc<Call>, stream: bool) -> Self {
+        Self { body, call, framing: Framing::default(), stream, pause: None }
+    }
+}
+
+impl http_body::Body for Received {
+    type Data = Bytes;
+    type Error = Status;
+
+    fn poll_frame(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<Option<Result<Frame<Bytes>, Status>>> {
+        let this = &mut *self;
+        match Pin::new(&mut this.body).poll_frame(cx) {
+            Poll::Ready(Some(Ok(frame))) => {
+                // who asks for health has one pause for all of it
+                if !this.call.is_health() {
+                    this.pause = None;
+                }
+                if let Some(data) = frame.data_ref() {
+                    this.call.hold(data.len())?;
+                    this.framing.take(data);
+                    if this.stream && this.framing.whole() {
+                        this.call.release();
+                    }
+                }
+                Poll::Ready(Some(Ok(frame)))
+            }
+            Poll::Ready(end) => Poll::Ready(end),
+            Poll::Pending => {
+                if this.stream && this.framing.whole() {
+                    return Poll::Pending;
+                }
+                let longest = this.call.longest_pause();
+                let pause =
+                    this.pause.get_or_insert_with(|| Box::pin(tokio::time::sleep_until(Instant::now() + longest)));
+                if pause.as_mut().poll(cx).is_ready() {
+                    let text = format!("request_pause: a request was begun and did not go on for {longest:?}");
+                    return Poll::Ready(Some(Err(Status::new(Code::DeadlineExceeded, text))));
+                }
+                Poll::Pending
+            }
+        }
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.body.is_end_stream()
+    }
+
+    fn size_hint(&self) -> SizeHint {
+        self.body.size_hint()
+    }
+}
+
+/// The body of an answer; the call is over when it is dropped.
+pub(super) struct Answering {
+    pub(super) body: Body,
+    pub(super) call: Arc<Call>,
+    pub(super) span: Span,
+}
+
+impl Drop for Answering {
+    fn drop(&mut self) {
+        let code = self.call.code();
+        let ms = self.call.time().as_secs_f64() * 1e3;
+        self.span.in_scope(|| tracing::info!(?code, ms, "answered"));
+    }
+}
+
+impl http_body::Body for Answering {
+    type Data = Bytes;
+    type Error = Status;
+
+    fn poll_frame(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<Option<Result<Frame<Bytes>, Status>>> {
+        let this = &mut *self;
+        let frame = this.span.in_scope(|| Pin::new(&mut this.body).poll_frame(cx));
+        if let Poll::Ready(Some(Ok(frame))) = &frame
+            && let Some(trailers) = frame.trailers_ref()
+        {
+            this.call.hear(trailers);
+        }
+        frame
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.body.is_end_stream()
+    }
+
+    fn size_hint(&self) -> SizeHint {
+        self.body.size_hint()
+    }
+}
