@@ -108,8 +108,9 @@ struct Count {
     labels: u64,
     placements: u64,
     depth: usize,
-    /// Box around it [units]; empty where low is above high.
+    /// Box around it [units], and around its polygons alone.
     extent: Option<[[f64; 2]; 2]>,
+    drawn: Option<[[f64; 2]; 2]>,
     /// True when something falls off the grid of the file's unit.
     off_grid: bool,
 }
@@ -258,6 +259,7 @@ impl Library {
             sum.extent = Some(enclose(sum.extent, [*p, *p]));
             sum.off_grid |= p[0].fract() != 0.0 || p[1].fract() != 0.0;
         }
+        sum.drawn = sum.extent;
         for text in &cell.texts {
             sum.extent = Some(enclose(sum.extent, [text.at, text.at]));
             sum.off_grid |= text.at.iter().any(|x| x.fract() != 0.0);
@@ -278,6 +280,9 @@ impl Library {
             sum.off_grid |= below.off_grid || !call.transform.keeps_grid() || !arrays;
             if let Some(extent) = below.extent {
                 sum.extent = Some(enclose(sum.extent, placed(call, extent)));
+            }
+            if let Some(drawn) = below.drawn {
+                sum.drawn = Some(enclose(sum.drawn, placed(call, drawn)));
             }
         }
         let cell = || cell.name.clone();
@@ -432,7 +437,7 @@ impl Flat<'_> {
     }
 
     fn placement(&mut self, called: usize, name: &str, t: &Transform, parent: Option<usize>) -> Option<usize> {
-        let extent = self.counts[called].extent.filter(|_| self.places)?;
+        let extent = self.counts[called].drawn.filter(|_| self.places)?;
         let call =
             Call { cell: String::new(), place: String::new(), transform: *t, count: [1, 1], pitch: [[0.0; 2]; 2] };
         let [low, high] = placed(&call, extent);

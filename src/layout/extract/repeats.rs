@@ -17,6 +17,13 @@ const QUANTUM: f64 = 1e-10;
 const FEWEST: usize = 2;
 /// Two magnifications are one up to this [1].
 const MAGNIFIED: f64 = 1e-9;
+/// Most kinds of content of cells with one name: with more they do not repeat, and the others stay flat.
+const MOST_KINDS: usize = 64;
+/// Looking into the cells of one round may meet so many times the elements and nodes of the scope, and as many at least: side by side they
+/// have each once, and boxes that all lie over each other, because something far away is in them, make no subnets.
+const LOOKED_AT: [usize; 2] = [8, 100_000];
+/// Bytes of an element as a row, and of its number and nodes.
+const BYTES_PER_ROW: usize = 400;
 
 /// Elements and instances in one frame.
 #[derive(Debug)]
@@ -62,8 +69,16 @@ pub(super) fn scope(found: &Extraction, rows: &Rows<'_>, items: Vec<Item>) -> (S
     }
     let mut taken: HashSet<String> = found.nodes.iter().map(|n| n.name.clone()).collect();
     taken.extend(found.layers.iter().map(|layer| layer.name.clone()));
-    let mut finder =
-        Finder { found, rows, nodes: Boxes::of(&places), inside, local: HashMap::new(), subnets: Vec::new(), taken };
+    let mut finder = Finder {
+        found,
+        rows,
+        nodes: Boxes::of(&places),
+        inside,
+        local: HashMap::new(),
+        subnets: Vec::new(),
+        taken,
+        counts: HashMap::new(),
+    };
     let labelled: HashSet<usize> = (0..found.nodes.len()).filter(|n| found.nodes[*n].labelled).collect();
     let scope = finder.group(items, top, Frame::DRAWING, &labelled);
     (scope, finder.subnets)
@@ -80,6 +95,14 @@ struct Finder<'a> {
     local: HashMap<String, [[f64; 2]; 2]>,
     subnets: Vec<Subnet>,
     taken: HashSet<String>,
+    /// The last number that a word got.
+    counts: HashMap<String, usize>,
+}
+
+/// Elements of a scope, with those at each node.
+struct Elements {
+    items: Vec<Item>,
+    at: HashMap<usize, Vec<usize>>,
 }
 
 /// What is in a placed cell.
@@ -108,61 +131,96 @@ impl Finder<'_> {
         for (k, item) in items.iter().enumerate() {
             self.found.nodes_of(item).into_iter().for_each(|n| at.entry(n).or_default().push(k));
         }
-        let mut gone = vec![false; items.len()];
+        let all = Elements { items, at };
+        let mut gone = vec![false; all.items.len()];
         let mut instances = Vec::new();
         let mut open = cells;
-        while !open.is_empty() && !items.is_empty() {
+        while !open.is_empty() && !all.items.is_empty() {
             let mut next = Vec::new();
+            let mut left = (LOOKED_AT[0] * (all.items.len() + all.at.len())).max(LOOKED_AT[1]);
             for members in by_name(&self.found.cells, &open) {
-                crate::budget::check();
-                let mut alike: Vec<Vec<(Content, usize)>> = Vec::new();
-                for k in members {
-                    let content = self.content(&items, &at, &gone, k).filter(|c| c.items.len() >= FEWEST);
-                    let Some(content) = content else {
-                        next.extend(&self.inside[k]);
-                        continue;
-                    };
-                    match alike.iter_mut().find(|group| group[0].0.same(&content)) {
-                        Some(group) => group.push((content, k)),
-                        None => alike.push(vec![(content, k)]),
+                for group in self.alike(&all, &gone, members, &mut left, &mut next) {
+                    if let Some(free) = self.free(group, &mut gone, &mut next) {
+                        instances.extend(self.subnet(&all, free, outer));
                     }
-                }
-                for group in alike {
-                    // boxes may overlap: an element belongs to the first
-                    let mut free: Vec<(Content, usize)> = Vec::new();
-                    for (content, k) in group {
-                        if content.items.iter().all(|i| !gone[*i]) {
-                            content.items.iter().for_each(|i| gone[*i] = true);
-                            free.push((content, k));
-                        } else {
-                            next.extend(&self.inside[k]);
-                        }
-                    }
-                    if free.len() < 2 {
-                        for (content, k) in free {
-                            content.items.iter().for_each(|i| gone[*i] = false);
-                            next.extend(&self.inside[k]);
-                        }
-                        continue;
-                    }
-                    instances.extend(self.subnet(&items, &at, free, outer));
                 }
             }
             open = next;
         }
         let mut kept = gone.into_iter().map(|gone| !gone);
-        let items = items.into_iter().filter(|_| kept.next().unwrap_or(true)).collect();
+        let items = all.items.into_iter().filter(|_| kept.next().unwrap_or(true)).collect();
         Scope { frame, items, instances }
     }
 
-    /// What is in a placed cell, of what is left of the scope's elements.
-    fn content(&mut self, items: &[Item], at: &HashMap<usize, Vec<usize>>, gone: &[bool], k: usize) -> Option<Content> {
+    /// Placed cells of one name by what is in them; of those that have nothing of their own, the inner ones are `next`. Once nothing is
+    /// `left` to look at, the others stay flat.
+    fn alike(
+        &mut self,
+        all: &Elements,
+        gone: &[bool],
+        members: Vec<usize>,
+        left: &mut usize,
+        next: &mut Vec<usize>,
+    ) -> Vec<Vec<(Content, usize)>> {
+        let mut alike: Vec<Vec<(Content, usize)>> = Vec::new();
+        for k in members {
+            crate::budget::check();
+            if *left == 0 {
+                break;
+            }
+            let Some(mut content) = self.content(all, gone, k, left).filter(|c| c.items.len() >= FEWEST) else {
+                next.extend(&self.inside[k]);
+                continue;
+            };
+            match alike.iter().position(|group| group[0].0.same(&content)) {
+                Some(kind) => {
+                    // those of the first stand for all
+                    content.rows = Vec::new();
+                    alike[kind].push((content, k));
+                }
+                None if alike.len() < MOST_KINDS => alike.push(vec![(content, k)]),
+                None => next.extend(&self.inside[k]),
+            }
+        }
+        alike
+    }
+
+    /// Takes the elements of contents that are the same, where two or more have theirs for themselves: boxes may overlap, and an element
+    /// belongs to the first. The cells in the others are `next`.
+    fn free(
+        &self,
+        group: Vec<(Content, usize)>,
+        gone: &mut [bool],
+        next: &mut Vec<usize>,
+    ) -> Option<Vec<(Content, usize)>> {
+        let mut free: Vec<(Content, usize)> = Vec::new();
+        for (content, k) in group {
+            if content.items.iter().all(|i| !gone[*i]) {
+                content.items.iter().for_each(|i| gone[*i] = true);
+                free.push((content, k));
+            } else {
+                next.extend(&self.inside[k]);
+            }
+        }
+        if free.len() >= 2 {
+            return Some(free);
+        }
+        for (content, k) in free {
+            content.items.iter().for_each(|i| gone[*i] = false);
+            next.extend(&self.inside[k]);
+        }
+        None
+    }
+
+    /// What is in a placed cell, of what is left of the scope's elements; what is met on the way is taken off `left`.
+    fn content(&mut self, all: &Elements, gone: &[bool], k: usize, left: &mut usize) -> Option<Content> {
         let cell = &self.found.cells[k];
         let unit = self.found.unit;
         let frame = Frame { origin: cell.origin.map(|x| x * unit), angle: cell.angle, mirrored: cell.mirrored };
         let [low, high] = cell.extent.map(|p| p.map(|x| f64::from(x) * unit));
         let own = self.own_box(cell, &frame);
         let near = self.nodes.overlapping(&[low.map(|x| x - unit), high.map(|x| x + unit)]);
+        *left = left.saturating_sub(near.len());
         let nodes: BTreeSet<usize> = near
             .into_iter()
             .map(|n| n as usize)
@@ -172,15 +230,17 @@ impl Finder<'_> {
             })
             .collect();
         let touching: BTreeSet<usize> =
-            nodes.iter().flat_map(|n| at.get(n).map_or(&[][..], Vec::as_slice)).copied().collect();
+            nodes.iter().flat_map(|n| all.at.get(n).map_or(&[][..], Vec::as_slice)).copied().collect();
+        *left = left.saturating_sub(touching.len());
         let inside = |item: &Item| {
             !matches!(item, Item::Port(..)) && self.found.nodes_of(item).iter().all(|n| nodes.contains(n))
         };
-        let chosen: Vec<usize> = touching.into_iter().filter(|i| !gone[*i] && inside(&items[*i])).collect();
+        let chosen: Vec<usize> = touching.into_iter().filter(|i| !gone[*i] && inside(&all.items[*i])).collect();
         if chosen.is_empty() {
             return None;
         }
-        let used: BTreeSet<usize> = chosen.iter().flat_map(|i| self.found.nodes_of(&items[*i])).collect();
+        crate::budget::lay_out(chosen.len() * BYTES_PER_ROW);
+        let used: BTreeSet<usize> = chosen.iter().flat_map(|i| self.found.nodes_of(&all.items[*i])).collect();
         let mut nodes: Vec<(i64, i64, usize)> = used
             .into_iter()
             .map(|n| {
@@ -191,7 +251,7 @@ impl Finder<'_> {
         nodes.sort_unstable();
         let nodes: Vec<usize> = nodes.into_iter().map(|(_, _, n)| n).collect();
         let number: HashMap<usize, usize> = nodes.iter().enumerate().map(|(k, n)| (*n, k)).collect();
-        let mut rows: Vec<Row> = chosen.iter().map(|i| self.rows.row(&items[*i], &frame)).collect();
+        let mut rows: Vec<Row> = chosen.iter().map(|i| self.rows.row(&all.items[*i], &frame)).collect();
         rows.iter_mut().flat_map(|row| &mut row.nodes).for_each(|n| *n = number[n]);
         rows.iter_mut().filter(|row| row.model == "wire").for_each(|row| row.nodes.sort_unstable());
         rows.sort_by(|a, b| (a.model, &a.nodes).cmp(&(b.model, &b.nodes)));
@@ -217,16 +277,10 @@ impl Finder<'_> {
     }
 
     /// Makes a subnet of contents that are the same.
-    fn subnet(
-        &mut self,
-        items: &[Item],
-        at: &HashMap<usize, Vec<usize>>,
-        members: Vec<(Content, usize)>,
-        outer: &HashSet<usize>,
-    ) -> Vec<Instance> {
+    fn subnet(&mut self, all: &Elements, members: Vec<(Content, usize)>, outer: &HashSet<usize>) -> Vec<Instance> {
         let (first, cell) = &members[0];
         let outside = |content: &Content, n: &usize| {
-            outer.contains(n) || at[n].iter().any(|i| content.items.binary_search(i).is_err())
+            outer.contains(n) || all.at[n].iter().any(|i| content.items.binary_search(i).is_err())
         };
         let mut terminals: Vec<usize> = (0..first.nodes.len())
             .filter(|k| members.iter().any(|(content, _)| outside(content, &content.nodes[*k])))
@@ -237,7 +291,7 @@ impl Finder<'_> {
         let word = word(&self.found.cells[*cell].cell);
         let name = self.unused(&format!("{word}_cell"), true);
         let given: HashSet<usize> = terminals.iter().map(|k| first.nodes[*k]).collect();
-        let own: Vec<Item> = first.items.iter().map(|i| items[*i].clone()).collect();
+        let own: Vec<Item> = first.items.iter().map(|i| all.items[*i].clone()).collect();
         let scope = self.group(own, self.inside[*cell].clone(), first.frame, &given);
         self.subnets.push(Subnet { name, terminals: terminals.iter().map(|k| first.nodes[*k]).collect(), scope });
         let subnet = self.subnets.len() - 1;
@@ -254,13 +308,18 @@ impl Finder<'_> {
     /// A name that nothing has: the word itself where `plain`, else with a number.
     fn unused(&mut self, word: &str, plain: bool) -> String {
         let gap = if word.ends_with(|c: char| c.is_ascii_digit()) { "_" } else { "" };
-        let mut name = if plain { word.to_owned() } else { format!("{word}{gap}1") };
-        let mut k = 1;
-        while !self.taken.insert(name.clone()) {
-            k += 1;
-            name = format!("{word}{gap}{k}");
+        if plain && self.taken.insert(word.to_owned()) {
+            return word.to_owned();
         }
-        name
+        // a second subnet is called `..._2`
+        let count = self.counts.entry(word.to_owned()).or_insert(usize::from(plain));
+        loop {
+            *count += 1;
+            let name = format!("{word}{gap}{count}");
+            if self.taken.insert(name.clone()) {
+                return name;
+            }
+        }
     }
 }
 
