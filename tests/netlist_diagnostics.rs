@@ -334,3 +334,16 @@ fn lua_netlists() {
     let code = if cfg!(feature = "lua") { "E021" } else { "E005" };
     assert_eq!((found.items[0].code.as_str(), found.items[0].line), (code, 1));
 }
+
+/// A resistance whose conductance is no number is refused where it stands; it ended the program.
+#[test]
+fn resistances_without_a_conductance_are_refused() {
+    let beam = "anchor p1 [a] []\nbeam2d p1 [a b] [l=10u w=1u]\neground * [a] []\n";
+    for resistance in ["R=1e-310", "R=1e-301", "R=1e301", "G=1e301"] {
+        let item = only(&format!("{beam}r R * [a b] [{resistance}]\n"));
+        assert_eq!((item.code.as_str(), item.severity), ("E060", Severity::Error), "{resistance}: {item:?}");
+        assert!(item.message.contains("`r`"), "{item:?}");
+    }
+    let heated = "anchor p1 [a] []\nhot beam2det p1 [a b] [l=10u w=1u R=1e-310]\nanchor p1 [b] []\n";
+    assert!(all(&format!("{PROCESS}{heated}")).items.iter().any(|d| d.code == "E060"), "{}", all(heated));
+}

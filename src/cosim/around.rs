@@ -119,13 +119,17 @@ pub fn around(structure: &Structure, wanted: &Around) -> Result<String, AroundEr
         return Err(AroundError::NothingElectrical);
     }
     let mut names = Names::new();
-    let mut nodes: BTreeMap<NodeId, String> = structure.electrical_grounds.iter().map(|n| (*n, "0".into())).collect();
+    // nodes on a wire are one node of SPICE
+    let nets = structure.nets();
+    let net = |id: NodeId| nets[id.0];
+    let mut nodes: BTreeMap<NodeId, String> =
+        structure.electrical_grounds.iter().map(|n| (net(*n), "0".into())).collect();
     let in_circuit = structure.circuit.iter().flat_map(|e| e.nodes.iter().copied());
     let at_ports = structure.ports.iter().flat_map(|p| [Some(p.plus), p.minus].into_iter().flatten());
     for node in in_circuit.chain(at_ports).collect::<Vec<_>>() {
-        nodes.entry(node).or_insert_with(|| names.take(&structure.nodes[node.0].name));
+        nodes.entry(net(node)).or_insert_with(|| names.take(&structure.nodes[node.0].name));
     }
-    let node = |id: NodeId| nodes.get(&id).cloned().unwrap_or_else(|| "0".into());
+    let node = |id: NodeId| nodes.get(&net(id)).cloned().unwrap_or_else(|| "0".into());
 
     let mut text = format!("* {}: the device, and the circuit that its netlist draws\n", wanted.file);
     let wave = |name: &str| wanted.drives.iter().find(|(driven, _)| driven == name).map(|(_, wave)| wave.as_str());
@@ -139,10 +143,11 @@ pub fn around(structure: &Structure, wanted: &Around) -> Result<String, AroundEr
         text += &line;
         text.push('\n');
     }
-    let touched: HashSet<NodeId> = structure.circuit.iter().flat_map(|e| e.nodes.iter().copied()).collect();
+    let touched: HashSet<NodeId> = structure.circuit.iter().flat_map(|e| e.nodes.iter().map(|n| net(*n))).collect();
     for port in &structure.ports {
         let given = wanted.ports.iter().find(|(name, _)| *name == port.name).map(|(_, volts)| *volts);
-        let within = touched.contains(&port.plus) && port.minus.is_none_or(|n| touched.contains(&n) || node(n) == "0");
+        let known = |n: NodeId| touched.contains(&net(n)) || node(n) == "0";
+        let within = touched.contains(&net(port.plus)) && port.minus.is_none_or(known);
         let over_time = wave(&port.name).map_or_else(String::new, |wave| format!(" {wave}"));
         if given.is_none() && over_time.is_empty() && within {
             continue;
@@ -327,6 +332,19 @@ mod tests {
                 ".end",
             ]
         );
+    }
+
+    /// Nodes on a wire are one node of the circuit, and the device has one port for them; on a wire to ground they are ground.
+    #[test]
+    fn wires_are_one_node() {
+        let more = "bias Vsrc * [s g] [V=4]\nR * [s x] [R=1k]\nC * [y e] [C=1p]\nwire * [m x y] []\nwire * [e g] []\n";
+        let text = deck(more, &Around::default()).unwrap();
+        let lines: Vec<&str> = text.lines().skip(1).take(4).collect();
+        assert_eq!(
+            lines,
+            ["v_bias s 0 dc 4e0 ac 1", "r_anon8 s x 1e3", "c_anon9 x 0 1e-12", "A1 %gd [x 0] null device"]
+        );
+        assert!(text.contains("ports=[\"x\"]"), "{text}");
     }
 
     /// Ports are driven by a source each; what is missing or unknown is told.

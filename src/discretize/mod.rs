@@ -91,6 +91,14 @@ pub enum DiscretizeError {
         /// Name of the port or source.
         source_name: String,
     },
+    /// Conductances that cannot be computed with.
+    #[error(
+        "conductances are too large or too small to be computed with: {element} has the largest; check resistances"
+    )]
+    Conductances {
+        /// The element with the smallest resistance.
+        element: String,
+    },
     /// A heater whose heat cannot leave.
     #[error("{beam} is heated but nothing conducts its heat to an anchor; use beam2det for the beams in between")]
     NoHeatSink {

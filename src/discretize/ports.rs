@@ -6,23 +6,22 @@
 use super::DiscretizeError;
 use super::rigid::Assembly;
 use crate::gaps::drive::Electrics;
-use crate::gaps::network::Circuit;
+use crate::gaps::network::{Circuit, CircuitError};
 use crate::gaps::thermal::{Heater, Heating};
-use crate::sets::Sets;
 use crate::structure::{GapVoltage, Structure};
 use nalgebra::{DMatrix, RowDVector};
 
 /// Builds the electrical side; `heated` lists the beams that are heaters, in heater order.
 ///
 /// # Errors
-/// [`DiscretizeError::SourceLoop`], [`DiscretizeError::NoHeatSink`].
+/// [`DiscretizeError::SourceLoop`], [`DiscretizeError::Conductances`], [`DiscretizeError::NoHeatSink`].
 pub fn lay(structure: &Structure, heated: &[usize], rigid: &Assembly) -> Result<Electrics, DiscretizeError> {
     let ports = structure.ports.len();
     let mut names: Vec<String> = structure.ports.iter().map(|p| p.name.clone()).collect();
     names.extend(structure.voltage_sources.iter().map(|s| s.name.clone()));
     let mut fixed: Vec<f64> = structure.voltage_sources.iter().map(|s| s.voltage).collect();
 
-    let net = nets(structure);
+    let net: Vec<usize> = structure.nets().into_iter().map(|node| node.0).collect();
     let mut heaters = Vec::with_capacity(heated.len());
     for &index in heated {
         let beam = &structure.beams[index];
@@ -48,8 +47,18 @@ pub fn lay(structure: &Structure, heated: &[usize], rigid: &Assembly) -> Result<
             .collect(),
         grounds: structure.electrical_grounds.iter().map(|n| net[n.0]).collect(),
     };
-    let potentials =
-        circuit.solve().map_err(|e| DiscretizeError::SourceLoop { source_name: names[e.source_index].clone() })?;
+    let potentials = circuit.solve().map_err(|e| match e {
+        CircuitError::SourceLoop { source_index } => {
+            DiscretizeError::SourceLoop { source_name: names[source_index].clone() }
+        }
+        CircuitError::Range { resistor } => {
+            let element = match structure.resistors.get(resistor) {
+                Some(resistor) => &resistor.name,
+                None => &structure.beams[heated[resistor - structure.resistors.len()]].name,
+            };
+            DiscretizeError::Conductances { element: element.clone() }
+        }
+    })?;
     let driven = potentials.potential.ncols();
     let gaps = structure.combs.len() + structure.plate_gaps.len() + structure.beam_gaps.len();
     // a gap with a voltage of its own is a source
@@ -87,15 +96,4 @@ pub fn lay(structure: &Structure, heated: &[usize], rigid: &Assembly) -> Result<
     let mut conductance = DMatrix::zeros(ports, sources);
     conductance.view_mut((0, 0), (ports, driven)).copy_from(&potentials.conductance.rows(0, ports));
     Ok(Electrics { ports, fixed, names, gap_rows, conductance, heating, inputs: Vec::new() })
-}
-
-/// For each node the one that stands for its conductor: nodes on a wire have one potential and one temperature.
-fn nets(structure: &Structure) -> Vec<usize> {
-    let mut nets = Sets::new(structure.nodes.len());
-    for wire in &structure.wires {
-        wire.nodes.iter().for_each(|node| {
-            nets.join(wire.nodes[0].0, node.0);
-        });
-    }
-    (0..structure.nodes.len()).map(|n| nets.first(n)).collect()
 }

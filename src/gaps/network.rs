@@ -38,20 +38,30 @@ pub struct Potentials {
     pub conductance: DMatrix<f64>,
 }
 
-/// Sources that contradict each other: a loop of ideal sources, or one across ground.
+/// Why a network has no potentials.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
-#[error("voltage source or port {source_index} closes a loop of ideal sources")]
-pub struct SourceLoop {
-    /// Index in [`Circuit::sources`].
-    pub source_index: usize,
+#[non_exhaustive]
+pub enum CircuitError {
+    /// Sources that contradict each other: a loop of ideal sources, or one across ground.
+    #[error("voltage source or port {source_index} closes a loop of ideal sources")]
+    SourceLoop {
+        /// Index in [`Circuit::sources`].
+        source_index: usize,
+    },
+    /// Conductances whose sums or quotients are beyond what doubles hold.
+    #[error("conductances are too large or too small to be computed with; the largest is that of resistor {resistor}")]
+    Range {
+        /// Index of the smallest resistance in [`Circuit::resistors`].
+        resistor: usize,
+    },
 }
 
 impl Circuit {
     /// Solves the network. A part that nothing ties to ground has its first node at 0 V.
     ///
     /// # Errors
-    /// [`SourceLoop`].
-    pub fn solve(&self) -> Result<Potentials, SourceLoop> {
+    /// [`CircuitError`].
+    pub fn solve(&self) -> Result<Potentials, CircuitError> {
         // spanning forest: sources first, to find loops of sources; then resistors, to find parts without ground
         let mut part = Sets::new(self.nodes + 1);
         let ground = self.nodes;
@@ -60,7 +70,7 @@ impl Circuit {
         }
         for (index, &(plus, minus)) in self.sources.iter().enumerate() {
             if !part.join(plus, minus.unwrap_or(ground)) {
-                return Err(SourceLoop { source_index: index });
+                return Err(CircuitError::SourceLoop { source_index: index });
             }
         }
         for &(a, b, _) in &self.resistors {
@@ -73,7 +83,7 @@ impl Circuit {
         // right-hand sides with their solutions, potentials with what sources fix of them, and conductances
         crate::budget::lay_out_matrix(free + 2 * self.nodes + 2 * count, count);
         let conductors = self.resistors.iter().map(|&(a, b, r)| (known.row[a], known.row[b], 1.0 / r));
-        let laplacian = Laplacian::new(free, conductors).ok_or(SourceLoop { source_index: 0 })?;
+        let laplacian = Laplacian::new(free, conductors).ok_or_else(|| self.out_of_range())?;
         let mut flows = vec![0.0; free * count];
         for &(a, b, r) in &self.resistors {
             crate::budget::check();
@@ -100,6 +110,12 @@ impl Circuit {
             }
         }
         Ok(Potentials { conductance: self.conductance(&known, &potential), potential })
+    }
+
+    fn out_of_range(&self) -> CircuitError {
+        let resistance = |k: &usize| self.resistors[*k].2;
+        let smallest = (0..self.resistors.len()).min_by(|a, b| resistance(a).total_cmp(&resistance(b)));
+        CircuitError::Range { resistor: smallest.unwrap_or(0) }
     }
 
     /// Current into the network at the plus of each source: what leaves the nodes that hang on it.
@@ -251,6 +267,15 @@ mod tests {
     fn parallel_sources_are_refused() {
         let circuit =
             Circuit { nodes: 2, resistors: vec![], sources: vec![(0, Some(1)), (1, Some(0))], grounds: vec![1] };
-        assert_eq!(circuit.solve(), Err(SourceLoop { source_index: 1 }));
+        assert_eq!(circuit.solve(), Err(CircuitError::SourceLoop { source_index: 1 }));
+    }
+
+    /// Conductances without end, or whose sum is, are told by the smallest resistance, also without any source.
+    #[test]
+    fn conductances_out_of_range_are_told() {
+        for resistors in [vec![(0, 1, 1.0), (0, 1, 1e-310)], vec![(0, 1, 1.01e-308), (0, 1, 1e-308)]] {
+            let circuit = Circuit { nodes: 3, resistors, sources: vec![], grounds: vec![1] };
+            assert_eq!(circuit.solve(), Err(CircuitError::Range { resistor: 1 }));
+        }
     }
 }

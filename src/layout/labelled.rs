@@ -74,7 +74,7 @@ pub enum LabelledError {
 
 /// Elements whose nodes must have places.
 fn has_places(model: &str) -> bool {
-    !matches!(model, "R" | "L" | "C" | "Vsrc" | "Isrc" | "opamp" | "vcvs" | "eground" | "port")
+    !matches!(model, "R" | "L" | "C" | "Vsrc" | "Isrc" | "opamp" | "vcvs" | "eground" | "port" | "wire")
 }
 
 /// A node and where it lies [m].

@@ -8,12 +8,16 @@ use super::value::short;
 use crate::sets::Sets;
 use crate::structure::{GapVoltage, NodeId, Structure};
 use std::collections::HashSet;
+use std::ops::RangeInclusive;
 
 /// So many loose parts or floating nodes are told one by one.
 const TOLD: usize = 3;
 
 /// So many loose nodes are told.
 const MOST_LOOSE: usize = 20;
+
+/// Resistances that can be computed with [Ω], and conductances of heat [W/K]: sums and quotients of them stay numbers.
+const RESISTANCES: RangeInclusive<f64> = 1e-300..=1e300;
 
 /// Reports what has become infinite or vanished: sizes may be in range one by one and not in their products.
 pub(crate) fn finite(drawing: &Drawing, sink: &mut Sink) {
@@ -45,7 +49,7 @@ pub(crate) fn finite(drawing: &Drawing, sink: &mut Sink) {
         look(&f.name, f.node, all(&f.force) && f.moment.is_finite());
     }
     for r in &s.resistors {
-        look(&r.name, r.a, r.resistance.is_finite() && r.resistance > 0.0);
+        look(&r.name, r.a, RESISTANCES.contains(&r.resistance));
     }
     for c in &s.combs {
         look(&c.name, c.a, all(&[c.gaps * c.permittivity * c.height / c.gap, c.overlap, c.parasitic]));
@@ -54,7 +58,8 @@ pub(crate) fn finite(drawing: &Drawing, sink: &mut Sink) {
         look(&g.name, g.nodes[0], all(&[g.permittivity * g.height * g.fringe, g.length, g.gap]));
     }
     for b in s.beams.iter().filter_map(|b| b.heater.as_ref().map(|h| (b, h))) {
-        look(&b.0.name, b.0.a, all(&[b.1.resistance, b.1.conductance, b.1.time_constant]));
+        let conducts = RESISTANCES.contains(&b.1.resistance) && RESISTANCES.contains(&b.1.conductance);
+        look(&b.0.name, b.0.a, conducts && b.1.time_constant.is_finite());
     }
 }
 

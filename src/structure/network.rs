@@ -1,6 +1,8 @@
 //! The electrical network that drives the mechanism: resistors, wires, sources, and ports.
 
+use super::Structure;
 use super::node::NodeId;
+use crate::sets::Sets;
 use serde::{Deserialize, Serialize};
 
 /// A linear resistor between two electrical nodes.
@@ -47,4 +49,17 @@ pub struct Port {
     pub plus: NodeId,
     /// Negative node; none: the structure's electrical ground.
     pub minus: Option<NodeId>,
+}
+
+impl Structure {
+    /// For each node the one that stands for its conductor, the first of those that wires join.
+    pub fn nets(&self) -> Vec<NodeId> {
+        let mut nets = Sets::new(self.nodes.len());
+        for wire in &self.wires {
+            wire.nodes.iter().for_each(|node| {
+                nets.join(wire.nodes[0].0, node.0);
+            });
+        }
+        (0..self.nodes.len()).map(|n| NodeId(nets.first(n))).collect()
+    }
 }

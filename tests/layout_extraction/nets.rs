@@ -123,3 +123,78 @@ fn labels_of_combs_are_ports() {
         assert_eq!(named, ports, "{text}");
     }
 }
+
+/// Ground is one by whatever names: two labels of ground on the pads of one part make no current between them.
+#[test]
+fn ground_has_many_names() {
+    for other in ["GND", "vss", "0"] {
+        let found = extracted(chevron("gnd", other).drawing());
+        assert!(found.live.is_empty(), "{other}: {:?}", found.nets);
+        let text = netlist(&found);
+        assert!(text.matches("beam2d p1").count() == 2 && !text.contains("det"), "{other}: {text}");
+    }
+}
+
+/// A label on a part that moves, on its own layer, names a node of it and not the wiring or the pad of another layer beneath; where wiring
+/// alone lies under the label, or the label is on the wiring's layer, it names the wiring.
+#[test]
+fn a_label_on_what_moves_is_not_of_the_wiring_beneath() {
+    let mut sheet = Sheet::new(0.0, [0.0; 2]);
+    sheet.pad([-20.0, -10.0], [0.0, 10.0]);
+    sheet.rectangle("POLY1", [0.0, -1.0], [100.0, 1.0]);
+    sheet.rectangle("POLY1", [100.0, -20.0], [140.0, 20.0]);
+    // a shield under all of the mass, and wiring from it to a pad of its own
+    sheet.rectangle("POLY0", [90.0, -30.0], [300.0, 30.0]);
+    sheet.pad([280.0, -10.0], [300.0, 10.0]);
+    sheet.label("mass", [120.0, 0.0]);
+    sheet.label("shield", [200.0, 0.0]);
+    let found = extracted(sheet.drawing());
+    assert!(found.notes.is_empty(), "{:?}", found.notes);
+    let nets: Vec<&str> = found.nets.iter().map(|net| net.name.as_str()).collect();
+    assert_eq!(nets, ["shield"]);
+    let named: Vec<&str> = found.nodes.iter().filter(|n| n.labelled).map(|n| n.name.as_str()).collect();
+    assert!(named.contains(&"mass"), "{named:?}");
+}
+
+/// A ground plane with holes joins the pads that it overlaps, one of two hundred here in a hole of it stands alone.
+#[test]
+fn a_perforated_plane_joins_what_it_overlaps() {
+    let mut sheet = Sheet::new(0.0, [0.0; 2]);
+    let at = |k: i32| 60.0 * f64::from(k);
+    for (i, j) in (0..15).flat_map(|i| (0..15).map(move |j| (at(i), at(j)))) {
+        // a frame of 60 by 60 with a hole of 30 by 30
+        sheet.rectangle("POLY0", [i - 30.0, j - 30.0], [i + 30.0, j - 15.0]);
+        sheet.rectangle("POLY0", [i - 30.0, j + 15.0], [i + 30.0, j + 30.0]);
+        sheet.rectangle("POLY0", [i - 30.0, j - 15.0], [i - 15.0, j + 15.0]);
+        sheet.rectangle("POLY0", [i + 15.0, j - 15.0], [i + 30.0, j + 15.0]);
+    }
+    for (i, j) in (0..14).flat_map(|i| (0..14).map(move |j| (i, j))) {
+        let past = if (i, j) == (7, 7) { 0.0 } else { 20.0 };
+        sheet.pad([at(i) - 10.0, at(j) - 10.0], [at(i) + 10.0 + past, at(j) + 10.0]);
+    }
+    sheet.label("plane", [at(2), at(3)]);
+    sheet.label("alone", [at(7), at(7)]);
+    let found = extracted(sheet.drawing());
+    let pads: Vec<_> = found.nets.iter().map(|net| (net.name.as_str(), net.pads.len())).collect();
+    assert_eq!(pads, [("plane", 195), ("alone", 1)]);
+}
+
+/// A bond pad twice as long as wide that stands alone is held like a square one, also at its ends, and its label names the net of the pad
+/// that wiring joins with it; it was said to float away.
+#[test]
+fn a_long_bond_pad() {
+    let mut sheet = Sheet::new(0.0, [0.0; 2]);
+    sheet.beam([0.0; 2], [200.0, 0.0], [2.0; 2], [2.0; 2]);
+    sheet.pad([-20.0, -10.0], [0.0, 10.0]);
+    sheet.pad([200.0, -10.0], [220.0, 10.0]);
+    sheet.pad([-20.0, 100.0], [20.0, 120.0]);
+    sheet.rectangle("POLY0", [-15.0, -5.0], [-5.0, 115.0]);
+    sheet.label("heat", [12.0, 110.0]);
+    sheet.label("gnd", [210.0, 0.0]);
+    let found = extracted(sheet.drawing());
+    assert!(found.unrecognised.is_empty() && found.notes.is_empty(), "{:?} {:?}", found.unrecognised, found.notes);
+    // 400 + 400 + 800 µm², and the beam
+    assert!((found.layers[0].anchored * 1e12 - 1600.0).abs() < 1e-3, "{:?}", found.layers[0]);
+    let text = netlist(&found);
+    assert!(text.contains("beam2det p1") && text.contains("heat port * "), "{text}");
+}

@@ -1,6 +1,6 @@
 //! What holds a layer: where its anchors lie, and which stretches of a line run over them.
 
-use super::boxes::{self, Boxes, Extent};
+use super::areas::Areas;
 use super::medial::Medial;
 use crate::layout::drawing::{Drawing, Polygon};
 use crate::layout::process::{self, Layer};
@@ -19,10 +19,7 @@ pub(super) enum Rule {
 
 /// Polygons that hold, found by place.
 #[derive(Debug)]
-pub(super) struct Held {
-    polygons: Vec<Vec<Vec<[f64; 2]>>>,
-    boxes: Boxes,
-}
+pub(super) struct Held(Areas);
 
 fn drawn(drawing: &Drawing, names: &[String]) -> Vec<Polygon> {
     let of = drawing.layers.iter().filter(|(name, _)| process::names(names, name));
@@ -51,62 +48,28 @@ impl Rule {
 
 impl Held {
     fn of(polygons: &[Polygon]) -> Self {
-        let float = |p: &Polygon| -> Vec<Vec<[f64; 2]>> {
-            p.contours.iter().map(|c| c.iter().map(|[x, y]| [f64::from(*x), f64::from(*y)]).collect()).collect()
-        };
-        let polygons: Vec<_> = polygons.iter().map(float).collect();
-        let extents: Vec<Extent> = polygons.iter().map(|p| boxes::around(p.iter().flatten().copied())).collect();
-        Self { boxes: Boxes::of(&extents), polygons }
+        Self(Areas::of(polygons))
     }
 
     /// Whether a point lies in one of them.
     pub(super) fn holds(&self, p: [f64; 2]) -> bool {
-        self.boxes.overlapping(&[p, p]).iter().any(|k| inside(&self.polygons[*k as usize], p))
+        !self.0.holding(p).is_empty()
     }
 
     /// Whether one of them overlaps an area of the axis.
     pub(super) fn touches(&self, axis: &Medial, origin: [f64; 2], edges: &[u32]) -> bool {
         let cells = edges.iter().map(|e| {
+            crate::budget::check();
             let edge = &axis.edges[*e as usize];
             axis.outline(edge.ends, edge.sites).map(|p| [p[0] + origin[0], p[1] + origin[1]])
         });
-        cells.filter(|cell| cell.iter().any(|p| *p != cell[0])).any(|cell| {
-            let near = self.boxes.overlapping(&boxes::around(cell));
-            near.iter().any(|k| overlap(&self.polygons[*k as usize], &cell))
-        })
+        let mut cells = cells.filter(|cell| cell.iter().any(|p| *p != cell[0]));
+        cells.any(|cell| !self.0.overlapping(&cell).is_empty())
     }
 
     /// Stretches of the line from `a` to `b` over them, as shares of its length, in order and disjoint.
     pub(super) fn over(&self, a: [f64; 2], b: [f64; 2]) -> Vec<[f64; 2]> {
-        let mut cuts = vec![0.0, 1.0];
-        let near = self.boxes.overlapping(&boxes::around([a, b]));
-        for contour in near.iter().flat_map(|k| &self.polygons[*k as usize]) {
-            for (p, q) in contour.iter().zip(contour.iter().cycle().skip(1)) {
-                let d = [b[0] - a[0], b[1] - a[1]];
-                let e = [q[0] - p[0], q[1] - p[1]];
-                let across = d[0] * e[1] - d[1] * e[0];
-                let f = [p[0] - a[0], p[1] - a[1]];
-                let (t, s) = ((f[0] * e[1] - f[1] * e[0]) / across, (f[0] * d[1] - f[1] * d[0]) / across);
-                if across != 0.0 && (0.0..=1.0).contains(&t) && (0.0..=1.0).contains(&s) {
-                    cuts.push(t);
-                }
-            }
-        }
-        cuts.sort_by(f64::total_cmp);
-        let mut covered: Vec<[f64; 2]> = Vec::new();
-        for pair in cuts.windows(2).filter(|pair| pair[1] - pair[0] > 1e-9) {
-            let t = 0.5 * (pair[0] + pair[1]);
-            if near
-                .iter()
-                .any(|k| inside(&self.polygons[*k as usize], [a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])]))
-            {
-                match covered.last_mut() {
-                    Some(last) if last[1] >= pair[0] - 1e-9 => last[1] = pair[1],
-                    _ => covered.push([pair[0], pair[1]]),
-                }
-            }
-        }
-        covered
+        self.0.over(a, b)
     }
 }
 
@@ -121,25 +84,4 @@ pub(super) fn inside(contours: &[Vec<[f64; 2]>], p: [f64; 2]) -> bool {
         }
     }
     odd
-}
-
-/// Whether a polygon and a cell share some area.
-pub(super) fn overlap(polygon: &[Vec<[f64; 2]>], cell: &[[f64; 2]]) -> bool {
-    let middle = |points: &[[f64; 2]]| {
-        let n = points.len() as f64;
-        [points.iter().map(|p| p[0]).sum::<f64>() / n, points.iter().map(|p| p[1]).sum::<f64>() / n]
-    };
-    let outline = [cell.to_vec()];
-    inside(polygon, middle(cell))
-        || polygon.iter().flatten().any(|p| inside(&outline, *p))
-        || polygon.iter().any(|contour| {
-            contour.iter().zip(contour.iter().cycle().skip(1)).any(|(p, q)| {
-                cell.iter().zip(cell.iter().cycle().skip(1)).any(|(a, b)| {
-                    let side = |p: &[f64; 2], q: &[f64; 2], r: &[f64; 2]| {
-                        (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
-                    };
-                    side(p, q, a) * side(p, q, b) < 0.0 && side(a, b, p) * side(a, b, q) < 0.0
-                })
-            })
-        })
 }

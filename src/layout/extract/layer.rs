@@ -19,7 +19,7 @@ use crate::layout::crossings::bounded;
 use crate::layout::drawing::{Drawing, Polygon};
 use crate::layout::process;
 use crate::layout::regions;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
 /// Bytes for each point of a layer while its axis is made.
@@ -77,13 +77,13 @@ fn at_origin(polygon: &Polygon) -> Polygon {
     Polygon { contours: polygon.contours.iter().map(moved).collect() }
 }
 
-/// Adds the model of a layer to the result.
+/// Adds the model of a layer to the result; answers the outlines of its parts in which something moves.
 pub(super) fn extract(
     drawing: &Drawing,
     layer: &process::Layer,
     drawn: &[Polygon],
     result: &mut Extraction,
-) -> Result<(), ExtractError> {
+) -> Result<Vec<Polygon>, ExtractError> {
     let unit = drawing.unit_m;
     let holes: Vec<Polygon> = drawing
         .layers
@@ -161,8 +161,9 @@ pub(super) fn extract(
     let models: Vec<Model> = pulled_at.map(|(bare, of)| if of.1.is_empty() { bare } else { model(of) }).collect();
     let mut loose = vec![false; parts.len()];
     combs.iter().flat_map(|comb| &comb.loose).for_each(|k| loose[*k] = true);
-    let held = models.iter().filter(|model| !model.anchors.is_empty()).count();
+    let held = models.iter().filter(|model| model.is_held()).count();
     sink.notes(drawing, layer, &rule, &parts, &models, &loose);
+    let mut moving = Vec::new();
     for (k, (part, model)) in parts.iter().zip(&models).enumerate() {
         let whole = regions::area(std::slice::from_ref(&part.polygon));
         let missing: f64 = part.holes.iter().map(|h| h.area).sum();
@@ -171,7 +172,7 @@ pub(super) fn extract(
             "the parts of its axis do not cover it: it is drawn too finely for its grid"
         } else if loose[k] {
             "it lies like a finger of a comb, and hangs on nothing"
-        } else if model.anchors.is_empty() && held > 0 && taps[k].is_empty() {
+        } else if !model.is_held() && held > 0 && taps[k].is_empty() {
             "nothing holds it, and it faces nothing that is held: it would float away"
         } else {
             done.anchored += model.held * unit * unit;
@@ -179,6 +180,7 @@ pub(super) fn extract(
             let fingers = whole - solid;
             let moves = !(model.beams.is_empty() && model.bodies.is_empty());
             *(if moves { &mut done.extracted } else { &mut done.anchored }) += fingers * unit * unit;
+            moving.extend(moves.then(|| part.polygon.clone()));
             pulled.push(Some(sink.add(model, k)));
             continue;
         };
@@ -187,10 +189,11 @@ pub(super) fn extract(
         sink.result.unrecognised.push(lost(layer, &part.polygon, unit, area, why));
         pulled.push(None);
     }
+    let anchored: HashSet<usize> = sink.result.anchors.iter().copied().collect();
     for comb in &combs {
         let nodes = comb.parts.map(|k| pulled[k].as_mut().and_then(Iterator::next));
         if let [Some(a), Some(b)] = nodes {
-            sink.comb(comb, [a, b]);
+            sink.comb(comb, [a, b], &anchored);
         }
     }
     for gap in &gaps {
@@ -217,7 +220,7 @@ pub(super) fn extract(
         }
     }
     result.layers.push(done);
-    Ok(())
+    Ok(moving)
 }
 
 /// The parts without the fingers of combs.
@@ -326,12 +329,12 @@ impl Sink<'_> {
             }
             self.result.notes.push(told);
         }
-        if models.iter().all(|m| m.anchors.is_empty()) {
+        if !models.iter().any(Model::is_held) {
             self.result.notes.push(format!("layer {name}: nothing holds it"));
             return;
         }
         let free: Vec<usize> =
-            (0..parts.len()).filter(|k| models[*k].anchors.is_empty() && !models[*k].taps.is_empty()).collect();
+            (0..parts.len()).filter(|k| !models[*k].is_held() && !models[*k].taps.is_empty()).collect();
         if !free.is_empty() {
             let told =
                 format!("layer {name}: nothing holds the parts with combs, which stay in the model: {}", list(free));
@@ -340,8 +343,8 @@ impl Sink<'_> {
     }
 
     /// A comb between two nodes, with its fingers as bodies on the sides that move.
-    fn comb(&mut self, comb: &combs::Comb, nodes: [usize; 2]) {
-        let held = nodes.map(|n| self.result.anchors.contains(&n));
+    fn comb(&mut self, comb: &combs::Comb, nodes: [usize; 2], anchored: &HashSet<usize>) {
+        let held = nodes.map(|n| anchored.contains(&n));
         for (i, node) in nodes.into_iter().enumerate() {
             if !held[i] && comb.masses[i].area > 0.0 {
                 let center =

@@ -10,6 +10,7 @@
 
 mod anchors;
 mod arcs;
+mod areas;
 mod boxes;
 mod combs;
 mod conductors;
@@ -102,6 +103,7 @@ pub fn extract(drawing: &Drawing, process: &Process, options: &ExtractOptions) -
         ..Extraction::default()
     };
     unknown_layers(drawing, process, &mut result)?;
+    let mut moving = Vec::new();
     for layer in &process.layers {
         let drawn: Vec<Polygon> = drawing
             .layers
@@ -110,7 +112,7 @@ pub fn extract(drawing: &Drawing, process: &Process, options: &ExtractOptions) -
             .flat_map(|(_, polygons)| polygons.iter().cloned())
             .collect();
         if !drawn.is_empty() {
-            layer::extract(drawing, layer, &drawn, &mut result)?;
+            moving.push(Moving { layer, parts: layer::extract(drawing, layer, &drawn, &mut result)? });
         }
     }
     if result.layers.is_empty() {
@@ -124,12 +126,19 @@ pub fn extract(drawing: &Drawing, process: &Process, options: &ExtractOptions) -
         });
     }
     arcs::same_widths(&mut result, drawing.unit_m);
-    let labels = nets::find(&mut result, drawing, process)?;
+    let labels = nets::find(&mut result, drawing, process, &moving)?;
     live::divide_tapers(&mut result);
     arcs::arcs(&mut result, drawing.unit_m);
     result.drop_unused_nodes();
     names::name(&mut result, drawing, &labels);
     Ok(result)
+}
+
+/// What moves of a layer.
+struct Moving<'a> {
+    layer: &'a process::Layer,
+    /// Outlines of the parts in which something moves, etch holes filled.
+    parts: Vec<Polygon>,
 }
 
 /// Tells of layers that the process does not know.

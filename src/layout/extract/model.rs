@@ -57,6 +57,11 @@ pub(super) struct Body {
 }
 
 impl Model {
+    /// Whether anything of it is held, with a node there or without.
+    pub(super) fn is_held(&self) -> bool {
+        !self.anchors.is_empty() || !self.pads.is_empty()
+    }
+
     /// Builds it from the axis of a part whose box has its lower left corner at `origin`; `taps` are places where
     /// something pulls at it, in coordinates of the drawing: on a centreline, or at the end of an arm.
     pub(super) fn of(
@@ -373,7 +378,7 @@ impl Builder<'_> {
         let at = |t: f64| [p[0] + t * (q[0] - p[0]), p[1] + t * (q[1] - p[1])];
         let width = |t: f64| limb.width[0] + t * (limb.width[1] - limb.width[0]);
         let widest = limb.width[0].max(limb.width[1]);
-        let mut kept = 0.0;
+        let (mut kept, mut free_ends) = (0.0, [false; 2]);
         // a free end is a joint of its own, and part of the beam
         let tips = (0..2).filter(|end| loose(*end)).map(|end| self.parts.at[k][end]);
         let (solid, missing) = tips.fold((limb.cell.area, self.limb_holes[k]), |(solid, missing), tip| {
@@ -398,6 +403,7 @@ impl Builder<'_> {
                 continue;
             }
             kept += t1 - t0;
+            free_ends = [free_ends[0] || t0 == 0.0, free_ends[1] || t1 == 1.0];
             let start = if t0 == 0.0 { a } else { self.node(local(t0), widest, true) };
             let end = if t1 == 1.0 { b } else { self.node(local(t1), widest, true) };
             for (stretch, nodes) in &mut held {
@@ -437,6 +443,11 @@ impl Builder<'_> {
         let area = limb.cell.area - self.limb_holes[k];
         self.model.area += area;
         self.model.held += (1.0 - kept) * area;
+        // a free end of what is held is held
+        for end in (0..2).filter(|end| loose(*end) && !free_ends[*end]) {
+            let tip = self.parts.at[k][end];
+            self.model.held += self.parts.joints[tip].cell.area - self.joint_holes[tip].area;
+        }
     }
 }
 

@@ -4,16 +4,17 @@
 //! join the pads that they overlap, and a part in which nothing moves is one conductor. Between two nets or more, the beams of a part carry
 //! current.
 
-use super::anchors::overlap;
+use super::areas::{self, Areas};
 use super::boxes::{self, Boxes, Extent};
 use super::names::identifier;
-use super::{ExtractError, Extraction, Net};
+use super::{ExtractError, Extraction, MOST_POINTS, Moving, Net};
 use crate::layout::crossings::bounded;
-use crate::layout::drawing::{Drawing, Polygon};
+use crate::layout::drawing::{Drawing, Label, Polygon};
 use crate::layout::mask;
 use crate::layout::process::{self, Process};
 use crate::layout::regions;
 use crate::sets::Sets;
+use std::cell::OnceCell;
 use std::collections::BTreeMap;
 
 /// Names of electrical ground, in small letters.
@@ -31,60 +32,30 @@ pub(super) struct OnNet {
 /// Finds nets; answers for each label of the drawing what conductor it stands on, if any.
 ///
 /// # Errors
-/// Wiring whose polygons cut one another too often to be merged.
+/// Wiring of too many points, or whose polygons cut one another too often to be merged.
 pub(super) fn find(
     result: &mut Extraction,
     drawing: &Drawing,
     process: &Process,
+    moving: &[Moving<'_>],
 ) -> Result<Vec<Option<OnNet>>, ExtractError> {
-    let pads: Vec<(usize, Vec<[f64; 2]>)> = outlines(result);
-    let boxes: Vec<Extent> = pads.iter().map(|(_, outline)| boxes::around(outline.iter().copied())).collect();
-    let tree = Boxes::of(&boxes);
-    let wiring = wiring(drawing, process)?;
-    let count = result.pads.len();
-    let mut sets = Sets::new(count + wiring.len());
-    for (w, (layers, contours)) in wiring.iter().enumerate() {
-        crate::budget::check();
-        for k in tree.overlapping(&boxes::around(contours.iter().flatten().copied())) {
-            let (pad, outline) = &pads[k as usize];
-            let joined =
-                layers.as_ref().is_none_or(|layers| layers.contains(&result.layers[result.pads[*pad].layer].name));
-            if joined && overlap(contours, outline) {
-                sets.join(*pad, count + w);
-            }
-        }
-    }
+    let under = Under::new(result, wiring(drawing, process)?, moving);
     let still = still(result);
-    let mut first: BTreeMap<usize, usize> = BTreeMap::new();
-    for k in 0..count {
-        // pads that share a node are one, and so is what does not move
-        let part = result.pads[k].part;
-        if still[part] {
-            sets.join(*first.entry(part).or_insert(k), k);
-        }
-    }
-    let mut of_node: BTreeMap<usize, usize> = BTreeMap::new();
-    for (k, pad) in result.pads.iter().enumerate() {
-        pad.nodes.iter().for_each(|n| {
-            sets.join(*of_node.entry(*n).or_insert(k), k);
-        });
-    }
-    let on_wiring =
-        Boxes::of(&wiring.iter().map(|(_, c)| boxes::around(c.iter().flatten().copied())).collect::<Vec<_>>());
+    let mut sets = joined(result, &under, &still);
+    let count = result.pads.len();
     let mut net_of: BTreeMap<usize, usize> = BTreeMap::new();
     let mut named: BTreeMap<String, usize> = BTreeMap::new();
     let mut labels = Vec::with_capacity(drawing.labels.len());
     for label in &drawing.labels {
+        crate::budget::check();
         let at = label.at.map(f64::from);
-        let under = tree.overlapping(&[at, at]).into_iter().map(|k| &pads[k as usize]);
-        let pad = under.filter(|(_, outline)| super::model::distance(outline, at) <= 1.0).map(|(pad, _)| *pad).next();
-        let wire = || {
-            let near = on_wiring.overlapping(&[at, at]).into_iter().map(|w| w as usize);
-            near.filter(|w| super::anchors::inside(&wiring[*w].1, at)).map(|w| count + w).next()
-        };
-        let Some(conductor) = pad.or_else(wire).filter(|_| !mask::on_notes(&label.layer)) else {
-            labels.push(None);
-            continue;
+        let (pad, conductor) = match under.label(result, label).filter(|_| !mask::on_notes(&label.layer)) {
+            Some(Conductor::Pad(pad)) => (Some(pad), pad),
+            Some(Conductor::Wire(wire)) => (None, count + wire),
+            None => {
+                labels.push(None);
+                continue;
+            }
         };
         let told = format!("label `{}` at {}", label.text, drawing.place(at));
         let Some(name) = identifier(&label.text) else {
@@ -124,40 +95,133 @@ pub(super) fn find(
     Ok(labels)
 }
 
-/// Outlines of all pads, each with its pad.
-fn outlines(result: &Extraction) -> Vec<(usize, Vec<[f64; 2]>)> {
-    let all = result.pads.iter().enumerate();
-    let cells = all.flat_map(|(k, pad)| pad.outlines.iter().map(move |outline| (k, outline.clone())));
-    cells.filter(|(_, outline)| outline.iter().any(|p| *p != outline[0])).collect()
+/// What a label can stand on.
+enum Conductor {
+    /// Index of a pad.
+    Pad(usize),
+    /// Index of a polygon of wiring.
+    Wire(usize),
 }
 
-/// A conductor that is no part: the layers that it can join (none: all), and its contours.
-type Wiring = (Option<Vec<String>>, Vec<Vec<[f64; 2]>>);
+/// Pads, wiring and parts that move, found by place.
+struct Under<'a> {
+    /// Outlines of pads, each with its pad.
+    pads: Vec<(usize, Vec<[f64; 2]>)>,
+    tree: Boxes,
+    wiring: Wiring,
+    /// Layers with their parts that move, sorted in when a label asks.
+    moving: Vec<(&'a Moving<'a>, OnceCell<Areas>)>,
+}
 
-/// Merged polygons of layers that hold still, and of metal.
-fn wiring(drawing: &Drawing, process: &Process) -> Result<Vec<Wiring>, ExtractError> {
-    let float = |p: &Polygon| -> Vec<Vec<[f64; 2]>> {
-        p.contours.iter().map(|c| c.iter().map(|[x, y]| [f64::from(*x), f64::from(*y)]).collect()).collect()
-    };
+impl<'a> Under<'a> {
+    fn new(result: &Extraction, wiring: Wiring, moving: &'a [Moving<'a>]) -> Self {
+        let all = result.pads.iter().enumerate();
+        let cells = all.flat_map(|(k, pad)| pad.outlines.iter().map(move |outline| (k, outline.clone())));
+        let pads: Vec<_> = cells.filter(|(_, outline)| outline.iter().any(|p| *p != outline[0])).collect();
+        let boxes: Vec<Extent> = pads.iter().map(|(_, outline)| boxes::around(outline.iter().copied())).collect();
+        let moving = moving.iter().map(|moving| (moving, OnceCell::new())).collect();
+        Self { tree: Boxes::of(&boxes), pads, wiring, moving }
+    }
+
+    /// The conductor that a label stands on. A label on a layer that moves belongs to what moves of it there, whatever lies beneath.
+    fn label(&self, result: &Extraction, label: &Label) -> Option<Conductor> {
+        let at = label.at.map(f64::from);
+        let near = self.tree.overlapping(&[at, at]).into_iter().map(|k| &self.pads[k as usize]);
+        let pads = near.filter(|(_, outline)| super::model::distance(outline, at) <= 1.0).map(|(pad, _)| *pad);
+        let pads: Vec<usize> = pads.collect();
+        for (moving, parts) in self.moving.iter().filter(|(m, _)| process::names(&m.layer.drawn, &label.layer)) {
+            let own = |pad: &&usize| result.layers[result.pads[**pad].layer].name == moving.layer.name;
+            if let Some(pad) = pads.iter().find(own) {
+                return Some(Conductor::Pad(*pad));
+            }
+            let parts = parts.get_or_init(|| {
+                crate::budget::lay_out(points(&moving.parts) * areas::BYTES_PER_POINT);
+                Areas::of(&moving.parts)
+            });
+            if !parts.holding(at).is_empty() {
+                return None;
+            }
+        }
+        let wire = || self.wiring.areas.holding(at).first().map(|w| Conductor::Wire(*w as usize));
+        pads.first().copied().map(Conductor::Pad).or_else(wire)
+    }
+}
+
+/// Pads, then polygons of wiring: which of them are one conductor.
+fn joined(result: &Extraction, under: &Under<'_>, still: &[bool]) -> Sets {
+    let count = result.pads.len();
+    let mut sets = Sets::new(count + under.wiring.areas.len());
+    for (pad, outline) in &under.pads {
+        crate::budget::check();
+        let layer = &result.layers[result.pads[*pad].layer].name;
+        for w in under.wiring.areas.overlapping(outline).into_iter().map(|w| w as usize) {
+            if under.wiring.joins(w, layer) {
+                sets.join(*pad, count + w);
+            }
+        }
+    }
+    let mut first: BTreeMap<usize, usize> = BTreeMap::new();
+    let mut of_node: BTreeMap<usize, usize> = BTreeMap::new();
+    for (k, pad) in result.pads.iter().enumerate() {
+        // what does not move is one, and so are pads that share a node
+        if still[pad.part] {
+            sets.join(*first.entry(pad.part).or_insert(k), k);
+        }
+        pad.nodes.iter().for_each(|n| {
+            sets.join(*of_node.entry(*n).or_insert(k), k);
+        });
+    }
+    sets
+}
+
+/// Conductors that are no part: merged polygons of layers that hold still, and of metal.
+struct Wiring {
+    areas: Areas,
+    /// The layers that polygons can join, none: all, from the polygon of that number on.
+    layers: Vec<(usize, Option<Vec<String>>)>,
+}
+
+impl Wiring {
+    /// Whether a polygon can join pads of a layer.
+    fn joins(&self, polygon: usize, layer: &String) -> bool {
+        let kind = self.layers.partition_point(|(first, _)| *first <= polygon);
+        kind > 0 && self.layers[kind - 1].1.as_ref().is_none_or(|layers| layers.contains(layer))
+    }
+}
+
+fn points(polygons: &[Polygon]) -> usize {
+    polygons.iter().flat_map(|p| &p.contours).map(Vec::len).sum()
+}
+
+/// Finds the wiring of a drawing.
+fn wiring(drawing: &Drawing, process: &Process) -> Result<Wiring, ExtractError> {
     let drawn = |names: &[String]| {
         let of = drawing.layers.iter().filter(|(name, _)| process::names(names, name));
         let all: Vec<Polygon> = of.flat_map(|(_, polygons)| polygons.iter().cloned()).collect();
-        let tangled = |tangled| ExtractError::Tangled { layer: names.join(", "), tangled };
-        bounded(all.iter()).map_err(tangled)?;
-        Ok(regions::union(&all))
+        let layer = || names.join(", ");
+        bounded(all.iter()).map_err(|tangled| ExtractError::Tangled { layer: layer(), tangled })?;
+        let merged = regions::union(&all);
+        let points = points(&merged);
+        if points > MOST_POINTS {
+            return Err(ExtractError::TooLarge { layer: layer(), points });
+        }
+        crate::budget::lay_out(points * areas::BYTES_PER_POINT);
+        Ok(merged)
     };
-    let mut all: Vec<Wiring> = Vec::new();
+    let (mut all, mut layers) = (Vec::new(), Vec::new());
     for fixed in &process.fixed {
-        all.extend(drawn(&fixed.drawn)?.iter().map(|p| (None, float(p))));
+        layers.push((all.len(), None));
+        all.extend(drawn(&fixed.drawn)?);
     }
     let mut metals: BTreeMap<Vec<String>, Vec<String>> = BTreeMap::new();
     for layer in process.layers.iter().filter(|layer| !layer.metal.is_empty()) {
         metals.entry(layer.metal.clone()).or_default().push(layer.name.clone());
     }
-    for (metal, layers) in metals {
-        all.extend(drawn(&metal)?.iter().map(|p| (Some(layers.clone()), float(p))));
+    for (metal, joins) in metals {
+        layers.push((all.len(), Some(joins)));
+        all.extend(drawn(&metal)?);
     }
-    Ok(all)
+    Ok(Wiring { areas: Areas::of(&all), layers })
 }
 
 /// For each part whether nothing in it moves.
@@ -171,24 +235,26 @@ fn still(result: &Extraction) -> Vec<bool> {
 
 /// Parts that move and lie between nets.
 fn live(result: &mut Extraction, still: &[bool]) -> Vec<usize> {
-    let mut nets: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
-    for (net, pads) in result.nets.iter().enumerate().map(|(k, net)| (k, &net.pads)) {
-        for part in pads.iter().map(|k| result.pads[*k].part).filter(|part| !still[*part]) {
-            let on = nets.entry(part).or_default();
-            if on.last() != Some(&net) {
-                on.push(net);
+    // ground is one, by whatever names
+    let ground = result.nets.iter().position(|net| net.ground).unwrap_or(0);
+    // by part: its layer, and the nets on it
+    let mut nets: BTreeMap<usize, (usize, Vec<usize>)> = BTreeMap::new();
+    for (k, net) in result.nets.iter().enumerate() {
+        let k = if net.ground { ground } else { k };
+        for pad in net.pads.iter().map(|pad| &result.pads[*pad]).filter(|pad| !still[pad.part]) {
+            let on = &mut nets.entry(pad.part).or_insert((pad.layer, Vec::new())).1;
+            if on.last() != Some(&k) {
+                on.push(k);
             }
         }
     }
-    let between: Vec<usize> = nets.into_iter().filter(|(_, on)| on.len() > 1).map(|(part, _)| part).collect();
     let mut without = Vec::new();
-    let live = between.into_iter().filter(|part| {
-        let layer = result.pads.iter().find(|pad| pad.part == *part).map_or(0, |pad| pad.layer);
+    let live = nets.into_iter().filter(|(_, (_, on))| on.len() > 1).filter_map(|(part, (layer, _))| {
         let known = super::live::resists(&result.layers[layer]);
         if !known && !without.contains(&layer) {
             without.push(layer);
         }
-        known
+        known.then_some(part)
     });
     let live = live.collect();
     for layer in without {

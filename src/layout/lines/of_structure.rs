@@ -2,7 +2,7 @@
 
 use super::{Line, Lines, ProcessLine};
 use crate::sets::Sets;
-use crate::structure::{Beam, CircuitKind, GapVoltage, NodeId, Structure};
+use crate::structure::{Beam, BeamGap, CircuitKind, GapVoltage, NodeId, Structure};
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 /// Parts that no line stands for.
@@ -50,6 +50,12 @@ fn places(model: &str) -> bool {
         model,
         "link2d" | "spring2d" | "damper2d" | "anchor" | "hinge" | "slider" | "guide2d" | "mass2d" | "plate2d"
     )
+}
+
+/// Nodes and direction of a gap whose lower beam lies to the right of the way along the upper one: of a mirrored one, the way back.
+fn unmirrored(gap: &BeamGap) -> ([NodeId; 4], f64) {
+    let [a, b, c, d] = gap.nodes;
+    if gap.side < 0.0 { ([b, a, d, c], gap.angle + std::f64::consts::PI) } else { (gap.nodes, gap.angle) }
 }
 
 struct OfStructure<'a> {
@@ -252,12 +258,10 @@ impl<'a> OfStructure<'a> {
             };
             let process = self.process_of(upper);
             let mut parameters = vec![("l", gap.length), ("w1", upper.width), ("w2", lower.width), ("gap", gap.gap)];
-            parameters.extend([("oz", gap.angle), ("V", voltage), ("permittivity", gap.permittivity)]);
+            let (nodes, angle) = unmirrored(gap);
+            parameters.extend([("oz", angle), ("V", voltage), ("permittivity", gap.permittivity)]);
             parameters.extend(gap.touch.map(|t| ("touch", t)));
-            if gap.side < 0.0 {
-                self.left.push(format!("that `{}` is mirrored", gap.name));
-            }
-            self.push(&gap.name, "gap2d", &process, &gap.nodes, &parameters);
+            self.push(&gap.name, "gap2d", &process, &nodes, &parameters);
             inside.extend(parts);
         }
         inside
@@ -298,12 +302,10 @@ impl<'a> OfStructure<'a> {
             let w1 = w1.or(w2.map(|w| both - w)).unwrap_or(both / 2.0);
             let w2 = w2.unwrap_or(both - w1);
             let mut parameters = vec![("l", gap.length), ("w1", w1), ("w2", w2), ("gap", gap.gap), ("h", gap.height)];
-            parameters.extend([("oz", gap.angle), ("permittivity", gap.permittivity)]);
+            let (nodes, angle) = unmirrored(gap);
+            parameters.extend([("oz", angle), ("permittivity", gap.permittivity)]);
             parameters.extend(gap.touch.map(|t| ("touch", t)));
-            if gap.side < 0.0 {
-                self.left.push(format!("that `{}` is mirrored", gap.name));
-            }
-            self.push(&gap.name, "gap2dforce", "*", &gap.nodes, &parameters);
+            self.push(&gap.name, "gap2dforce", "*", &nodes, &parameters);
         }
         for gap in &structure.plate_gaps {
             if matches!(gap.voltage, GapVoltage::Fixed(_)) {
