@@ -21,7 +21,6 @@ const LONG_FILES: &[&str] = &[
     "src/layout/process.rs",
     "src/netlist/sugar3/builtins.rs",
     "src/netlist/sugar3/evaluate.rs",
-    "src/service/rpc.rs",
     "tests/netlist_library.rs",
     "tests/service/attacks.rs",
 ];

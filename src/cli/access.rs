@@ -2,35 +2,42 @@
 
 use bimorph::service::access::Access;
 use clap::Args;
+use clap::builder::{OsStringValueParser, TypedValueParser};
 use std::path::PathBuf;
 
 /// For `https://` and servers that ask for a token.
 #[derive(Debug, Args)]
 pub(crate) struct AccessArgs {
     /// Authorities to trust at https:// addresses, PEM
-    #[arg(long, value_name = "FILE", env = "BIMORPH_CA")]
+    #[arg(long, value_name = "FILE", value_parser = path(), env = "BIMORPH_CA")]
     ca: Option<PathBuf>,
 
     /// File with the token to show a server
-    #[arg(long, value_name = "FILE", env = "BIMORPH_TOKEN_FILE")]
+    #[arg(long, value_name = "FILE", value_parser = path(), env = "BIMORPH_TOKEN_FILE")]
     token_file: Option<PathBuf>,
 
     /// Own certificate, for servers that ask for one, PEM
-    #[arg(long, value_name = "FILE", env = "BIMORPH_CLIENT_CERT")]
+    #[arg(long, value_name = "FILE", value_parser = path(), env = "BIMORPH_CLIENT_CERT")]
     client_cert: Option<PathBuf>,
 
     /// Key of the own certificate, PEM
-    #[arg(long, value_name = "FILE", env = "BIMORPH_CLIENT_KEY")]
+    #[arg(long, value_name = "FILE", value_parser = path(), env = "BIMORPH_CLIENT_KEY")]
     client_key: Option<PathBuf>,
+}
+
+/// A path; an empty one says nothing, as an empty variable does.
+fn path() -> impl TypedValueParser<Value = PathBuf> {
+    OsStringValueParser::new().map(PathBuf::from)
 }
 
 impl AccessArgs {
     pub(crate) fn access(&self) -> Access {
+        let said = |path: &Option<PathBuf>| path.clone().filter(|path| !path.as_os_str().is_empty());
         Access {
-            authority: self.ca.clone(),
-            token_file: self.token_file.clone(),
-            certificate: self.client_cert.clone(),
-            key: self.client_key.clone(),
+            authority: said(&self.ca),
+            token_file: said(&self.token_file),
+            certificate: said(&self.client_cert),
+            key: said(&self.client_key),
         }
     }
 }

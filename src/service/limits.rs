@@ -1,7 +1,7 @@
 //! What one server allows: a table, from which come the fields, their defaults, and what everybody is told of them.
 
 use super::proto;
-use super::written::{Bytes, Count, Time, Written};
+use super::written::{Bytes, BytesOrNone, Count, Time, Written};
 use std::sync::LazyLock;
 use std::time::Duration;
 
@@ -54,7 +54,7 @@ limits! {
 
     /// Largest SUGAR 3 netlist, all files together: such a netlist is a Lua program, and 0 runs none. With 1M they run
     /// in the sandbox of docs/netlist.md.
-    program_bytes: Bytes = 0;
+    program_bytes: BytesOrNone = 0;
 
     /// Most mechanical unknowns of one model.
     unknowns: Count = 200_000;
@@ -207,11 +207,19 @@ mod tests {
             limits.set(name, "7").unwrap_or_else(|error| panic!("{error}"));
             assert_ne!(limits, Limits::default(), "{name}");
             assert_eq!(limits.get(limit), "7", "{name}");
-            for bad in ["0", "-1", "x", "", "1e99", "G"] {
+            for bad in ["-1", "x", "", "1e99", "G"] {
                 let error = limits.set(name, bad).expect_err("means nothing");
                 assert!(error.starts_with(name), "{error}");
             }
+            // every default can be written, and none but such is nothing
+            let default = Limits::default().get(limit);
+            limits.set(name, &default).unwrap_or_else(|error| panic!("{error}"));
+            assert_eq!(limits.get(limit), default, "{name}");
+            assert_eq!(limits.set(name, "0").is_ok(), default == "0", "{name}");
         }
+        // what is added up or multiplied stays a number
+        let error = Limits::default().set("connections", "2305843009213693952").expect_err("too many");
+        assert!(error.contains("at most 1e15"), "{error}");
         let error = Limits::default().set("session", "1").expect_err("no such limit");
         assert!(error.contains("sessions"), "{error}");
         let mut limits = Limits::default();

@@ -166,7 +166,7 @@ pub(super) fn busy(shared: &Shared, gate: &Gate) -> Option<String> {
         ("calls", calls, limits.calls),
         ("held_bytes", held, limits.held_bytes),
         // each would wait for this many others before its turn
-        ("waiting", waiting, WAITING * limits.analyses),
+        ("waiting", waiting, limits.analyses.saturating_mul(WAITING)),
     ] {
         if have >= most {
             return Some(format!("{what}: {have} of {most}"));

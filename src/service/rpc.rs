@@ -1,13 +1,12 @@
 //! The calls of `service.proto`: check, look up, compute, convert.
 
-use super::chunks::{HEARTBEAT, Outlet, TableStream, send_transient};
+use super::analyses::{TransientStream, count};
+use super::chunks::{HEARTBEAT, TableStream};
 use super::connection::Connections;
-use super::convert::{
-    self, Violation, analysis as results, model as text, options as options_wire, sweep as sweeps_wire,
-};
+use super::convert::{self, model as text, options as options_wire, sweep as sweeps_wire};
 use super::limits::Limits;
 use super::metrics::Metrics;
-use super::models::{Model, Models, check_size};
+use super::models::{Models, check_size};
 use super::server::MakeDevice;
 use super::session::Question;
 use super::sessions::Sessions;
@@ -15,17 +14,12 @@ use super::shutdown::Shutdown;
 use super::store::Store;
 use super::stream::{TrialStream, answerable};
 use super::sweeps::Sweeps;
-use super::work::{Results, Work, guarded};
+use super::work::Work;
 use super::{proto, status};
-use crate::analysis::integrator::Integrator;
-use crate::analysis::transient::TransientOptions;
-use crate::analysis::{harmonic, mesh, modes, pull_in, statics};
 use crate::budget::Budget;
 use crate::compile::{CompileError, CompileOptions, compile};
 use crate::device::Token;
 use crate::netlist::Bundle;
-use crate::options::Value;
-use crate::options::analysis::{MODES_COUNT, PULL_IN_MAX, TRAN_POINTS, TRAN_RHO, TRAN_STEP, TRAN_STOP};
 use proto::device_reply::Kind as ReplyKind;
 use proto::sweep_status::State;
 use std::pin::Pin;
@@ -66,7 +60,8 @@ pub(super) struct Calls(pub(super) Arc<Shared>);
 /// Time between two messages of WatchSweep.
 const WATCH_INTERVAL: Duration = Duration::from_millis(100);
 
-type Reply<T> = Result<Response<T>, Status>;
+/// The answer of a call.
+pub(super) type Reply<T> = Result<Response<T>, Status>;
 
 impl Calls {
     /// Bundle and options of a request, within limits.
@@ -81,25 +76,11 @@ impl Calls {
     }
 
     /// A place for results that are being sent.
-    fn sending(&self) -> Result<OwnedSemaphorePermit, Status> {
+    pub(super) fn sending(&self) -> Result<OwnedSemaphorePermit, Status> {
         let most = self.0.limits.result_streams;
         let place = Arc::clone(&self.0.results).try_acquire_owned();
         place.map_err(|_| status::limit("result_streams", most, "one more; read or end those that are open"))
     }
-
-    /// Looks up a model, then computes on it.
-    async fn analyse<T: Send + 'static>(
-        &self,
-        id: &str,
-        job: impl FnOnce(&Model) -> Result<T, Status> + Send + 'static,
-    ) -> Reply<T> {
-        let model = self.0.models.get(id)?;
-        self.0.work.run(move || job(&model)).await.map(Response::new)
-    }
-}
-
-fn voltages(values: Vec<proto::Named>) -> Result<Vec<(String, f64)>, Status> {
-    convert::voltages("voltages", values).map_err(status::violation)
 }
 
 #[tonic::async_trait]
@@ -214,7 +195,10 @@ impl proto::bimorph_server::Bimorph for Calls {
         let proto::KeepAliveRequest { session, lease_s } = request.into_inner();
         let session = self.0.session(&session).await?;
         let (limits, none) = (&self.0.limits, lease_s == 0.0);
-        let lease_s = if none { limits.idle.as_secs_f64() } else { lease_s.min(limits.stream_idle.as_secs_f64()) };
+        let longest = limits.stream_idle.as_secs_f64();
+        // what is no number is not the longest one
+        let lease_s = if lease_s > longest { longest } else { lease_s };
+        let lease_s = if none { limits.idle.as_secs_f64() } else { lease_s };
         let lease_s = convert::number("lease_s", lease_s, true).map_err(status::violation)?;
         session.usage.lease((!none).then(|| Duration::from_secs_f64(lease_s)));
         Ok(Response::new(proto::KeepAliveResponse { lease_s }))
@@ -226,157 +210,28 @@ impl proto::bimorph_server::Bimorph for Calls {
     }
 
     async fn r#static(&self, request: Request<proto::StaticRequest>) -> Reply<proto::StaticResponse> {
-        let request = request.into_inner();
-        let voltages = voltages(request.voltages)?;
-        let job = move |model: &Model| {
-            let (fitted, mut result, _) =
-                statics::static_fitted(&model.compiled, &voltages).map_err(status::analysis)?;
-            result.warnings.extend(mesh::warnings(&fitted));
-            Ok(results::static_to_wire(&result))
-        };
-        self.analyse(&request.model, job).await
+        self.statics(request.into_inner()).await
     }
 
     async fn modes(&self, request: Request<proto::ModesRequest>) -> Reply<proto::ModesResponse> {
-        let request = request.into_inner();
-        let voltages = voltages(request.voltages)?;
-        let count = if request.count == 0 { MODES_COUNT.count() } else { request.count as usize };
-        if count > self.0.limits.modes {
-            return Err(status::limit("modes", self.0.limits.modes, count));
-        }
-        let most = self.0.limits.mode_work;
-        let job = move |model: &Model| {
-            let work = model.unknowns().saturating_mul(count.saturating_mul(count));
-            if work > most {
-                return Err(status::limit("mode_work", most, work));
-            }
-            let (fitted, mut result, _) =
-                modes::modes_fitted(&model.compiled, count, &voltages).map_err(status::analysis)?;
-            result.warnings.extend(mesh::warnings(&fitted));
-            Ok(results::modes_to_wire(&result))
-        };
-        self.analyse(&request.model, job).await
+        self.frequencies(request.into_inner()).await
     }
 
     async fn frequency_response(
         &self,
         request: Request<proto::FrequencyResponseRequest>,
     ) -> Reply<proto::FrequencyResponseReply> {
-        let request = request.into_inner();
-        let id = request.model.clone();
-        count("signals", request.signals.len(), &self.0.limits)?;
-        let options = convert::harmonic::request_from_wire(request).map_err(status::violation)?;
-        options.check().map_err(status::analysis)?;
-        let most = self.0.limits.message_bytes;
-        let bytes = options.bytes();
-        if bytes > most {
-            return Err(status::limit("message_bytes", most, bytes));
-        }
-        let job = move |model: &Model| {
-            let (fitted, mut result) =
-                harmonic::harmonic_fitted(&model.compiled, &options, &mut |_| true).map_err(status::analysis)?;
-            result.warnings.extend(mesh::warnings(&fitted));
-            Ok(convert::harmonic::result_to_wire(&result))
-        };
-        self.analyse(&id, job).await
+        self.response(request.into_inner()).await
     }
 
     async fn pull_in(&self, request: Request<proto::PullInRequest>) -> Reply<proto::PullInResponse> {
-        let request = request.into_inner();
-        let max = request.max_v;
-        convert::options::analysis(&PULL_IN_MAX, Value::Number(max)).map_err(status::violation)?;
-        let port = (!request.port.is_empty()).then_some(request.port);
-        let job = move |model: &Model| {
-            let (fitted, mut result) =
-                pull_in::pull_in_fitted(&model.compiled, port.as_deref(), max).map_err(status::analysis)?;
-            result.warnings.extend(mesh::warnings(&fitted));
-            Ok(results::pull_in_to_wire(&result))
-        };
-        self.analyse(&request.model, job).await
+        self.pulled_in(request.into_inner()).await
     }
 
-    type TransientStream = Results<ReceiverStream<Result<proto::TransientEvent, Status>>>;
+    type TransientStream = TransientStream;
 
     async fn transient(&self, request: Request<proto::TransientRequest>) -> Reply<Self::TransientStream> {
-        let request = request.into_inner();
-        let model = self.0.models.get(&request.model)?;
-        let release = match request.release_model.as_str() {
-            "" => None,
-            id => Some(self.0.models.get(id)?),
-        };
-        let given = |about, value| convert::options::analysis(about, value).map_err(status::violation);
-        let stop = request.stop_s;
-        given(&TRAN_STOP, Value::Number(stop))?;
-        let tol = match request.tol {
-            0.0 => model.compiled.options.tol,
-            tol => convert::number("tol", tol, true).map_err(status::violation)?,
-        };
-        let points = if request.points == 0 { TRAN_POINTS.count() } else { request.points as usize };
-        given(&TRAN_POINTS, Value::Count(points))?;
-        count("signals", request.signals.len(), &self.0.limits)?;
-        count("events", request.events.len(), &self.0.limits)?;
-        let values = points.saturating_mul(request.signals.len() + 1);
-        if values > self.0.limits.transient_values {
-            return Err(status::limit("transient_values", self.0.limits.transient_values, values));
-        }
-        let method = match request.method.as_str() {
-            "" => Integrator::default(),
-            name => Integrator::named(name).ok_or_else(|| {
-                let expected = format!("expected one of {:?}, got \"{name}\"", Integrator::NAMES);
-                status::violation(Violation::new("method", expected))
-            })?,
-        };
-        let method = match (method, request.rho) {
-            (Integrator::GeneralizedAlpha { .. }, Some(rho)) => {
-                given(&TRAN_RHO, Value::Number(rho))?;
-                Integrator::GeneralizedAlpha { rho }
-            }
-            (_, Some(_)) => {
-                return Err(status::violation(Violation::new("rho", "expected only with method generalized-alpha")));
-            }
-            (method, None) => method,
-        };
-        let step = match request.step_s {
-            0.0 => None,
-            step => {
-                given(&TRAN_STEP, Value::Number(step))?;
-                Some(step)
-            }
-        };
-        let events = convert::pairs(request.events);
-        let (signals, voltages) = (request.signals, voltages(request.voltages)?);
-        let sending = self.sending()?;
-        let place = self.0.work.place().await?;
-        let budget = self.0.work.budget();
-        let (outlet, receiver) = Outlet::new(Arc::clone(&self.0));
-        let outlet = outlet.with_place(place);
-        let results = Results::new(ReceiverStream::new(receiver), budget.clone());
-        let mut failed = outlet.also();
-        tokio::task::spawn_blocking(move || {
-            let _sending = sending;
-            let job = || {
-                let release = release.as_ref().map(|model| &*model.compiled);
-                let options = TransientOptions {
-                    stop,
-                    signals,
-                    points,
-                    tol,
-                    voltages,
-                    release,
-                    method,
-                    step,
-                    events,
-                    keep: false,
-                    ..TransientOptions::default()
-                };
-                send_transient(&model.compiled, &options, outlet);
-                Ok(())
-            };
-            if let Err(status) = guarded(&budget, job) {
-                failed.send(Err(status));
-            }
-        });
-        Ok(Response::new(results))
+        self.motion(request.into_inner()).await
     }
 
     async fn submit_sweep(&self, request: Request<proto::SubmitSweepRequest>) -> Reply<proto::SubmitSweepResponse> {
@@ -390,11 +245,7 @@ impl proto::bimorph_server::Bimorph for Calls {
         if points > limits.sweep_points {
             return Err(status::limit("sweep_points", limits.sweep_points, points));
         }
-        if let Some(proto::sweep_spec::Analysis::Static(asked)) =
-            request.spec.as_ref().and_then(|s| s.analysis.as_ref())
-        {
-            count("outputs", asked.outputs.len(), limits)?;
-        }
+        count("outputs", request.spec.as_ref().map_or(0, sweeps_wire::outputs), limits)?;
         let shared = Arc::clone(&self.0);
         let job = move || {
             let spec = sweeps_wire::spec_from_wire(request.spec).map_err(status::violation)?;
@@ -448,11 +299,6 @@ impl proto::bimorph_server::Bimorph for Calls {
         self.0.sweeps.cancel(&request.get_ref().sweep)?;
         Ok(Response::new(proto::CancelSweepResponse {}))
     }
-}
-
-/// Refuses a list that is longer than anyone needs, before anything is looked up for it.
-fn count(what: &str, got: usize, limits: &Limits) -> Result<(), Status> {
-    if got > limits.signals { Err(status::limit(what, limits.signals, got)) } else { Ok(()) }
 }
 
 /// A fault of a session as the status of a unary call.

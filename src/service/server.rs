@@ -184,8 +184,8 @@ fn share(
     Arc::new(Shared {
         work: places(limits.analyses),
         desk: places(limits.analyses),
-        trials: places(2 * limits.analyses),
-        results: Arc::new(Semaphore::new(limits.result_streams)),
+        trials: places(limits.analyses.saturating_mul(2)),
+        results: Arc::new(Semaphore::new(limits.result_streams.min(Semaphore::MAX_PERMITS))),
         told,
         make,
         models: Models::default(),
@@ -198,6 +198,9 @@ fn share(
         limits,
     })
 }
+
+/// SIGXFSZ, on Linux and on BSDs.
+const FILE_TOO_LARGE: i32 = 25;
 
 /// [`run`] on threads of its own, until SIGINT or SIGTERM, or the end of standard input where
 /// [`ServeOptions::while_stdin`] says so: what `bimorph serve` calls. A second signal stops at once.
@@ -221,6 +224,8 @@ pub fn run_until_signal(options: ServeOptions) -> Result<(), ServeError> {
         use tokio::signal::unix::{SignalKind, signal};
         let mut interrupt = signal(SignalKind::interrupt()).map_err(ServeError::Runtime)?;
         let mut terminate = signal(SignalKind::terminate()).map_err(ServeError::Runtime)?;
+        // a file that may not grow is an error of who writes it, as a full disk is, and not the end of the server
+        let _too_large = signal(SignalKind::from_raw(FILE_TOO_LARGE));
         let input = input_ends(options.while_stdin);
         let (first, told) = tokio::sync::oneshot::channel();
         let mut serving = std::pin::pin!(run(options, async {

@@ -146,27 +146,24 @@ pub fn variable(name: &str) -> String {
 }
 
 impl Settings {
-    /// Sets one by its name. What a stronger source has said stays.
+    /// Sets one by its name. What a stronger source has said stays; what is said here must be right all the same.
     ///
     /// # Errors
     /// [`SettingError`], which names `place`.
     pub fn set(&mut self, name: &str, text: &str, source: Source, place: String) -> Result<(), SettingError> {
         let value =
             |place, expected: &str| SettingError::Value { place, expected: expected.to_owned(), got: text.to_owned() };
+        let mut unheard = Self::default();
         if let Some(setting) = SETTINGS.iter().find(|setting| setting.name == name) {
-            if self.yields(setting.name, source) {
-                (setting.read)(self, text).map_err(|expected| value(place, expected))?;
-            }
-            return Ok(());
+            let settings = if self.yields(setting.name, source) { self } else { &mut unheard };
+            return (setting.read)(settings, text).map_err(|expected| value(place, expected));
         }
         let Some(limit) = LIMITS.iter().find(|limit| limit.name == name) else {
             let known = SETTINGS.iter().map(|setting| setting.name).chain(LIMITS.iter().map(|limit| limit.name));
             return Err(SettingError::Unknown { place, known: known.collect::<Vec<_>>().join(", ") });
         };
-        if self.yields(limit.name, source) {
-            (limit.read)(&mut self.limits, text).map_err(|expected| value(place, expected))?;
-        }
-        Ok(())
+        let settings = if self.yields(limit.name, source) { self } else { &mut unheard };
+        (limit.read)(&mut settings.limits, text).map_err(|expected| value(place, expected))
     }
 
     /// Whether a setting takes what `source` says; then it is remembered.
@@ -179,14 +176,15 @@ impl Settings {
         true
     }
 
-    /// Takes what variables say, those whose names begin with [`ENVIRONMENT`].
+    /// Takes what variables say, those whose names begin with [`ENVIRONMENT`]. Kubernetes tells every container of a service called
+    /// `bimorph-serve` in variables that begin so, too: those are passed over.
     ///
     /// # Errors
     /// [`SettingError`].
     pub fn read_environment(&mut self, variables: impl Iterator<Item = (String, String)>) -> Result<(), SettingError> {
         for (variable, text) in variables {
             let Some(name) = variable.strip_prefix(ENVIRONMENT).map(str::to_lowercase) else { continue };
-            if !text.is_empty() && name != "config" {
+            if !text.is_empty() && name != "config" && !is_of_a_service(&name, &text) {
                 self.set(&name, &text, Source::Environment, variable)?;
             }
         }
@@ -243,7 +241,8 @@ impl Settings {
         };
         let is_path = SETTINGS.iter().any(|setting| setting.name == name && setting.place == File::PLACE);
         let text = match path.parent() {
-            Some(folder) if is_path => folder.join(text).display().to_string(),
+            // nothing is no path, and not the folder of the file
+            Some(folder) if is_path && !text.is_empty() => folder.join(text).display().to_string(),
             _ => text,
         };
         self.set(name, &text, Source::File, place)
@@ -296,6 +295,16 @@ impl Settings {
             ..ServeOptions::default()
         }
     }
+}
+
+/// Whether a variable is one of those by which Kubernetes tells where a service is: `…_SERVICE_HOST`, `…_SERVICE_PORT` and those of
+/// its ports, `…_PORT` and those of a container link.
+fn is_of_a_service(name: &str, text: &str) -> bool {
+    name == "service_host"
+        || name == "service_port"
+        || name.starts_with("service_port_")
+        || name == "port" && text.contains("://")
+        || name.strip_prefix("port_").is_some_and(|rest| rest.starts_with(|c: char| c.is_ascii_digit()))
 }
 
 fn is_limit(name: &str) -> bool {

@@ -25,6 +25,9 @@ fn whole(text: &str) -> Option<usize> {
     text.parse().ok().filter(|n| *n > 0)
 }
 
+/// Largest number of anything: sums and small multiples of such still are numbers.
+const MOST: usize = 1_000_000_000_000_000;
+
 /// A whole number above 0.
 #[derive(Debug)]
 pub struct Count;
@@ -34,7 +37,7 @@ impl Written for Count {
     const PLACE: &'static str = "N";
 
     fn read(text: &str) -> Result<usize, &'static str> {
-        whole(text).ok_or("a whole number above 0")
+        whole(text).filter(|n| *n <= MOST).ok_or("a whole number above 0, at most 1e15")
     }
 
     fn write(held: &usize) -> String {
@@ -65,6 +68,23 @@ impl Written for Bytes {
             .into_iter()
             .find(|(shift, _)| *held > 0 && held.is_multiple_of(1 << shift));
         unit.map_or(held.to_string(), |(shift, unit)| format!("{}{unit}", held >> shift))
+    }
+}
+
+/// Bytes, or none.
+#[derive(Debug)]
+pub struct BytesOrNone;
+
+impl Written for BytesOrNone {
+    type Held = usize;
+    const PLACE: &'static str = "BYTES";
+
+    fn read(text: &str) -> Result<usize, &'static str> {
+        if text == "0" { Ok(0) } else { Bytes::read(text).map_err(|_| "bytes, as 0, 1000000, 64M or 2G") }
+    }
+
+    fn write(held: &usize) -> String {
+        Bytes::write(held)
     }
 }
 

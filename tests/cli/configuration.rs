@@ -53,6 +53,29 @@ fn options_before_the_environment_before_a_file() {
     }
 }
 
+/// What can be written as a default can be written: a server that runs no programs says so. Variables by which Kubernetes tells every
+/// container of a service called `bimorph-serve` are no settings, but `BIMORPH_SERVE_PORT=1` is a mistake.
+#[test]
+fn defaults_and_variables_of_kubernetes_are_taken() {
+    let bench = Bench::new(&[]);
+    let command = || bench.command("serve --listen 127.0.0.1:0 --limit program_bytes=0");
+    let mut inside = command();
+    for (name, text) in [
+        ("SERVICE_HOST", "10.0.0.11"),
+        ("SERVICE_PORT", "50051"),
+        ("SERVICE_PORT_GRPC", "50051"),
+        ("PORT", "tcp://10.0.0.11:50051"),
+        ("PORT_50051_TCP_ADDR", "10.0.0.11"),
+    ] {
+        inside.env(format!("BIMORPH_SERVE_{name}"), text);
+    }
+    let server = Server::spawn(inside);
+    assert_eq!(told(&format!("http://{}", server.address))["program_bytes"], ("0".to_owned(), "option".to_owned()));
+    let ran = command().env("BIMORPH_SERVE_PORT", "1").output().expect("it runs");
+    let stderr = String::from_utf8_lossy(&ran.stderr);
+    assert!(stderr.contains("BIMORPH_SERVE_PORT: there is no such setting"), "{stderr}");
+}
+
 /// The example's settings are settings.
 #[test]
 fn the_example_is_read() {
@@ -72,6 +95,8 @@ fn mistakes_are_named_by_place() {
         ("misplaced.toml", "sessions = 3\n"),
         ("value.toml", "[limits]\nmemory = \"much\"\n"),
         ("kind.toml", "listen = { a = 1 }\n"),
+        ("empty.toml", "state_dir = \"\"\n"),
+        ("weaker.toml", "[limits]\nsessions = \"many\"\n"),
         ("broken.toml", "listen = [\n"),
     ]);
     for (options, variable, said) in [
@@ -88,11 +113,18 @@ fn mistakes_are_named_by_place() {
             "value.toml: memory: expected bytes above 0, as 1000000, 64M or 2G, got \"much\"",
         ),
         ("--config kind.toml", None, "kind.toml: listen: expected a text"),
+        ("--config empty.toml", None, "empty.toml: state_dir: expected a path, got \"\""),
+        ("--config weaker.toml --max-sessions 3", None, "weaker.toml: sessions: expected a whole number above 0"),
+        ("--max-connections 2305843009213693952", None, "expected a whole number above 0, at most 1e15"),
         ("--config broken.toml", None, "configuration broken.toml: "),
         ("--config nosuch.toml", None, "configuration nosuch.toml: "),
         ("", Some(("BIMORPH_SERVE_SESION", "3")), "BIMORPH_SERVE_SESION: there is no such setting"),
         ("", Some(("BIMORPH_SERVE_INSECURE", "yes")), "BIMORPH_SERVE_INSECURE: expected true or false, got \"yes\""),
-        ("--limit sessions=none", None, "--limit sessions: expected a whole number above 0, got \"none\""),
+        (
+            "--limit sessions=none",
+            None,
+            "--limit sessions: expected a whole number above 0, at most 1e15, got \"none\"",
+        ),
         ("--max-sessions 0", None, "--max-sessions: expected a whole number above 0"),
         ("--listen nowhere", None, "--listen: expected unix:///path, host:port"),
     ] {

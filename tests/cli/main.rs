@@ -7,6 +7,8 @@ mod chart;
 mod configuration;
 mod errors;
 mod export;
+#[cfg(target_os = "linux")]
+mod full;
 mod health;
 mod kept;
 mod layouts;

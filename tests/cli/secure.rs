@@ -152,6 +152,10 @@ fn commands_show_them_too() {
     let ran = command.env("BIMORPH_CA", tls("authority.pem")).env("BIMORPH_TOKEN_FILE", bench.path("alice")).output();
     let ran = ran.expect("it runs");
     assert_eq!(String::from_utf8_lossy(&ran.stdout), stdout, "{}", String::from_utf8_lossy(&ran.stderr));
+    // an empty variable says nothing, and stops nothing that needs no server
+    let here = words.split(" --to ").next().expect("words");
+    let ran = bench.command(here).env("BIMORPH_CA", "").env("BIMORPH_CLIENT_KEY", "").output().expect("it runs");
+    assert_eq!(String::from_utf8_lossy(&ran.stdout), stdout, "{}", String::from_utf8_lossy(&ran.stderr));
     let without = bench.run(&format!("{words} --ca {}", tls("authority.pem").display()));
     assert_eq!(without.status, 1);
     assert!(without.stderr.contains("asks for a token"), "{}", without.stderr);

@@ -61,8 +61,14 @@ impl Stream {
         let accept = proto::Accept { token: reply.token, answer: true };
         match self.ask(Ask::Accept(accept)).await? {
             Reply::Accepted(accepted) => Ok((reply, accepted.kept)),
+            Reply::Fault(fault) => Err(Status::data_loss(fault.message)),
             other => panic!("{other:?}"),
         }
+    }
+
+    /// The same, which may be refused: the words.
+    pub(crate) async fn try_step(&mut self, step: usize, parent: u64) -> Result<proto::TrialReply, String> {
+        self.step(step, parent).await.map(|(reply, _)| reply).map_err(|status| status.message().to_owned())
     }
 }
 
@@ -95,6 +101,16 @@ impl Killed {
         let server = Server::start(&bench, &format!("{options} {more}"));
         let wire = client(&server.address).await;
         Self { bench, options, server, wire }
+    }
+
+    /// What it says on the next line that holds `head`, after it.
+    pub(crate) fn line(&mut self, head: &str) -> String {
+        self.server.line(head)
+    }
+
+    /// Its process.
+    pub(crate) fn id(&self) -> u32 {
+        self.server.id()
     }
 
     /// Kills it.

@@ -25,6 +25,7 @@ fn limits_are_named() {
         transient_values: 100,
         sweep_points: 10,
         sweeps: 0,
+        signals: 5,
         ..Limits::default()
     };
     let server = start("127.0.0.1:0", small);
@@ -51,6 +52,11 @@ fn limits_are_named() {
             proto::SubmitSweepRequest { bundle: wire_bundle(), options: None, spec: Some(spec) }
         };
         exhausted(&client.submit_sweep(sweep(u32::MAX)).await.expect_err("too many"), "sweep_points");
+        let mut wide = sweep(2);
+        let asked = proto::SweepTransient { outputs: vec!["m.x".into(); 6], stop_s: 1e-6, ..Default::default() };
+        let spec = wide.spec.as_mut().expect("a sweep");
+        spec.analysis = Some(proto::sweep_spec::Analysis::Transient(asked));
+        exhausted(&client.submit_sweep(wide).await.expect_err("too many"), "outputs");
         exhausted(&client.submit_sweep(sweep(2)).await.expect_err("too many"), "sweeps");
     });
 }

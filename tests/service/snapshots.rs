@@ -107,6 +107,23 @@ fn other_snapshots_are_refused() {
     });
 }
 
+/// What a session of another server may answer is bounded here as what is opened here.
+#[test]
+fn a_restored_session_is_within_limits() {
+    let (here, there) = (server(Limits::default()), server(Limits { signals: 1, ..Limits::default() }));
+    block_on(async {
+        let (mut a, mut b) = (here.client().await, there.client().await);
+        let model = compiled(&mut a).await;
+        assert_eq!(compiled(&mut b).await, model);
+        let session = open(&mut a, &model).await;
+        let request = proto::SnapshotRequest { session, token: 0 };
+        let snapshot = a.snapshot(request).await.expect("a snapshot").into_inner().snapshot;
+        let refused = b.restore(proto::RestoreRequest { model, snapshot }).await.expect_err("two signals");
+        assert_eq!(refused.code(), Code::ResourceExhausted);
+        assert!(refused.message().starts_with("signals"), "{}", refused.message());
+    });
+}
+
 /// A lease keeps a session for longer than the server does, and for less, as it says; a stranger without the id cannot.
 #[test]
 fn leases_keep_sessions() {
@@ -126,7 +143,9 @@ fn leases_keep_sessions() {
         assert_eq!(keep(&plain, 0.0).await.expect("is kept"), 0.4);
         assert_eq!(keep(&short, 0.001).await.expect("is kept"), 0.001);
         assert_eq!(keep("guess", 1.0).await.expect_err("no such session").code(), Code::NotFound);
-        assert_eq!(keep(&plain, -1.0).await.expect_err("no time").code(), Code::InvalidArgument);
+        for none in [-1.0, f64::NAN] {
+            assert_eq!(keep(&plain, none).await.expect_err("no time").code(), Code::InvalidArgument);
+        }
         tokio::time::sleep(Duration::from_millis(1500)).await;
         assert_eq!(keep(&plain, 0.0).await.expect_err("is forgotten").code(), Code::NotFound);
         assert_eq!(keep(&short, 0.0).await.expect_err("is forgotten").code(), Code::NotFound);

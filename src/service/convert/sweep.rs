@@ -42,6 +42,15 @@ pub fn spec_to_wire(spec: &SweepSpec) -> proto::SweepSpec {
     }
 }
 
+/// Outputs that are asked for at each point.
+pub fn outputs(spec: &proto::SweepSpec) -> usize {
+    match &spec.analysis {
+        Some(Analysis::Static(asked)) => asked.outputs.len(),
+        Some(Analysis::Transient(asked)) => asked.outputs.len(),
+        Some(Analysis::Modes(_) | Analysis::PullIn(_)) | None => 0,
+    }
+}
+
 /// Points of a grid as it came, before any axis is laid out; an axis without values counts as one.
 pub fn grid_points(spec: &proto::SweepSpec) -> usize {
     let values = |axis: &proto::SweepParameter| match &axis.values {
