@@ -21,6 +21,7 @@ pub mod finer;
 mod heard;
 mod run;
 mod scratch;
+mod spice_names;
 
 pub use error::CosimError;
 pub use find::{find_ngspice, find_plugin};

@@ -13,8 +13,6 @@ const FUNCTION: usize = 100;
 /// Files that are longer.
 const LONG_FILES: &[&str] = &[
     "src/layout/cif.rs",
-    "src/layout/extract/layer.rs",
-    "src/layout/extract/model.rs",
     "src/layout/flatten.rs",
     "src/layout/gds.rs",
     "src/layout/lines/of_structure.rs",

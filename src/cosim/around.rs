@@ -4,8 +4,9 @@
 //! ([`Structure::without_circuit`]); the rest of the circuit stands beside it. Ports of the netlist are held at a voltage by a source
 //! each, as they are in every analysis, unless the netlist's circuit touches them and no voltage is given.
 
+use super::spice_names::Names;
 use crate::structure::{CircuitElement, CircuitKind, NodeId, Structure};
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::{BTreeMap, HashSet};
 use std::fmt::Write;
 use thiserror::Error;
 
@@ -68,36 +69,6 @@ pub enum AroundError {
         /// The name.
         file: String,
     },
-}
-
-/// Legal, distinct names of SPICE, with the number that the last of a kind got.
-struct Names {
-    taken: HashMap<String, usize>,
-}
-
-impl Names {
-    fn new() -> Self {
-        // ngspice takes all of these for ground
-        Self { taken: ["0", "gnd"].map(|name| (name.to_owned(), 1)).into() }
-    }
-
-    /// A name for `wanted` that no one else has.
-    fn take(&mut self, wanted: &str) -> String {
-        let plain = wanted.chars().filter(|c| *c != ')');
-        let plain: String =
-            plain.map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '_' }).collect();
-        let mut count = self.taken.get(&plain).copied().unwrap_or(0);
-        let name = loop {
-            count += 1;
-            let name = if count == 1 { plain.clone() } else { format!("{plain}_{count}") };
-            if !self.taken.contains_key(&name) {
-                break name;
-            }
-        };
-        self.taken.insert(plain, count);
-        self.taken.entry(name.clone()).or_insert(1);
-        name
-    }
 }
 
 /// The deck around a netlist's device.
@@ -272,17 +243,6 @@ mod tests {
         let loaded =
             load(&Bundle::from_text("n.net", &format!("{PLATE}{more}")), &[]).unwrap_or_else(|d| panic!("{d}"));
         around(&loaded.structure, &Around { file: "n.net".into(), ..wanted.clone() })
-    }
-
-    /// Names are legal and distinct, also where one is spelled as another's number; a hundred thousand of one name cost no more each
-    /// than the first.
-    #[test]
-    fn names_are_distinct() {
-        let mut names = Names::new();
-        let taken: Vec<String> = ["a(1)", "A(1)", "a_1_2", "a 1", "gnd", "0"].map(|n| names.take(n)).into();
-        assert_eq!(taken, ["a_1", "a_1_2", "a_1_2_2", "a_1_3", "gnd_2", "0_2"]);
-        let many: HashSet<String> = (0..100_000).map(|_| names.take("r_anon9")).collect();
-        assert_eq!(many.len(), 100_000);
     }
 
     /// What a source gives over time stands behind its voltage; a name that is no source is told.

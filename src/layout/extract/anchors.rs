@@ -72,16 +72,3 @@ impl Held {
         self.0.over(a, b)
     }
 }
-
-/// Whether a point lies inside contours, by the even-odd rule.
-pub(super) fn inside(contours: &[Vec<[f64; 2]>], p: [f64; 2]) -> bool {
-    let mut odd = false;
-    for contour in contours {
-        for (a, b) in contour.iter().zip(contour.iter().cycle().skip(1)) {
-            if (a[1] > p[1]) != (b[1] > p[1]) && p[0] < a[0] + (b[0] - a[0]) * (p[1] - a[1]) / (b[1] - a[1]) {
-                odd = !odd;
-            }
-        }
-    }
-    odd
-}

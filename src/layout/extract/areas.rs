@@ -3,7 +3,6 @@
 //! A question meets the edges near it alone, whatever the areas have elsewhere: inside and outside are told along a ray to the right, by
 //! the even-odd rule (M. Shimrat, Algorithm 112, CACM 5, 1962), on edges that are sorted by place.
 
-use super::anchors::inside;
 use super::boxes::{self, Boxes, Extent};
 use crate::layout::drawing::Polygon;
 
@@ -117,6 +116,35 @@ impl Areas {
         }
         covered
     }
+}
+
+/// Whether a point lies inside contours, by the even-odd rule.
+pub(super) fn inside(contours: &[Vec<[f64; 2]>], p: [f64; 2]) -> bool {
+    let mut odd = false;
+    for contour in contours {
+        for (a, b) in contour.iter().zip(contour.iter().cycle().skip(1)) {
+            if (a[1] > p[1]) != (b[1] > p[1]) && p[0] < a[0] + (b[0] - a[0]) * (p[1] - a[1]) / (b[1] - a[1]) {
+                odd = !odd;
+            }
+        }
+    }
+    odd
+}
+
+/// How far a point lies outside a convex or nearly convex outline; 0 inside.
+pub(super) fn distance(outline: &[[f64; 2]], p: [f64; 2]) -> f64 {
+    if inside(&[outline.to_vec()], p) {
+        return 0.0;
+    }
+    let edges = outline.iter().zip(outline.iter().cycle().skip(1));
+    edges
+        .map(|(a, b)| {
+            let d = [b[0] - a[0], b[1] - a[1]];
+            let l2 = (d[0] * d[0] + d[1] * d[1]).max(f64::MIN_POSITIVE);
+            let t = (((p[0] - a[0]) * d[0] + (p[1] - a[1]) * d[1]) / l2).clamp(0.0, 1.0);
+            (p[0] - a[0] - t * d[0]).hypot(p[1] - a[1] - t * d[1])
+        })
+        .fold(f64::INFINITY, f64::min)
 }
 
 #[cfg(test)]

@@ -30,8 +30,11 @@ mod nets;
 mod pads;
 mod repeats;
 mod rows;
+mod sink;
 mod skeleton;
 mod snap;
+mod strips;
+mod taps;
 
 pub use found::{Arc, Beam, Body, Comb, Extraction, Facing, LayerResult, Net, Node, Pad, Plates, Unrecognised};
 pub use netlist::{Written, netlist, written};

@@ -1,18 +1,12 @@
 //! From limbs and joints to nodes, beams, rigid bodies and anchors.
 
 use super::anchors::Rule;
-use super::boxes::Boxes;
 use super::joints::{self, Joint, Kind, Parts};
 use super::medial::Medial;
 use super::moments::Moments;
 use super::pads::Pad;
+use super::taps::{Cells, Owner, Tap};
 
-/// A free end beyond an anchor shorter than this many widths is part of the anchor [1].
-const STUMP: f64 = 1.5;
-/// Nodes nearer to each other than this many widths are one [1].
-const ON_AXIS: f64 = 0.01;
-/// A place on the edge of a part may lie this far outside [database units].
-const BESIDE: f64 = 4.0;
 /// A pad is at least this much wider than its limb [1].
 const PAD: f64 = 1.5;
 
@@ -122,82 +116,30 @@ impl Model {
     }
 }
 
-/// Where something pulls.
-#[derive(Debug, Clone, Copy)]
-struct Tap {
-    /// In coordinates of the part.
-    at: [f64; 2],
-    owner: Owner,
-    /// On the centreline, not at the end of an arm.
-    on_axis: bool,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Owner {
-    Limb(usize),
-    Joint(usize),
-}
-
-/// The areas of limbs and joints, found by place.
-#[derive(Debug, Default)]
-struct Cells {
-    boxes: Boxes,
-    edges: Vec<(u32, Owner)>,
-}
-
-impl Cells {
-    fn of(axis: &Medial, parts: &Parts) -> Self {
-        let joints = parts
-            .joints
-            .iter()
-            .enumerate()
-            .flat_map(|(j, joint)| joint.edges.iter().map(move |e| (*e, Owner::Joint(j))));
-        let limbs =
-            parts.limbs.iter().enumerate().flat_map(|(k, limb)| limb.edges.iter().map(move |e| (*e, Owner::Limb(k))));
-        let edges: Vec<_> = joints.chain(limbs).collect();
-        let outline = |e: u32| axis.outline(axis.edges[e as usize].ends, axis.edges[e as usize].sites);
-        let extents: Vec<_> = edges.iter().map(|(e, _)| super::boxes::around(outline(*e))).collect();
-        Self { boxes: Boxes::of(&extents), edges }
-    }
-
-    /// Whose area is nearest to a place on the part or at its edge.
-    fn nearest(&self, axis: &Medial, at: [f64; 2]) -> Owner {
-        let near = self.boxes.overlapping(&[at.map(|x| x - BESIDE), at.map(|x| x + BESIDE)]);
-        let all = 0..self.edges.len() as u32;
-        let near: Vec<u32> = if near.is_empty() { all.collect() } else { near };
-        let away = |k: &u32| {
-            let edge = &axis.edges[self.edges[*k as usize].0 as usize];
-            distance(&axis.outline(edge.ends, edge.sites), at)
-        };
-        let found = near.iter().min_by(|a, b| away(a).total_cmp(&away(b)).then(a.cmp(b)));
-        found.map_or(Owner::Joint(0), |k| self.edges[*k as usize].1)
-    }
-}
-
 pub(super) struct Builder<'a> {
     pub(super) model: Model,
     pub(super) axis: &'a Medial,
     /// Lower left corner of the part's box.
     pub(super) origin: [f64; 2],
     pub(super) parts: &'a Parts,
-    rule: &'a Rule,
+    pub(super) rule: &'a Rule,
     /// For each node, whether it is held.
     pub(super) anchored: Vec<bool>,
     /// For each joint, the node that stands for it.
-    bodies: Vec<Option<usize>>,
+    pub(super) bodies: Vec<Option<usize>>,
     /// For each joint, the pad that it is part of.
     pub(super) pad_of: Vec<Option<usize>>,
     /// Joints and pads that adjoin them.
     pub(super) adjoining: Vec<(usize, usize)>,
-    taps: Vec<Tap>,
-    cells: Cells,
+    pub(super) taps: Vec<Tap>,
+    pub(super) cells: Cells,
     /// Area of the holes in each limb, and holes in each joint.
-    limb_holes: Vec<f64>,
-    joint_holes: Vec<Moments>,
+    pub(super) limb_holes: Vec<f64>,
+    pub(super) joint_holes: Vec<Moments>,
 }
 
 impl Builder<'_> {
-    fn node(&mut self, local: [f64; 2], reach: f64, held: bool) -> usize {
+    pub(super) fn node(&mut self, local: [f64; 2], reach: f64, held: bool) -> usize {
         let origin = self.origin;
         self.model.nodes.push([local[0] + origin[0], local[1] + origin[1]]);
         self.model.reach.push(reach);
@@ -208,32 +150,6 @@ impl Builder<'_> {
     fn holds(&self, local: [f64; 2]) -> bool {
         let origin = self.origin;
         matches!(self.rule, Rule::Drawn(held) if held.holds([local[0] + origin[0], local[1] + origin[1]]))
-    }
-
-    /// What is nearest to a place.
-    fn tap(&self, place: [f64; 2], on_axis: bool) -> Tap {
-        let at = [place[0] - self.origin[0], place[1] - self.origin[1]];
-        let mut owner = self.cells.nearest(self.axis, at);
-        // the end of a limb is part of it
-        if let Owner::Joint(j) = owner
-            && let ([port], Kind::Node(_)) = (self.parts.joints[j].ports.as_slice(), &self.parts.joints[j].kind)
-        {
-            owner = Owner::Limb(port.limb);
-        }
-        Tap { at, owner, on_axis }
-    }
-
-    fn tap_joint(&mut self, k: usize, j: usize) {
-        let Some(body) = self.bodies[j] else { return };
-        let held = self.anchored[body];
-        let node = self.node(self.taps[k].at, 0.0, held);
-        if !held {
-            self.model.links.push([body, node]);
-        }
-        self.model.taps[k] = node;
-        if held && let Some(pad) = self.model.pads.iter_mut().find(|pad| pad.nodes.contains(&body)) {
-            pad.nodes.push(node);
-        }
     }
 
     /// Makes the nodes of a joint and returns those of its ports.
@@ -337,132 +253,4 @@ impl Builder<'_> {
             },
         }
     }
-
-    /// A rigid arm from a node to where something pulls.
-    fn tap_node(&mut self, k: usize, node: usize) {
-        if self.taps[k].on_axis {
-            self.model.taps[k] = node;
-            return;
-        }
-        let tap = self.node(self.taps[k].at, 0.0, self.anchored[node]);
-        if !self.anchored[node] {
-            self.model.links.push([node, tap]);
-        }
-        self.model.taps[k] = tap;
-    }
-
-    /// A limb between two nodes, less what lies over anchors.
-    fn limb(&mut self, k: usize, a: usize, b: usize) {
-        let limb = &self.parts.limbs[k];
-        let [p, q] = [a, b].map(|n| self.model.nodes[n]);
-        let long = (q[0] - p[0]).hypot(q[1] - p[1]);
-        let loose = |end: usize| {
-            let joint = &self.parts.joints[self.parts.at[k][end]];
-            joint.ports.len() == 1 && matches!(joint.kind, Kind::Node(_))
-        };
-        let covered = match self.rule {
-            Rule::Drawn(held) => held.over(p, q),
-            Rule::Wide(reach) if limb.width[0].min(limb.width[1]) >= 2.0 * reach => vec![[0.0, 1.0]],
-            Rule::Pads if self.parts.limbs.len() == 1 && loose(0) && loose(1) => vec![[0.0, 1.0]],
-            _ => Vec::new(),
-        };
-        let mut held = self.held(&covered, a, b);
-        let mut free = Vec::new();
-        let mut from = 0.0;
-        for [t0, t1] in covered.into_iter().chain([[1.0, 1.0]]) {
-            if (t0 - from) * long > 1e-6 * long {
-                free.push([from, t0]);
-            }
-            from = t1;
-        }
-        let at = |t: f64| [p[0] + t * (q[0] - p[0]), p[1] + t * (q[1] - p[1])];
-        let width = |t: f64| limb.width[0] + t * (limb.width[1] - limb.width[0]);
-        let widest = limb.width[0].max(limb.width[1]);
-        let (mut kept, mut free_ends) = (0.0, [false; 2]);
-        // a free end is a joint of its own, and part of the beam
-        let tips = (0..2).filter(|end| loose(*end)).map(|end| self.parts.at[k][end]);
-        let (solid, missing) = tips.fold((limb.cell.area, self.limb_holes[k]), |(solid, missing), tip| {
-            (solid + self.parts.joints[tip].cell.area, missing + self.joint_holes[tip].area)
-        });
-        let porosity = missing / solid;
-        let (loose_start, loose_end) = (loose(0), loose(1));
-        let cut = !(free.len() == 1 && free[0] == [0.0, 1.0]);
-        let origin = self.origin;
-        let local = |t: f64| [at(t)[0] - origin[0], at(t)[1] - origin[1]];
-        let mut taps: Vec<(f64, usize)> = Vec::new();
-        for (tap, Tap { at, .. }) in self.taps.iter().enumerate().filter(|(_, tap)| tap.owner == Owner::Limb(k)) {
-            let d = [(q[0] - p[0]) / long, (q[1] - p[1]) / long];
-            let along = (at[0] + origin[0] - p[0]) * d[0] + (at[1] + origin[1] - p[1]) * d[1];
-            taps.push(((along / long).clamp(0.0, 1.0), tap));
-        }
-        taps.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        for [t0, t1] in free {
-            let stump =
-                cut && (t0 == 0.0 && loose_start || t1 == 1.0 && loose_end) && (t1 - t0) * long < STUMP * widest;
-            if stump {
-                continue;
-            }
-            kept += t1 - t0;
-            free_ends = [free_ends[0] || t0 == 0.0, free_ends[1] || t1 == 1.0];
-            let start = if t0 == 0.0 { a } else { self.node(local(t0), widest, true) };
-            let end = if t1 == 1.0 { b } else { self.node(local(t1), widest, true) };
-            for (stretch, nodes) in &mut held {
-                nodes.extend((stretch[1] == t0).then_some(start));
-                nodes.extend((stretch[0] == t1).then_some(end));
-            }
-            // nodes along it: (share, node)
-            let mut along = vec![(t0, start)];
-            for (t, tap) in taps.iter().filter(|(t, _)| *t >= t0 && *t <= t1) {
-                let last = along[along.len() - 1];
-                let node = if (t - last.0) * long < ON_AXIS * widest {
-                    last.1
-                } else if (t1 - t) * long < ON_AXIS * widest {
-                    end
-                } else {
-                    let node = self.node(local(*t), widest, false);
-                    along.push((*t, node));
-                    node
-                };
-                self.tap_node(*tap, node);
-            }
-            along.push((t1, end));
-            for pair in along.windows(2) {
-                let width = [width(pair[0].0), width(pair[1].0)];
-                self.model.beams.push(Beam { a: pair[0].1, b: pair[1].1, width, porosity });
-            }
-        }
-        for (t, tap) in taps {
-            if self.model.taps[tap] == usize::MAX {
-                let node = self.node(self.taps[tap].at, 0.0, true);
-                self.model.taps[tap] = node;
-                let over = held.iter_mut().find(|(stretch, _)| stretch[0] <= t && t <= stretch[1]);
-                over.into_iter().for_each(|(_, nodes)| nodes.push(node));
-            }
-        }
-        self.stretches(k, [p, q], held);
-        let area = limb.cell.area - self.limb_holes[k];
-        self.model.area += area;
-        self.model.held += (1.0 - kept) * area;
-        // a free end of what is held is held
-        for end in (0..2).filter(|end| loose(*end) && !free_ends[*end]) {
-            let tip = self.parts.at[k][end];
-            self.model.held += self.parts.joints[tip].cell.area - self.joint_holes[tip].area;
-        }
-    }
-}
-
-/// How far a point lies outside a convex or nearly convex outline; 0 inside.
-pub(super) fn distance(outline: &[[f64; 2]], p: [f64; 2]) -> f64 {
-    if super::anchors::inside(&[outline.to_vec()], p) {
-        return 0.0;
-    }
-    let edges = outline.iter().zip(outline.iter().cycle().skip(1));
-    edges
-        .map(|(a, b)| {
-            let d = [b[0] - a[0], b[1] - a[1]];
-            let l2 = (d[0] * d[0] + d[1] * d[1]).max(f64::MIN_POSITIVE);
-            let t = (((p[0] - a[0]) * d[0] + (p[1] - a[1]) * d[1]) / l2).clamp(0.0, 1.0);
-            (p[0] - a[0] - t * d[0]).hypot(p[1] - a[1] - t * d[1])
-        })
-        .fold(f64::INFINITY, f64::min)
 }

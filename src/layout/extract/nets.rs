@@ -127,7 +127,7 @@ impl<'a> Under<'a> {
     fn label(&self, result: &Extraction, label: &Label) -> Option<Conductor> {
         let at = label.at.map(f64::from);
         let near = self.tree.overlapping(&[at, at]).into_iter().map(|k| &self.pads[k as usize]);
-        let pads = near.filter(|(_, outline)| super::model::distance(outline, at) <= 1.0).map(|(pad, _)| *pad);
+        let pads = near.filter(|(_, outline)| areas::distance(outline, at) <= 1.0).map(|(pad, _)| *pad);
         let pads: Vec<usize> = pads.collect();
         for (moving, parts) in self.moving.iter().filter(|(m, _)| process::names(&m.layer.drawn, &label.layer)) {
             let own = |pad: &&usize| result.layers[result.pads[**pad].layer].name == moving.layer.name;
