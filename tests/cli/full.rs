@@ -1,5 +1,6 @@
 //! Disks that are full: what was accepted stays, what cannot be kept is told, and bytes are counted as files have them.
 
+use crate::bench::{Bench, CANTILEVER};
 use crate::overseen::{block_on, get, value};
 use crate::stepping::Killed;
 use bimorph::service::proto;
@@ -55,4 +56,37 @@ fn a_disk_that_is_full() {
 fn limit_files(id: u32, most: &str) {
     let set = Command::new("prlimit").args(["--pid", &id.to_string(), &format!("--fsize={most}:")]).status();
     assert!(set.expect("prlimit is there").success());
+}
+
+/// A sweep whose disk is full ends with an error and no table; what was done is in its journal, and with --resume, when there is room,
+/// the table has the bytes of one run.
+#[test]
+fn a_sweep_on_a_disk_that_is_full() {
+    let bench = Bench::new(&[("c.net", CANTILEVER)]);
+    let words = "sweep c.net --segments 1 --param F=1u:2u:400 --signals b.y --threads 2";
+    let whole = bench.run(words);
+    assert_eq!(whole.status, 0, "{}", whole.stderr);
+    let limited = |most: usize| {
+        let inner = bench.command(&format!("{words} --out w.csv --resume"));
+        let mut outer = Command::new("prlimit");
+        // as on a full disk, a write is refused; without the trap the system would end the program
+        outer.arg(format!("--fsize={most}")).args(["sh", "-c", "trap '' XFSZ; exec \"$0\" \"$@\""]);
+        outer.arg(inner.get_program()).args(inner.get_args()).current_dir(bench.path(""));
+        let ran = outer.output().expect("it runs");
+        (ran.status.code(), String::from_utf8_lossy(&ran.stderr).into_owned())
+    };
+    let mut before = 0;
+    for most in [4000, 8000] {
+        let (status, stderr) = limited(most);
+        assert_eq!(status, Some(1), "{stderr}");
+        assert!(stderr.contains("w.csv.journal"), "{stderr}");
+        assert!(!bench.path("w.csv").exists());
+        let kept = std::fs::metadata(bench.path("w.csv.journal")).expect("a journal").len();
+        assert!(kept > before, "{kept} bytes, {before} before");
+        before = kept;
+    }
+    let ended = bench.run(&format!("{words} --out w.csv --resume"));
+    assert_eq!(ended.status, 0, "{}", ended.stderr);
+    assert_eq!(std::fs::read_to_string(bench.path("w.csv")).expect("the table"), whole.stdout);
+    assert_eq!(bench.files(), ["c.net", "w.csv"]);
 }

@@ -11,6 +11,7 @@ mod export;
 mod full;
 mod health;
 mod kept;
+mod killed_clients;
 mod layouts;
 mod outputs;
 mod overseen;

@@ -209,10 +209,26 @@ fn the_doctor_looks_at_settings() {
     assert!(good.stdout.contains("more days; 2 tokens"), "{}", good.stdout);
     assert!(good.stdout.contains("ok       states   0 sessions"), "{}", good.stdout);
     assert!(!bench.path("states").exists(), "looking makes nothing");
+    assert!(good.stdout.contains("others can read tokens: chmod 600"), "{}", good.stdout);
     let expired = settings("expired", "tokens/states");
     assert_eq!(expired.status, 1);
     for said in ["missing  access   certificate ", "it has expired", "missing  states   state folder "] {
         assert!(expired.stdout.contains(said), "{}", expired.stdout);
+    }
+}
+
+/// A token file that others can read is told when a server starts, and one that they cannot is not.
+#[test]
+fn a_token_file_that_others_can_read() {
+    use std::fs::{Permissions, set_permissions};
+    use std::os::unix::fs::PermissionsExt;
+    let bench = bench();
+    for (mode, told) in [(0o644, true), (0o600, false)] {
+        set_permissions(bench.path("tokens"), Permissions::from_mode(mode)).expect("set");
+        // it ends by itself, at an address that metrics cannot have
+        let ran = bench.run("serve --listen 127.0.0.1:0 --token-file tokens --metrics unix:///tmp/nosuch");
+        assert_eq!(ran.status, 1);
+        assert_eq!(ran.stderr.contains("others can read this file: chmod 600"), told, "{mode:o}: {}", ran.stderr);
     }
 }
 

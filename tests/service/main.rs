@@ -13,6 +13,7 @@ mod random;
 mod refusals;
 mod running;
 mod same_bits;
+mod slow_readers;
 mod snapshots;
 mod soak;
 mod victim;

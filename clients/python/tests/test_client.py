@@ -6,6 +6,7 @@ import math
 import multiprocessing
 import os
 import pickle
+import warnings
 from pathlib import Path
 
 import pytest
@@ -279,3 +280,21 @@ def test_samples(client: bimorph.Client) -> None:
     with pytest.raises(bimorph.InvalidRequest, match="deviation"):
         wrong = bimorph.Samples({"k": bimorph.Normal(1.0, -1.0)}, count=4)
         client.sweep(netlist, {}, bimorph.Modes(count=1), samples=wrong)
+
+
+def test_a_server_of_another_version_is_told_once(program: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Once a process, by the first call of any kind; a server of the same version is not told."""
+    with bimorph.serve(program) as server:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            with server.client() as client:
+                client.compile(bimorph.Netlist.text(PLATE))
+        monkeypatch.setattr("bimorph.channel.OWN", "0.0.1")
+        with pytest.warns(UserWarning) as told:
+            for _ in range(2):
+                with server.client() as client:
+                    client.compile(bimorph.Netlist.text(PLATE))
+                    version = client.version()
+        assert [str(warning.message) for warning in told] == [
+            f"server {server.address} is of version {version}, this client of 0.0.1: numbers and options may differ"
+        ]

@@ -7,8 +7,11 @@ them come: a server has a bounded number of connections.
 
 from __future__ import annotations
 
+import contextlib
+import importlib.metadata
 import os
 import threading
+import warnings
 import weakref
 from collections.abc import Callable, Iterator
 from typing import Any, TypeVar
@@ -16,8 +19,8 @@ from typing import Any, TypeVar
 import grpc
 
 from .access import Access, is_secure, target
-from .errors import from_rpc
-from .v1 import service_pb2_grpc
+from .errors import BimorphError, from_rpc
+from .v1 import model_pb2, service_pb2_grpc
 
 T = TypeVar("T")
 
@@ -45,6 +48,8 @@ class _Connection:
         else:
             self._channel = grpc.insecure_channel(target(address), options=_PLAIN)
         self.stub: Any = service_pb2_grpc.BimorphStub(self._channel)
+        self.compared = False
+        """Whether the server's version was looked at."""
 
     def __del__(self) -> None:
         # A channel of another process is left alone: closing it here could hang.
@@ -77,6 +82,13 @@ def _connect(address: str, access: Access) -> _Connection:
         return connection
 
 
+OWN = importlib.metadata.version("bimorph")
+"""The version of this package."""
+
+_told: set[tuple[str, str]] = set()
+"""Servers and their versions that this process was warned of."""
+
+
 class Channel:
     """The way to one server, connected when first used."""
 
@@ -103,7 +115,23 @@ class Channel:
     def call(self, method: str, request: Any) -> Any:
         """A unary call within the timeout."""
         stub = self.stub
-        return self.guard(lambda: getattr(stub, method)(request, timeout=self.timeout, metadata=self.metadata))
+        answer = self.guard(lambda: getattr(stub, method)(request, timeout=self.timeout, metadata=self.metadata))
+        connection = self._connection
+        if connection is not None and not connection.compared:
+            connection.compared = True
+            self._compare(answer if method == "Info" else None)
+        return answer
+
+    def _compare(self, info: Any) -> None:
+        """Warns once of a server of another version: its numbers may differ, and its states cannot be gone on from."""
+        if info is None:
+            with contextlib.suppress(BimorphError):
+                info = self.call("Info", model_pb2.InfoRequest())
+        if info is None or info.version == OWN or (self.address, info.version) in _told:
+            return
+        _told.add((self.address, info.version))
+        text = f"server {self.address} is of version {info.version}, this client of {OWN}: numbers and options may differ"
+        warnings.warn(text, stacklevel=4)
 
     def stream(self, method: str, request: Any) -> Iterator[Any]:
         """A call with many answers; left early, it is cancelled."""
