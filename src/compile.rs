@@ -1,6 +1,6 @@
 //! From netlist text to a ready model: netlist → structure → discretize.
 
-use crate::discretize::{DiscretizeError, Discretized, discretize_with, order};
+use crate::discretize::{DiscretizeError, Discretized, discretize_with, order, yielded};
 use crate::equations::Joints;
 use crate::multibody::relative::Unfit;
 use crate::netlist::{Bundle, Diagnostics, Setting, Source};
@@ -152,6 +152,10 @@ fn laid_out(
     segments: &[usize],
 ) -> Result<Discretized, DiscretizeError> {
     let mut parts = discretize_with(structure, options, segments)?;
+    for (arm, strain) in yielded::arms(&parts, &structure.yields).iter().zip(structure.yields.iter().map(|y| y.strain))
+    {
+        yielded::strain(&mut parts, arm, strain);
+    }
     if let Some(share) = options.imperfection {
         imperfection::apply(&mut parts, share * structure.extent());
     }

@@ -1,7 +1,9 @@
 //! What a mechanism is after it was heated too far once: its hot arms shortened, see [`crate::gaps::backbending`].
-use super::statics::operating_point;
-use super::{AnalysisError, PortVoltages};
+use super::mesh::backbent_fitted;
+use super::statics::{StaticResult, operating_point, static_fitted};
+use super::{AnalysisError, BeamMotions, PortVoltages};
 use crate::compile::Compiled;
+use crate::discretize::yielded;
 use crate::gaps::backbending::Strength;
 use crate::multibody::BlockMatrix;
 use crate::multibody::forces::{RestStrain, add_offset_change, axial_change, axial_force};
@@ -23,16 +25,19 @@ pub struct Backbent {
     pub compiled: Compiled,
     /// Permanent strain of each beam that can yield [1], by name; negative: shorter.
     pub strains: Vec<(String, f64)>,
+    /// Yield stress over Young's modulus of each [1]: what their strains are small against.
+    pub bearable: Vec<f64>,
 }
 
 /// A beam that can yield.
 struct Arm {
+    /// Index in the structure's yields.
+    index: usize,
     beam: usize,
     heater: usize,
     strength: Strength,
     area: f64,
-    /// Its joints in the model, with the length each stands for [m] and its rest offset as built [m].
-    joints: Vec<(usize, f64, f64)>,
+    joints: yielded::Arm,
     /// Shortening so far [1].
     strain: f64,
 }
@@ -58,30 +63,48 @@ pub fn backbend(compiled: &Compiled, voltages: &PortVoltages) -> Result<Backbent
         let now: Vec<(String, f64)> = voltages.iter().map(|(name, v)| (name.clone(), share * v)).collect();
         settle(&mut bent, &mut arms, &now)?;
     }
-    let strains = arms.iter().map(|a| (compiled.structure.beams[a.beam].name.clone(), -a.strain)).collect();
-    Ok(Backbent { compiled: bent, strains })
+    let beams = &compiled.structure.beams;
+    let strains = arms.iter().map(|a| (beams[a.beam].name.clone(), -a.strain)).collect();
+    let bearable = arms.iter().map(|a| a.strength.cold / beams[a.beam].material.youngs_modulus).collect();
+    Ok(Backbent { compiled: bent, strains, bearable })
+}
+
+/// Where a mechanism rests at `voltages` after its ports were raised to `raised` once: the model, the equilibrium, the displacement of
+/// points along every beam, and permanent strains by name.
+///
+/// The mesh holds the tolerance for the strains and for the equilibrium; the estimate is the sum of both errors.
+///
+/// # Errors
+/// See [`backbend`].
+pub fn static_backbent(
+    compiled: &Compiled,
+    raised: &PortVoltages,
+    voltages: &PortVoltages,
+) -> Result<(Compiled, StaticResult, BeamMotions, Vec<(String, f64)>), AnalysisError> {
+    let bent = backbent_fitted(compiled, raised)?;
+    let of_strains = bent.compiled.order.estimated_error;
+    let (mut fitted, mut result, curves) = static_fitted(&bent.compiled, voltages)?;
+    let both = fitted.order.estimated_error.zip(of_strains).map(|(a, b)| a + b);
+    (fitted.order.estimated_error, result.estimated_error) = (both, both);
+    Ok((fitted, result, curves, bent.strains))
 }
 
 fn arms(compiled: &Compiled) -> Vec<Arm> {
-    let model = &compiled.parts.system.model;
-    let of = |heater: usize| {
-        let mine = model.joints.iter().enumerate().filter_map(move |(k, j)| {
-            model.section(j).expansion.filter(|(group, _)| *group == heater).map(|(_, length)| (k, length, j.rest))
-        });
-        mine.collect::<Vec<_>>()
-    };
-    (compiled.structure.yields.iter())
-        .filter_map(|y| {
+    let yields = &compiled.structure.yields;
+    let joints = yielded::arms(&compiled.parts, yields);
+    (yields.iter().zip(joints).enumerate())
+        .filter_map(|(index, (y, joints))| {
             let heater = compiled.parts.heaters.iter().position(|&beam| beam == y.beam)?;
             let beam = &compiled.structure.beams[y.beam];
             let ambient = beam.material.ambient_temperature;
             Some(Arm {
+                index,
                 beam: y.beam,
                 heater,
                 strength: Strength { cold: y.stress, ambient, softening: y.softening },
                 area: beam.width * beam.thickness,
-                joints: of(heater),
-                strain: 0.0,
+                joints,
+                strain: -y.strain,
             })
         })
         .filter(|arm| !arm.joints.is_empty())
@@ -124,7 +147,7 @@ fn pressures(
     system.electrics.apply(&point.sources, &point.rise, &mut drive);
     let rest = RestStrain { expansion: &drive.expansion, built_in: 1.0 };
     let mean = |arm: &Arm, force: &dyn Fn(usize) -> f64| {
-        arm.joints.iter().map(|(k, _, _)| force(*k)).sum::<f64>() / (arm.joints.len() as f64 * arm.area)
+        arm.joints.iter().map(|(k, _)| force(*k)).sum::<f64>() / (arm.joints.len() as f64 * arm.area)
     };
     let excess = (arms.iter())
         .map(|arm| {
@@ -140,7 +163,7 @@ fn pressures(
     let mut relief = DMatrix::zeros(arms.len(), arms.len());
     for (column, cause) in arms.iter().enumerate() {
         moved.fill(Pose::zeros());
-        for &(k, length, _) in &cause.joints {
+        for &(k, length) in &cause.joints {
             // a rest offset that falls by `length`, as a load
             add_offset_change(model, &model.joints[k], &point.q, length, &mut moved);
         }
@@ -163,8 +186,7 @@ fn pressures(
 
 fn apply(bent: &mut Compiled, arms: &[Arm]) {
     for arm in arms {
-        for &(k, length, built) in &arm.joints {
-            bent.parts.system.model.joints[k].rest = built - length * arm.strain;
-        }
+        let before = std::mem::replace(&mut bent.structure.yields[arm.index].strain, -arm.strain);
+        yielded::strain(&mut bent.parts, &arm.joints, -arm.strain - before);
     }
 }

@@ -1,12 +1,13 @@
 //! Equilibrium paths: how a mechanism's equilibria go on while one load, voltage, temperature or stress grows, past folds
 //! and through bifurcations.
 use super::contact_range::within_contact_range;
+use super::gap_pieces;
 use super::signal::{Signal, View};
 use super::statics::{beam_motions, node_motions, operating_point, source_vector};
 use super::{AnalysisError, BeamMotions, NodeMotions, Watch};
 use crate::compile::Compiled;
 use crate::multibody::planar::Pose;
-use crate::solve::continuation::{Branch, Continuation, ContinuationOptions, Event, PathEnd};
+use crate::solve::continuation::{Branch, Continuation, ContinuationOptions, Event, PathEnd, Traced};
 use crate::solve::family::Blend;
 use serde::Serialize;
 
@@ -73,6 +74,23 @@ pub struct ContinuationResult {
     pub unknowns: usize,
     /// Newton iterations.
     pub iterations: usize,
+    /// The gap along beams that leaves out most for want of pieces, and the largest share of its distance on the way.
+    #[serde(skip)]
+    pub in_pieces: Option<(String, f64)>,
+    /// What is to be known of the path.
+    pub warnings: Vec<String>,
+}
+
+/// The path of equilibria on the mesh for it, with the model on that mesh.
+///
+/// # Errors
+/// See [`AnalysisError`].
+pub fn trace_fitted(
+    compiled: &Compiled,
+    request: &ContinuationRequest<'_>,
+    watch: Watch<'_>,
+) -> Result<(Compiled, ContinuationResult), AnalysisError> {
+    super::mesh::path_fitted(compiled, request, watch)
 }
 
 /// Traces the path of equilibria from the one at `from`.
@@ -125,6 +143,7 @@ pub fn trace(
     for point in &traced.points {
         within_contact_range(compiled, &point.q)?;
     }
+    let mut in_pieces: Option<(String, f64)> = None;
     let value = |s: f64| if s == 1.0 { request.to } else { request.from + s * (request.to - request.from) };
     let mut columns: Vec<Vec<f64>> = vec![Vec::with_capacity(traced.points.len()); signals.len()];
     let zeros = vec![Pose::zeros(); system.bodies()];
@@ -137,6 +156,11 @@ pub fn trace(
         let view = View { q: &point.q, v: &zeros, rise: &rise, volts: &drive.volts };
         for (column, signal) in columns.iter_mut().zip(&signals) {
             column.push(signal.value(compiled, &view));
+        }
+        if let Some((name, share)) = gap_pieces::left_out(compiled, &point.q, &drive.volts)
+            && in_pieces.as_ref().is_none_or(|(_, most)| share > *most)
+        {
+            in_pieces = Some((name.to_owned(), share));
         }
     }
     let critical = |kind: Event| -> Vec<CriticalPoint> {
@@ -163,5 +187,19 @@ pub fn trace(
         last_curves: traced.points.last().map(|p| beam_motions(compiled, &p.q)).unwrap_or_default(),
         unknowns: system.model.unknowns(),
         iterations: traced.iterations,
+        in_pieces,
+        warnings: told(&traced, value),
     })
+}
+
+/// What is to be known of a path whose points have these values.
+fn told(traced: &Traced, value: impl Fn(f64) -> f64) -> Vec<String> {
+    let at = |point: &usize| value(traced.points[*point].s);
+    let rough = traced.rough.iter().map(|point| {
+        format!("the path was lost next to the fold or bifurcation at {:.4e}, which is not located closely", at(point))
+    });
+    let stayed = traced.stayed.iter().map(|point| {
+        format!("no branch was found at the bifurcation at {:.4e}: the path goes straight on, unstable", at(point))
+    });
+    rough.chain(stayed).collect()
 }

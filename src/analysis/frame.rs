@@ -1,7 +1,8 @@
 //! Statics, modes and motion of a linear frame of cubic beam elements: the baseline that stands for SUGAR.
 //!
 //! Same drawing, same materials, same heat; small displacements and constant matrices. Results have the form of those of the
-//! product's own analyses. Electrostatic forces are not part of it: voltages across gaps are refused, contact is left out.
+//! product's own analyses. Gaps act with their nonlinear forces on the linear frame, as SUGAR's do, in statics and in modes about that
+//! equilibrium; a motion in time refuses voltages across them, and stops are left out.
 
 use super::modes::{ModesResult, normalized};
 use super::signal::node_signal;
@@ -10,9 +11,11 @@ use super::transient::options::{TransientOptions, check};
 use super::transient::result::{Counters, TransientResult};
 use super::{AnalysisError, BeamMotions, NodeMotions, PortVoltages, Watch};
 use crate::compile::Compiled;
-use crate::discretize::frame::{Elements, Frame, FrameOptions, assemble};
-use crate::gaps::{Point, Ramp};
+use crate::discretize::frame::{Elements, Frame, FrameGaps, FrameOptions, assemble};
+use crate::gaps::{Drive, Gap, Point, Ramp};
+use crate::multibody::BlockMatrix;
 use crate::multibody::factor::ZeroPivot;
+use crate::multibody::linear_system::LinearSystem;
 use crate::multibody::planar::Pose;
 use crate::solve::SolveError;
 use crate::solve::baseline::frame_modes::lowest_consistent_modes;
@@ -22,6 +25,10 @@ use crate::solve::linear::LinearSolver;
 
 /// Steps between two output times are doubled until the motion settles, up to this many.
 const MOST_STEPS: usize = 1 << 14;
+/// Newton iterations of an equilibrium, at most.
+const MOST_ITERATIONS: usize = 100;
+/// A change below this share of the displacements is rounding.
+const SETTLED: f64 = 1e-12;
 
 /// The frame of a compiled netlist: one element for each beam, as SUGAR has it, or by the band when one was given.
 ///
@@ -31,7 +38,8 @@ pub fn frame(compiled: &Compiled) -> Result<Frame, AnalysisError> {
     let options = &compiled.options;
     let elements = options.band.map_or(Elements::Each(1), |band| Elements::Band(band, options.tol));
     let elements = options.segments.map_or(elements, Elements::Each);
-    frame_with(compiled, &FrameOptions { elements, shear: options.shear, undamped: options.undamped })
+    let gaps = FrameGaps::Laid { chord: options.as_sugar };
+    frame_with(compiled, &FrameOptions { elements, shear: options.shear, undamped: options.undamped, gaps })
 }
 
 /// The frame with a given choice of elements.
@@ -43,7 +51,7 @@ pub fn frame_with(compiled: &Compiled, options: &FrameOptions) -> Result<Frame, 
         .map_err(|e| AnalysisError::BadRequest { what: "frame".into(), detail: e.to_string() })
 }
 
-/// Linear static equilibrium, and the displacement of points along every beam.
+/// Static equilibrium under loads, heat and gaps, and the displacement of points along every beam.
 ///
 /// # Errors
 /// See [`AnalysisError`].
@@ -52,8 +60,8 @@ pub fn frame_statics(
     frame: &Frame,
     voltages: &PortVoltages,
 ) -> Result<(StaticResult, BeamMotions), AnalysisError> {
-    let (sources, rise) = steady(compiled, voltages)?;
-    let q = balance(compiled, frame, &rise)?;
+    let (sources, rise, drive) = sources(compiled, voltages)?;
+    let (q, iterations) = balance(compiled, frame, &rise, &drive.volts)?;
     let nodes = node_motions(compiled, frame, &q);
     let electrical = electrical(compiled, &sources, &rise);
     let result = StaticResult {
@@ -69,12 +77,12 @@ pub fn frame_statics(
         unknowns: frame.system.unknowns(),
         estimated_error: None,
         warnings: Vec::new(),
-        iterations: 1,
+        iterations,
     };
     Ok((result, beam_motions(frame, &q)))
 }
 
-/// Undamped modes about the drawn geometry, and for each the displacement of points along every beam.
+/// Undamped modes about the drawn geometry, or where there are voltages across gaps about the equilibrium under those; and for each the displacement of points along every beam.
 ///
 /// # Errors
 /// See [`AnalysisError`].
@@ -84,11 +92,17 @@ pub fn frame_modes(
     count: usize,
     voltages: &PortVoltages,
 ) -> Result<(ModesResult, Vec<BeamMotions>), AnalysisError> {
-    steady(compiled, voltages)?;
-    let found = lowest_consistent_modes(&frame.system, count).map_err(|p| singular(frame, p))?;
+    let (_, rise, drive) = sources(compiled, voltages)?;
+    let mut system = frame.system.clone();
+    if drive.volts.iter().any(|volts| *volts != 0.0) {
+        let (q, _) = balance(compiled, frame, &rise, &drive.volts)?;
+        add_gap_stiffness(frame, &q, &drive.volts, &mut system.stiffness);
+    }
+    let found = lowest_consistent_modes(&system, count).map_err(|p| singular(frame, p))?;
     let shape = |x: &Vec<Pose>| normalized(node_motions(compiled, frame, x), beam_motions(frame, x));
     let (shapes, curves) = found.shapes.iter().map(shape).unzip();
     let result = ModesResult {
+        estimated_error: None,
         frequencies_hz: found.lambda.iter().map(|&l| l.max(0.0).sqrt() / std::f64::consts::TAU).collect(),
         shapes,
         errors: vec![None; found.residuals.len()],
@@ -124,7 +138,7 @@ pub fn frame_transient(
                 });
             }
             let (_, rise) = steady(initial, &options.voltages)?;
-            (balance(initial, &before, &rise)?, rise)
+            (balance(initial, &before, &rise, &[])?.0, rise)
         }
         None => (zeros.clone(), vec![0.0; heaters]),
     };
@@ -202,18 +216,24 @@ pub fn frame_transient(
     })
 }
 
-/// Source voltages and steady rises; refuses voltages that would act across gaps.
-fn steady(compiled: &Compiled, voltages: &PortVoltages) -> Result<(Vec<f64>, Vec<f64>), AnalysisError> {
+/// Source voltages, steady rises, and what they drive.
+fn sources(compiled: &Compiled, voltages: &PortVoltages) -> Result<(Vec<f64>, Vec<f64>, Drive), AnalysisError> {
     let electrics = &compiled.parts.system.electrics;
     let sources = source_vector(compiled, voltages)?;
     let mut rise = vec![0.0; electrics.heating.heaters.len()];
     let mut drive = electrics.drive();
     electrics.steady(&sources, &mut rise, &mut drive);
+    Ok((sources, rise, drive))
+}
+
+/// Source voltages and steady rises; refuses voltages that would act across gaps.
+fn steady(compiled: &Compiled, voltages: &PortVoltages) -> Result<(Vec<f64>, Vec<f64>), AnalysisError> {
+    let (sources, rise, drive) = sources(compiled, voltages)?;
     if let Some(gap) = drive.volts.iter().position(|v| *v != 0.0) {
         return Err(AnalysisError::BadRequest {
             what: "frame".into(),
             detail: format!(
-                "{} carries {} V; the linear frame has no electrostatic forces",
+                "{} carries {} V; the linear frame moves in time without electrostatic forces",
                 compiled.parts.gap_names[gap], drive.volts[gap]
             ),
         });
@@ -232,18 +252,57 @@ fn force(compiled: &Compiled, frame: &Frame, rise: &[f64], out: &mut [Pose]) {
     }
 }
 
-fn balance(compiled: &Compiled, frame: &Frame, rise: &[f64]) -> Result<Vec<Pose>, AnalysisError> {
+/// The equilibrium with these voltages across the gaps, from the drawing by Newton's method, and its iterations.
+fn balance(
+    compiled: &Compiled,
+    frame: &Frame,
+    rise: &[f64],
+    volts: &[f64],
+) -> Result<(Vec<Pose>, usize), AnalysisError> {
     let system = &frame.system;
-    let mut q = vec![Pose::zeros(); system.bodies()];
-    force(compiled, frame, rise, &mut q);
-    system.project(&mut q);
-    let mut matrix = system.combine(1.0, 0.0, 0.0);
-    // the recursion's test of pivots finds free motions; the solution itself is the sparse package's
-    matrix.clone().factor(&system.pattern).map_err(|p| singular(frame, p))?;
+    let mut load = vec![Pose::zeros(); system.bodies()];
+    force(compiled, frame, rise, &mut load);
     let mut solver = Sparse::new(&system.pattern)?;
-    solver.factor(&system.pattern, &mut matrix).map_err(|p| singular(frame, p))?;
-    solver.solve(&system.pattern, &matrix, &mut q);
-    Ok(q)
+    let mut q = vec![Pose::zeros(); system.bodies()];
+    for iteration in 1..=MOST_ITERATIONS {
+        let mut stiffness = system.stiffness.clone();
+        let mut change = load.clone();
+        let mut borne = vec![Pose::zeros(); system.bodies()];
+        stiffness.multiply_add(&system.pattern, &q, &mut borne);
+        for (gap, volts) in acting(frame, volts) {
+            gap.add_force(true, &q, -0.5 * volts * volts, true, &mut borne);
+        }
+        change.iter_mut().zip(&borne).for_each(|(change, borne)| *change -= borne);
+        add_gap_stiffness(frame, &q, volts, &mut stiffness);
+        let tangent = LinearSystem { stiffness, ..system.clone() };
+        tangent.project(&mut change);
+        let mut matrix = tangent.combine(1.0, 0.0, 0.0);
+        // the recursion's test of pivots finds free motions; the solution itself is the sparse package's
+        matrix.clone().factor(&system.pattern).map_err(|p| singular(frame, p))?;
+        solver.factor(&system.pattern, &mut matrix).map_err(|p| singular(frame, p))?;
+        solver.solve(&system.pattern, &matrix, &mut change);
+        let amount = |x: &[Pose]| x.iter().map(Pose::amax).fold(0.0, f64::max);
+        q.iter_mut().zip(&change).for_each(|(q, change)| *q += change);
+        let settled = amount(&change) <= SETTLED * amount(&q);
+        if settled || acting(frame, volts).next().is_none() {
+            return Ok((q, iteration));
+        }
+    }
+    Err(AnalysisError::NotConverged {
+        detail: format!("the frame finds no equilibrium in {MOST_ITERATIONS} iterations: its gaps may have pulled in"),
+    })
+}
+
+/// The gaps with a voltage across them.
+fn acting<'a>(frame: &'a Frame, volts: &'a [f64]) -> impl Iterator<Item = (&'a Gap, f64)> {
+    frame.gaps.iter().zip(volts.iter().copied()).filter(|(_, volts)| *volts != 0.0)
+}
+
+/// Adds what the field in the gaps does to the stiffness at `q`, contact with it.
+fn add_gap_stiffness(frame: &Frame, q: &[Pose], volts: &[f64], stiffness: &mut BlockMatrix<f64, 3>) {
+    for (gap, volts) in acting(frame, volts) {
+        gap.add_tangent((&frame.system.pattern, true), q, -0.5 * volts * volts, stiffness);
+    }
 }
 
 fn singular(frame: &Frame, pivot: ZeroPivot) -> AnalysisError {

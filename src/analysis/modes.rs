@@ -1,6 +1,8 @@
 //! Natural frequencies and shapes about the operating point.
+use super::gap_pieces;
+use super::mesh::{OF_DEFLECTION, of_share_in_pieces};
 use super::signal::{Signal, View};
-use super::statics::{NodeMotion, operating_point};
+use super::statics::{NodeMotion, operating_point, told_at};
 use super::{AnalysisError, BeamMotions, NodeMotions, PortVoltages};
 use crate::compile::Compiled;
 use crate::gaps::Point;
@@ -32,6 +34,9 @@ pub struct ModesResult {
     pub deflection_m: f64,
     /// What the numbers do not say by themselves.
     pub warnings: Vec<String>,
+    /// Largest estimated relative error by the mesh, of every frequency and of the equilibrium that they are about [1]; none without an
+    /// estimate, and where nobody has fitted the mesh to them.
+    pub estimated_error: Option<f64>,
 }
 
 /// Modes beyond those asked for, which keep the last of these apart from what follows.
@@ -87,8 +92,12 @@ pub fn modes_with_curves(
         // neither loads nor built-in strain
         drive.load = 0.0;
     }
+    let (mut way, mut in_pieces) = (Vec::new(), None);
     let q = if loaded {
         let point = operating_point(compiled, voltages)?;
+        way = told_at(compiled, &point);
+        let share = gap_pieces::left_out(compiled, &point.q, &point.volts);
+        in_pieces = share.map(|(name, share)| (name.to_owned(), OF_DEFLECTION * share));
         let mut rise = point.rise.clone();
         system.electrics.steady(&point.sources, &mut rise, &mut drive);
         point.q
@@ -122,13 +131,16 @@ pub fn modes_with_curves(
     }
     let forces = if loaded { axial_forces(&compiled.structure, &compiled.parts, &q, &drive) } else { Vec::new() };
     let mut errors = estimated(compiled, &tangent, &forces, &found);
-    let warnings = told(compiled, count, &q, &found.lambda);
+    let mut warnings = told(compiled, count, &q, &found.lambda);
+    warnings.extend(of_share_in_pieces(compiled, in_pieces).map(|d| d.message));
+    warnings.extend(way.into_iter().map(|way| format!("the equilibrium that these modes are about: {way}")));
     errors.truncate(count);
     found.lambda.truncate(count);
     found.shapes.truncate(count);
     found.residuals.truncate(count);
     let (shapes, curves) = found.shapes.iter().map(|x| shape(compiled, &q, x)).unzip();
     let result = ModesResult {
+        estimated_error: None,
         frequencies_hz: found.lambda.iter().map(|&l| l.max(0.0).sqrt() / std::f64::consts::TAU).collect(),
         shapes,
         residuals: found.residuals,

@@ -23,8 +23,10 @@ use serde::Serialize;
 
 /// How far beyond a fold a part is let fall, as a share of its voltage.
 const PAST: f64 = 1e-3;
-/// Halvings of that where the branch itself does not lead to its fold.
-const BISECTIONS: usize = 12;
+/// Halvings of a step, at most, where the branch itself does not lead to its fold.
+const BISECTIONS: usize = 40;
+/// Share of a voltage to which it is found so.
+const SHARP: f64 = 1e-8;
 /// Folds on the way up, or on the way down, after which the search gives up.
 const MOST_FOLDS: usize = 200;
 /// Points of one piece of a branch.
@@ -48,6 +50,18 @@ pub struct PullInResult {
     /// What the numbers do not say by themselves, as sentences.
     #[serde(skip)]
     pub warnings: Vec<String>,
+}
+
+impl PullInResult {
+    /// Why there is no release, and what else the voltages do not say, as sentences.
+    pub fn told(&self) -> Vec<String> {
+        let way = match (self.release_v, self.held) {
+            (Some(_), _) => None,
+            (None, true) => Some("no release: it stays closed".to_owned()),
+            (None, false) => Some("no release: nothing holds the part beyond pull-in".to_owned()),
+        };
+        way.into_iter().chain(self.warnings.iter().cloned()).collect()
+    }
 }
 
 /// [`pull_in`] on the mesh that holds the tolerance, which comes with it.
@@ -244,6 +258,9 @@ impl Sweep<'_> {
     /// the part, let fall from its equilibrium `q` at `holds`, is `kept`.
     fn sharpen(&mut self, q: &[Pose], mut holds: f64, mut falls: f64, kept: impl Fn(&[Pose]) -> bool) -> f64 {
         for _ in 0..BISECTIONS {
+            if (holds - falls).abs() <= SHARP * falls.abs() {
+                break;
+            }
             let (middle, mut there) = (f64::midpoint(holds, falls), q.to_vec());
             match self.fall(&mut there, middle) {
                 Ok(()) if kept(&there) => holds = middle,

@@ -47,6 +47,40 @@ pub struct StaticResult {
     pub warnings: Vec<String>,
 }
 
+impl StaticResult {
+    /// How it came about, as sentences, where that is not by the shortest way.
+    pub fn told(&self) -> Vec<String> {
+        told(self.pulled_in, self.jumped, &self.free_motions)
+    }
+}
+
+fn told(pulled_in: bool, jumped: bool, free_motions: &[String]) -> Vec<String> {
+    let way = match (pulled_in, jumped) {
+        (true, _) => Some("pulled in on the way to these voltages".to_owned()),
+        (false, true) => {
+            let branches = "`bimorph path` shows the branches";
+            Some(format!("snapped through or buckled on the way to these loads; {branches}"))
+        }
+        (false, false) => None,
+    };
+    let held = free_motions.iter().map(|motion| format!("held, because no load excites it: {motion}"));
+    way.into_iter().chain(held).collect()
+}
+
+/// [`StaticResult::told`] of an equilibrium that something else starts from.
+pub(crate) fn told_at(compiled: &Compiled, point: &OperatingPoint) -> Vec<String> {
+    let (pulled_in, jumped) = jump(compiled, point);
+    told(pulled_in, jumped, &point.free_motions)
+}
+
+/// Whether it pulled in, and whether it jumped at all.
+fn jump(compiled: &Compiled, point: &OperatingPoint) -> (bool, bool) {
+    let system = &compiled.parts.system;
+    let jumped = point.path.fold.is_some();
+    let touching = (0..system.gaps.len()).any(|g| system.touches(g, &point.q));
+    (jumped && point.volts.iter().any(|v| *v != 0.0) && touching, jumped)
+}
+
 /// Finds the equilibrium that is reached from rest by raising all loads and voltages together.
 ///
 /// # Errors
@@ -90,15 +124,14 @@ pub(crate) fn result_at(compiled: &Compiled, point: &OperatingPoint) -> StaticRe
             .map(|g| electrics.gap_rows[(g, p)] * system.capacitance(g, &point.q) * point.volts[g])
             .sum::<f64>()
     };
-    let jumped = point.path.fold.is_some();
-    let touching = (0..system.gaps.len()).any(|g| system.touches(g, &point.q));
+    let (pulled_in, jumped) = jump(compiled, point);
     let electrical = electrical(compiled, &point.sources, &point.rise);
     StaticResult {
         nodes: node_motions(compiled, &point.q),
         temperatures_k: electrical.temperatures_k,
         currents_a: electrical.currents_a,
         charges_c: (0..electrics.ports).map(|p| (port(p), charge(p))).collect(),
-        pulled_in: jumped && point.volts.iter().any(|v| *v != 0.0) && touching,
+        pulled_in,
         jumped,
         free_motions: point.free_motions.clone(),
         unknowns: system.model.unknowns(),

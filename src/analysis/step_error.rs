@@ -55,7 +55,10 @@ pub fn with_step_error<T>(
         sample(t, values);
     };
     let (mut result, more) = run(options, &mut both, watch)?;
-    let Some(companion) = companion.filter(|_| whole || reached >= FEWEST) else { return Ok((result, more)) };
+    let Some(companion) = companion.filter(|_| whole || reached >= FEWEST) else {
+        result.warnings.extend((!options.signals.is_empty()).then(|| unknown(options)));
+        return Ok((result, more));
+    };
     let signals = picked.signals(&result.signals);
     let found = TransientResult { signals, ..companion.clone() };
     let apart = relative_error_above(&found, &companion, &|unit| least(unit, options, model));
@@ -162,6 +165,11 @@ pub(crate) fn step_error(options: &TransientOptions<'_>, model: &Compiled, watch
         Ok((transient(model, options, sample, watch)?, ()))
     };
     with_step_error(options, model, &mut run, &mut |_, _| (), watch).ok()?.0.step_error
+}
+
+/// What to say of steps that nothing was compared with.
+pub(crate) fn unknown(options: &TransientOptions<'_>) -> String {
+    format!("nothing tells how far the steps in time are off: the tolerance {:e} is not confirmed", options.tol)
 }
 
 /// What to say of steps whose estimate is beyond the tolerance; `place` says where it was made.

@@ -102,13 +102,17 @@ fn degrees([re, im]: [f64; 2]) -> String {
     format!("{:.1}°", phase + 0.0)
 }
 
-/// Value of a signal at the frequency on the grid next to `hertz`.
-fn nearest(result: &HarmonicResult, signal: usize, hertz: f64) -> [f64; 2] {
+/// Share of its width within which a resonance is seen by the frequency on the grid next to it.
+const ON_TOP: f64 = 0.1;
+
+/// Value of a signal at a resonance at `hertz` of this half-power width [Hz]: that at the frequency on the grid next to it, none where that
+/// is on its flank.
+fn on_top(result: &HarmonicResult, signal: usize, hertz: f64, width: f64) -> Option<[f64; 2]> {
     let grid = &result.frequencies_hz;
     let after = grid.partition_point(|f| *f < hertz);
     let near = [after.saturating_sub(1), after.min(grid.len() - 1)];
     let k = if hertz - grid[near[0]] <= grid[near[1]] - hertz { near[0] } else { near[1] };
-    result.signals[signal].values[k]
+    ((grid[k] - hertz).abs() <= ON_TOP * width).then(|| result.signals[signal].values[k])
 }
 
 /// The table of resonances, and what damps without ringing.
@@ -125,8 +129,9 @@ fn resonances(result: &HarmonicResult, poles: &[Root]) -> String {
             .map(|pole| {
                 let own = pole.im / TAU;
                 let q = pole.quality().map_or("undamped".into(), four);
-                let (height, phase) = match (pole.quality(), nearest(result, 0, own)) {
-                    (Some(_), v) if size(v).is_finite() => (quotient(size(v), &first.unit), degrees(v)),
+                let (height, phase) = match (pole.quality(), on_top(result, 0, own, pole.width_hz())) {
+                    (Some(_), Some(v)) if size(v).is_finite() => (quotient(size(v), &first.unit), degrees(v)),
+                    (Some(_), None) => ("–".into(), "–".into()),
                     _ => ("no bound".into(), "–".into()),
                 };
                 vec![quantity(pole.frequency_hz(), "Hz"), q, quantity(pole.width_hz(), "Hz"), height, phase]

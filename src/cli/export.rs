@@ -4,6 +4,7 @@ use super::failure::Failure;
 use super::model::{Context, ModelArgs, Named, warn_of};
 use super::output::{check_folder, print, write_page};
 use super::{progress, report, value};
+use bimorph::analysis::mesh::beyond;
 use bimorph::compile::Compiled;
 use bimorph::export::compare::{Fitted, fit};
 use bimorph::export::names::{self, Pins};
@@ -115,7 +116,7 @@ impl Export {
         busy.finish_and_clear();
         let fitted = fitted?;
         let pins = Pins::of(&fitted.model.ports, &fitted.model.signals)?;
-        let warnings = self.warnings(&fitted);
+        let warnings = self.warnings(&compiled, &fitted);
         warn_of(&warnings);
         let about = self.about(&compiled, &fitted);
         let text = match self.spice {
@@ -143,8 +144,9 @@ impl Export {
     }
 
     /// What the file does not say by its numbers.
-    fn warnings(&self, fitted: &Fitted) -> Vec<String> {
-        let mut warnings = Vec::new();
+    fn warnings(&self, compiled: &Compiled, fitted: &Fitted) -> Vec<String> {
+        let mut warnings: Vec<String> =
+            beyond(compiled.options.tol, compiled.order.estimated_error).into_iter().collect();
         if fitted.error > self.within {
             let (modes, error, within) = (fitted.model.modes.len(), fitted.error, self.within);
             warnings.push(format!("{modes} modes deviate by {error:.1e}, more than --within {within:.1e}"));
@@ -238,7 +240,7 @@ impl Export {
         if fitted.error > 0.0 {
             about.push(format!("  found at {hertz:.4e} Hz from port {port} to {row}"));
         }
-        about.extend(self.warnings(fitted).iter().map(|warning| format!("warning: {warning}")));
+        about.extend(self.warnings(compiled, fitted).iter().map(|warning| format!("warning: {warning}")));
         about.extend(model.signals.iter().map(|s| format!("signal {}: 1 V is {:e} {}", s.name, 1.0 / s.scale, s.unit)));
         about
     }
@@ -261,7 +263,14 @@ fn summary(fitted: &Fitted, pins: &Pins, name: &str) -> String {
     let model = &fitted.model;
     let row = |(j, mode): (usize, &bimorph::export::linear::Mode)| {
         let number = mode.number.map_or_else(|| "static".into(), |n| n.to_string());
-        vec![number, quantity(mode.omega / TAU, "Hz"), format!("{:.3e}", quality(fitted, j))]
+        vec![
+            number,
+            quantity(mode.omega / TAU, "Hz"),
+            match quality(fitted, j) {
+                q if q.is_finite() => format!("{q:.3e}"),
+                _ => "undamped".into(),
+            },
+        ]
     };
     let rows: Vec<Vec<String>> = model.modes.iter().enumerate().map(row).collect();
     let mut text = report::columns(&["mode", "frequency", "Q"], &rows);

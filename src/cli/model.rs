@@ -7,7 +7,7 @@ use bimorph::compile::{CompileOptions, Compiled, Drawn, Junctions, compile, draw
 use bimorph::front::{self, Asked, Source};
 use bimorph::layout::Format;
 use bimorph::layout::drawing::Drawing;
-use bimorph::netlist::{Bundle, DroppedInclude, Setting};
+use bimorph::netlist::{Bundle, Diagnostic, DroppedInclude, Setting, Severity};
 use bimorph::options::{MODEL, Value};
 use clap::Args;
 use serde::ser::SerializeMap;
@@ -124,7 +124,12 @@ impl ModelArgs {
             return Err(Failure::bad("--junctions", "centreline", got));
         }
         options.junctions = Junctions::Centreline;
-        self.compiled(&options)
+        let mut compiled = compile(&self.bundle()?, &options)?;
+        // that of the recursion's mesh is no frame's
+        compiled.order.estimated_error = None;
+        compiled.warnings.items.push(baseline());
+        warn(&compiled);
+        Ok(compiled)
     }
 
     fn compiled(&self, options: &CompileOptions) -> Result<Compiled, Failure> {
@@ -135,10 +140,15 @@ impl ModelArgs {
 
     /// What the model was made from, for JSON.
     pub(crate) fn context<'a>(&'a self, compiled: &'a Compiled) -> Context<'a> {
+        self.context_of(compiled, compiled)
+    }
+
+    /// The same of a run in which `compiled` moves and `drawn` is what the netlist says.
+    pub(crate) fn context_of<'a>(&'a self, drawn: &'a Compiled, compiled: &'a Compiled) -> Context<'a> {
         Context {
             file: self.file.display().to_string(),
-            parameters: Map(&compiled.parameters),
-            options: Keys(&compiled.options),
+            parameters: Map(&drawn.parameters),
+            options: Keys(&drawn.options),
             estimated_error: compiled.order.estimated_error,
             warnings: compiled.warnings.items.iter().map(|d| d.message.as_str()).collect(),
         }
@@ -147,6 +157,20 @@ impl ModelArgs {
     /// The netlist's file name, for titles.
     pub(crate) fn title(&self) -> String {
         self.file.file_name().map_or_else(|| self.file.display().to_string(), |n| n.to_string_lossy().into_owned())
+    }
+}
+
+/// What every result of the linear frame is warned of.
+fn baseline() -> Diagnostic {
+    Diagnostic {
+        code: "W043".into(),
+        severity: Severity::Warning,
+        file: String::new(),
+        line: 0,
+        column: 0,
+        width: 0,
+        message: "the linear frame is a baseline: small displacements, no stops, and nothing tells how far its elements are off".into(),
+        help: "--segments N or --band HZ for more elements; --solver recursion has an estimate".into(),
     }
 }
 

@@ -139,6 +139,8 @@ fn table(title: &str, result: &ModesResult) -> Result<Table, Failure> {
     let mut table = Table::new(title, "Modes");
     table.push_real("mode", "", (1..=result.frequencies_hz.len()).map(|k| k as f64).collect())?;
     table.push_real("frequency", "Hz", result.frequencies_hz.clone())?;
+    let errors = result.errors.iter().map(|error| error.unwrap_or(f64::NAN)).collect();
+    table.push_real("error", "", errors)?;
     table.push_real("residual", "", result.residuals.clone())?;
     Ok(table)
 }

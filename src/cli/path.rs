@@ -1,10 +1,12 @@
 //! `bimorph path`: how equilibria go on while one thing grows.
 
 use super::failure::Failure;
-use super::model::{Context, ModelArgs, Named};
+use super::model::{Context, ModelArgs, Named, warn_of, warn_of_mesh};
 use super::output::OutputArgs;
 use super::{progress, report, statics, value};
-use bimorph::analysis::continuation::{ContinuationRequest, ContinuationResult, CriticalPoint, Growing, trace};
+use bimorph::analysis::continuation::{
+    ContinuationRequest, ContinuationResult, CriticalPoint, Growing, trace, trace_fitted,
+};
 use bimorph::analysis::statics::NodeMotion;
 use bimorph::compile::{Compiled, compile};
 use bimorph::netlist::Setting;
@@ -133,9 +135,11 @@ impl PathCommand {
             let found = trace(first, &request, &mut progress::watch(&bar))?;
             request.signals = busiest(&found);
         }
-        let result = trace(first, &request, &mut progress::watch(&bar));
+        let result = trace_fitted(first, &request, &mut progress::watch(&bar));
         bar.finish_and_clear();
-        let result = result?;
+        let (fitted, result) = result?;
+        warn_of_mesh(first, &fitted);
+        warn_of(&result.warnings);
 
         let split = |k: fn(&(String, String, Vec<f64>)) -> String| -> Vec<(String, String)> {
             result.signals.iter().map(|s| (s.0.clone(), k(s))).collect()
@@ -155,14 +159,14 @@ impl PathCommand {
             unknowns: result.unknowns,
             iterations: result.iterations,
             port_voltages_v: Named(&self.ports),
-            context: self.model.context(first),
+            context: self.model.context(&fitted).with(&result.warnings),
         };
         let unit = self.unit(&drawn, ends.as_ref());
         self.output.finish(
             || self.table(&result, unit),
-            || Ok(self.picture(first, &result, unit)),
+            || Ok(self.picture(&fitted, &result, unit)),
             &document,
-            &self.text(first, &result, unit),
+            &self.text(&fitted, &result, unit),
         )
     }
 

@@ -71,7 +71,9 @@ impl Pullin {
         let table = || {
             let mut table = Table::new(self.model.title(), "Pull-in");
             table.push_real("pull_in", "V", vec![result.pull_in_v])?;
+            // without a release it says whether something holds the part
             table.push_real("release", "V", vec![result.release_v.unwrap_or(f64::NAN)])?;
+            table.push_real("held", "", vec![f64::from(u8::from(result.held))])?;
             Ok(table)
         };
         let picture = || Err(Failure::NoSuchOutput { what: "pullin", kind: "picture", hint: "write .csv or .raw" });

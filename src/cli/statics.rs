@@ -6,7 +6,7 @@ use super::output::OutputArgs;
 use super::solver::ModelChoice;
 use super::{progress, report, value};
 use bimorph::analysis::BeamMotions;
-use bimorph::analysis::backbending::backbend;
+use bimorph::analysis::backbending::static_backbent;
 use bimorph::analysis::frame::{frame, frame_statics};
 use bimorph::analysis::statics::{NodeMotion, StaticResult, static_fitted};
 use bimorph::compile::Compiled;
@@ -73,28 +73,24 @@ struct Document<'a> {
 impl Static {
     pub(crate) fn run(&self) -> Result<(), Failure> {
         self.output.check()?;
-        let mut compiled = match self.solver {
+        let drawn = match self.solver {
             ModelChoice::Recursion => self.model.compile()?,
             ModelChoice::Frame => self.model.compile_frame()?,
         };
-        let mut permanent_strains = Vec::new();
-        if !self.backbend.is_empty() {
-            if self.solver == ModelChoice::Frame {
-                return Err(Failure::bad("--backbend", "--solver recursion", "--solver frame, which does not yield"));
-            }
-            let bent = backbend(&compiled, &self.backbend)?;
-            (compiled, permanent_strains) = (bent.compiled, bent.strains);
+        if !self.backbend.is_empty() && self.solver == ModelChoice::Frame {
+            return Err(Failure::bad("--backbend", "--solver recursion", "--solver frame, which does not yield"));
         }
         let busy = progress::spinner("static equilibrium");
-        let drawn = compiled;
+        let unbent = |(fitted, result, curves)| (fitted, result, curves, Vec::new());
         let result = match self.solver {
-            ModelChoice::Recursion => static_fitted(&drawn, &self.ports),
+            ModelChoice::Recursion if self.backbend.is_empty() => static_fitted(&drawn, &self.ports).map(unbent),
+            ModelChoice::Recursion => static_backbent(&drawn, &self.backbend, &self.ports),
             ModelChoice::Frame => frame(&drawn)
                 .and_then(|frame| frame_statics(&drawn, &frame, &self.ports))
-                .map(|(result, curves)| (drawn.clone(), result, curves)),
+                .map(|(result, curves)| unbent((drawn.clone(), result, curves))),
         };
         busy.finish_and_clear();
-        let (compiled, result, curves) = result?;
+        let (compiled, result, curves, permanent_strains) = result?;
         warn_of_mesh(&drawn, &compiled);
         let document = Document {
             nodes: Named(&result.nodes),
@@ -114,7 +110,12 @@ impl Static {
         let title = self.model.title();
         let shown = match self.signals.as_slice() {
             [] => text(&compiled, &result, &permanent_strains),
-            names => chosen(&result, &value::names(names))? + &report::footing(&compiled, result.unknowns),
+            names => {
+                chosen(&result, &value::names(names))?
+                    + &told(&result)
+                    + "\n"
+                    + &report::footing(&compiled, result.unknowns)
+            }
         };
         self.output.finish(
             || table(&title, &result),
@@ -195,6 +196,11 @@ fn chosen(result: &StaticResult, names: &[String]) -> Result<String, Failure> {
     Ok(report::columns(&["signal", "value"], &rows) + "\n")
 }
 
+/// How the equilibrium came about.
+fn told(result: &StaticResult) -> String {
+    result.told().iter().map(|sentence| format!("\n{sentence}\n")).collect()
+}
+
 /// A displacement below this share of the largest one is rounding.
 const NOISE: f64 = 1e-12;
 
@@ -221,14 +227,7 @@ fn text(compiled: &Compiled, result: &StaticResult, strains: &[(String, f64)]) -
         let rows: Vec<Vec<String>> = strains.iter().map(|(n, e)| vec![n.clone(), format!("{e:.3e}")]).collect();
         let _ = write!(text, "\n{}", report::columns(&["beam", "permanent strain"], &rows));
     }
-    if result.pulled_in {
-        text.push_str("\npulled in on the way to these voltages\n");
-    } else if result.jumped {
-        text.push_str("\nsnapped through or buckled on the way to these loads; `bimorph path` shows the branches\n");
-    }
-    for motion in &result.free_motions {
-        let _ = writeln!(text, "\nheld, because no load excites it: {motion}");
-    }
+    text.push_str(&told(result));
     let _ = write!(text, "\n{} Newton iterations, {}", result.iterations, report::footing(compiled, result.unknowns));
     text
 }

@@ -17,6 +17,7 @@ use bimorph::options::analysis::{MODES_COUNT, PULL_IN_MAX};
 use bimorph::results::atomic;
 use bimorph::service::client::Client;
 use clap::{Args, ValueEnum};
+use std::io::{self, IsTerminal};
 use std::path::PathBuf;
 use std::sync::OnceLock;
 use std::time::Duration;
@@ -52,16 +53,16 @@ pub(crate) struct Sweep {
     #[arg(long, value_enum, default_value_t = Analysis::Static)]
     analysis: Analysis,
 
-    /// Modes: how many
-    #[arg(long, short = 'n', default_value_t = MODES_COUNT.count())]
-    count: usize,
+    /// Modes: how many [default: 6]
+    #[arg(long, short = 'n')]
+    count: Option<usize>,
 
     /// Static: columns wanted, NODE.x, NODE.y, NODE.rz, PORT.i, PORT.q, BEAM.T [default: every node]; tran: signals at the end
     #[arg(long, value_name = "NAMES")]
     signals: Vec<String>,
 
     /// Tran: end time [s]; the motion starts from rest
-    #[arg(long, value_parser = value::number, required_if_eq("analysis", "tran"))]
+    #[arg(long, value_name = "SECONDS", value_parser = value::number, required_if_eq("analysis", "tran"))]
     stop: Option<f64>,
 
     /// Static, modes, tran: hold a port at a voltage [V]. Repeatable
@@ -72,9 +73,9 @@ pub(crate) struct Sweep {
     #[arg(long, value_name = "NAME")]
     source: Option<String>,
 
-    /// Pull-in: highest voltage tried [V]
-    #[arg(long, default_value_t = PULL_IN_MAX.number(), value_name = "VOLTS", value_parser = value::number, allow_negative_numbers = true)]
-    max: f64,
+    /// Pull-in: highest voltage tried [V] [default: 200]
+    #[arg(long, value_name = "VOLTS", value_parser = value::number, allow_negative_numbers = true)]
+    max: Option<f64>,
 
     /// Run part I of N (I from 0) of the grid
     #[arg(long, value_name = "I/N", default_value = "0/1")]
@@ -104,7 +105,7 @@ pub(crate) struct Sweep {
     resume: bool,
 }
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Analysis {
     Static,
     Modes,
@@ -122,6 +123,7 @@ impl Sweep {
         }
         let spec = self.spec()?;
         let (bundle, options) = (self.model.bundle()?, self.model.options()?);
+        warn_of_netlist(&spec, &bundle, &options);
         let bar = progress::bar("sweep");
         let table = match &self.to {
             None => self.here(&spec, &bundle, &options, &bar),
@@ -190,14 +192,17 @@ impl Sweep {
 
     fn spec(&self) -> Result<SweepSpec, Failure> {
         let parameters = self.parameters.iter().map(|text| text.parse()).collect::<Result<Vec<SweepParameter>, _>>()?;
-        MODES_COUNT.check(&Value::Count(self.count))?;
-        PULL_IN_MAX.check(&Value::Number(self.max))?;
+        self.check_use()?;
+        let count = self.count.unwrap_or(MODES_COUNT.count());
+        let max = self.max.unwrap_or(PULL_IN_MAX.number());
+        MODES_COUNT.check(&Value::Count(count))?;
+        PULL_IN_MAX.check(&Value::Number(max))?;
         let analysis = match self.analysis {
             Analysis::Static => {
                 SweepAnalysis::Static { outputs: value::names(&self.signals), voltages: self.ports.clone() }
             }
-            Analysis::Modes => SweepAnalysis::Modes { count: self.count, voltages: self.ports.clone() },
-            Analysis::Pullin => SweepAnalysis::PullIn { port: self.source.clone(), max: self.max },
+            Analysis::Modes => SweepAnalysis::Modes { count, voltages: self.ports.clone() },
+            Analysis::Pullin => SweepAnalysis::PullIn { port: self.source.clone(), max },
             Analysis::Tran => {
                 let stop = self.stop.unwrap_or_default();
                 if !(stop.is_finite() && stop > 0.0) {
@@ -216,6 +221,34 @@ impl Sweep {
         Ok(spec)
     }
 
+    /// Refuses what the analysis would ignore.
+    fn check_use(&self) -> Result<(), Failure> {
+        use Analysis::{Modes, Pullin, Static, Tran};
+        let given: [(&str, bool, &[Analysis]); 6] = [
+            ("--count", self.count.is_some(), &[Modes]),
+            ("--signals", !self.signals.is_empty(), &[Static, Tran]),
+            ("--stop", self.stop.is_some(), &[Tran]),
+            ("--port", !self.ports.is_empty(), &[Static, Modes, Tran]),
+            ("--source", self.source.is_some(), &[Pullin]),
+            ("--max", self.max.is_some(), &[Pullin]),
+        ];
+        let name = |analysis: &Analysis| {
+            analysis.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default()
+        };
+        if let Some((option, _, of)) = given.iter().find(|(_, given, of)| *given && !of.contains(&self.analysis)) {
+            let expected = of.iter().map(name).collect::<Vec<_>>().join(" or ");
+            return Err(Failure::bad(option, &format!("--analysis {expected} beside it"), name(&self.analysis)));
+        }
+        if self.threads.is_some() && self.to.is_some() {
+            return Err(Failure::bad(
+                "--threads",
+                "a sweep in this process",
+                "--to, where the server decides".to_owned(),
+            ));
+        }
+        Ok(())
+    }
+
     fn deliver(&self, table: &SweepTable) -> Result<(), Failure> {
         let text = table.to_csv();
         // A table in which no point has a result is no result: nothing is written.
@@ -227,6 +260,15 @@ impl Sweep {
                 .map_err(|source| Failure::Write { path: path.clone(), source }),
             None => print(&text),
         }
+    }
+}
+
+/// Shows what the netlist is warned of at the first point; the points themselves are checked one by one.
+fn warn_of_netlist(spec: &SweepSpec, bundle: &Bundle, options: &CompileOptions) {
+    if let Ok(drawn) = sweep::first_drawn(spec, bundle, options)
+        && !drawn.warnings.items.is_empty()
+    {
+        eprint!("{}", drawn.warnings.render(io::stderr().is_terminal()));
     }
 }
 

@@ -118,10 +118,10 @@ impl Tran {
         };
         let drawn = released.as_ref().unwrap_or(&initial);
         let method = self.integrator(drawn)?;
-        let (fitted, start) = self.fitted(drawn, released.as_ref().map(|_| &initial), method)?;
+        let mut signals = if self.signals.is_empty() { free_nodes(drawn) } else { value::names(&self.signals) };
+        let (fitted, start) = self.fitted(drawn, released.as_ref().map(|_| &initial), method, &signals)?;
         warn_of_mesh(drawn, &fitted);
         let (compiled, start) = (&fitted, start.as_ref());
-        let mut signals = if self.signals.is_empty() { free_nodes(compiled) } else { value::names(&self.signals) };
         let wanted = signals.len();
         if self.draw.is_some() {
             signals.extend(draw_motion::signals(compiled));
@@ -162,7 +162,7 @@ impl Tran {
             t: &result.t,
             signals: Named(&signals),
             units: Named(&units),
-            method: method.name(),
+            method: if self.solver == SolverChoice::Frame { "newmark" } else { method.name() },
             counters: result.counters,
             events: &result.events,
             joint_coordinates: joints.clone(),
@@ -172,7 +172,7 @@ impl Tran {
             solver: self.solver,
             release: self.release.as_deref(),
             port_voltages_v: Named(&self.ports),
-            context: self.model.context(start.unwrap_or(compiled)).with(&result.warnings),
+            context: self.model.context_of(start.unwrap_or(compiled), compiled).with(&result.warnings),
         };
         let title = self.model.title();
         let mut text = text(compiled, &result, joints.as_ref());
@@ -191,6 +191,18 @@ impl Tran {
                 return Err(Failure::bad("--draw", "--solver recursion or another of its equations", "--solver frame"));
             }
         }
+        if self.solver == SolverChoice::Frame {
+            let given = [
+                ("--method", self.method.is_some()),
+                ("--step", self.step.is_some()),
+                ("--rho", self.rho.is_some()),
+                ("--event", !self.events.is_empty()),
+            ];
+            if let Some((option, _)) = given.iter().find(|(_, given)| *given) {
+                let got = "--solver frame, which moves by Newmark's rule with steps of its own".to_owned();
+                return Err(Failure::bad(option, "--solver recursion", got));
+            }
+        }
         TRAN_STOP.check(&Value::Number(self.stop))?;
         TRAN_POINTS.check(&Value::Count(self.points))?;
         TRAN_STEP.check(&self.step.map_or(Value::Unset, Value::Number))?;
@@ -204,9 +216,11 @@ impl Tran {
         drawn: &Compiled,
         release: Option<&Compiled>,
         method: Integrator,
+        signals: &[String],
     ) -> Result<(Compiled, Option<Compiled>), Failure> {
         let run = TransientOptions {
             stop: self.stop,
+            signals: signals.to_vec(),
             voltages: self.ports.clone(),
             release,
             method,

@@ -143,8 +143,11 @@ fn range(samples: &Samples, name: &str, unit: &str) -> f64 {
     span.max(least)
 }
 
-/// How far a value lies outside of what is between two others.
+/// How far a value lies outside of what is between two others; infinitely far where one is not a number.
 fn distance(value: [f64; 2], one: [f64; 2], other: [f64; 2]) -> f64 {
+    if [value, one, other].as_flattened().iter().any(|x| x.is_nan()) {
+        return f64::INFINITY;
+    }
     let outside = |d: usize| {
         let (low, high) = (one[d].min(other[d]), one[d].max(other[d]));
         (low - value[d]).max(value[d] - high).max(0.0)

@@ -8,15 +8,15 @@
 //! rotary inertia of the section, which wide beams show. SUGAR has neither.
 //!
 //! Rigid links, plates, supports, springs and loads are those of the drawing. A node that lies at r from the reference point
-//! of its rigid group moves as u = q + θ × r. Combs and gaps are left out.
+//! of its rigid group moves as u = q + θ × r. Combs and gaps are left out, or laid for their share in the stiffness.
 //!
 //! Reference: J. S. Przemieniecki, "Theory of Matrix Structural Analysis" (1968), §5.6 and §11.3, for the element; J. V.
 //! Clark et al., "Addressing the needs of complex MEMS design", MEMS 2002, for SUGAR.
 
 use super::bar::bar;
 use super::rigid::Assembly;
-use super::{DiscretizeError, cubic, lay_spring, order};
-use crate::gaps::Point;
+use super::{DiscretizeError, cubic, gap, lay_spring, order};
+use crate::gaps::{Gap, Point};
 use crate::multibody::linear_system::{LinearSystem, add_pair};
 use crate::multibody::planar::{JointFrame, Pose};
 use crate::multibody::{BodyId, BodyName, Joint};
@@ -36,6 +36,18 @@ pub enum Elements {
     Beams(Vec<usize>),
 }
 
+/// What becomes of combs, plates and facing beams.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FrameGaps {
+    /// They are left out.
+    LeftOut,
+    /// The field in them is there to be added to the stiffness; `chord`: along straight lines between facing beams, as SUGAR has them.
+    Laid {
+        /// Along straight lines.
+        chord: bool,
+    },
+}
+
 /// How a drawing is made into a frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FrameOptions {
@@ -45,6 +57,8 @@ pub struct FrameOptions {
     pub shear: bool,
     /// Leave out gas damping.
     pub undamped: bool,
+    /// What becomes of gaps.
+    pub gaps: FrameGaps,
 }
 
 /// A linear frame, and where the drawing's parts went.
@@ -60,6 +74,8 @@ pub struct Frame {
     pub nodes: Vec<Option<Point>>,
     /// For each beam, the points along its centreline, ends included.
     pub beams: Vec<Vec<Point>>,
+    /// Gaps in the order of the product's own; none where they are left out.
+    pub gaps: Vec<Gap>,
 }
 
 /// Assembles the frame of a drawing.
@@ -80,9 +96,14 @@ pub fn assemble(structure: &Structure, options: &FrameOptions) -> Result<Frame, 
     let stiffest = pieces.iter().map(Piece::axial).fold(0.0, f64::max);
     rigid.hold_hinges(structure, stiffest, &mut joints);
 
+    let (gaps, _, across) = match options.gaps {
+        FrameGaps::LeftOut => Default::default(),
+        FrameGaps::Laid { chord } => gap::lay(structure, &rigid, chord),
+    };
     let couplings: Vec<(BodyId, BodyId)> = (pieces.iter().map(|p| (p.from.body, p.to.body)))
         .chain(joints.iter().map(|j: &Joint| (j.a, j.b)))
         .chain(dampers.iter().map(|d| (d.a, d.b)))
+        .chain(across)
         .collect();
     let bodies = rigid.finish_bodies().into_iter().map(|b| (b.name.to_string(), b.free.map(|p| *p))).collect();
     let (mut system, place) = LinearSystem::new(bodies, &couplings);
@@ -148,7 +169,8 @@ pub fn assemble(structure: &Structure, options: &FrameOptions) -> Result<Frame, 
     let nodes =
         (0..structure.nodes.len()).map(|n| structure.nodes[n].mechanical.then(|| placed(rigid.point(n)))).collect();
     let beams = beams.into_iter().map(|points| points.into_iter().map(placed).collect()).collect();
-    Ok(Frame { system, load, expansion, nodes, beams })
+    let gaps = gaps.into_iter().map(|g| gap::centered(g, &placed)).collect();
+    Ok(Frame { system, load, expansion, nodes, beams, gaps })
 }
 
 /// The elements of every beam, and the points between them along its centreline, ends included.

@@ -35,6 +35,7 @@ pub mod overlap;
 pub mod ports;
 pub mod rigid;
 pub mod scheme;
+pub mod yielded;
 
 pub use crate::options::{Junctions, Scheme};
 

@@ -14,27 +14,27 @@ pub(super) fn bodies(ends: &[Approach; 2]) -> [BodyId; 4] {
 }
 
 /// z = (w, φ) of the first end, then of the second: distances [m] and slopes of one beam against the other [1].
-pub(super) fn values(model: &Model, ends: &[Approach; 2], side: f64, q: &[Pose]) -> Vector4<f64> {
-    let w = |e: &Approach| e.value(q, model.linear);
+pub(super) fn values(linear: bool, ends: &[Approach; 2], side: f64, q: &[Pose]) -> Vector4<f64> {
+    let w = |e: &Approach| e.value(q, linear);
     let turn = |e: &Approach| side * (e.a.rotation(q) - e.b.rotation(q));
     Vector4::new(w(&ends[0]), turn(&ends[0]), w(&ends[1]), turn(&ends[1]))
 }
 
 /// Change of z with a change `dq` of the configuration.
-pub(super) fn changes(model: &Model, ends: &[Approach; 2], side: f64, q: &[Pose], dq: &[Pose]) -> Vector4<f64> {
+pub(super) fn changes(linear: bool, ends: &[Approach; 2], side: f64, q: &[Pose], dq: &[Pose]) -> Vector4<f64> {
     let mut d = Quad::zeros();
     for (i, id) in bodies(ends).into_iter().enumerate() {
         d.fixed_rows_mut::<3>(3 * i).copy_from(&Model::pose(dq, id));
     }
-    rows(model, ends, side, q).0 * d
+    rows(linear, ends, side, q).0 * d
 }
 
 /// ∂z/∂(bodies a, b, c, d), and ∂²w/∂θ² of each body.
-pub(super) fn rows(model: &Model, ends: &[Approach; 2], side: f64, q: &[Pose]) -> (SMatrix<f64, 4, 12>, [f64; 4]) {
+pub(super) fn rows(linear: bool, ends: &[Approach; 2], side: f64, q: &[Pose]) -> (SMatrix<f64, 4, 12>, [f64; 4]) {
     let mut rows = SMatrix::<f64, 4, 12>::zeros();
     let mut bend = [0.0; 4];
     for (e, end) in ends.iter().enumerate() {
-        let m = end.measure(q, model.linear);
+        let m = end.measure(q, linear);
         for i in 0..3 {
             rows[(2 * e, 3 * e + i)] = m.gradient[i];
             rows[(2 * e, 6 + 3 * e + i)] = m.gradient[3 + i];

@@ -6,8 +6,9 @@ use super::contact::Contact;
 use super::facing::Facing;
 use super::facing_ends;
 use super::stop::Stop;
+use crate::multibody::model::locate;
 use crate::multibody::planar::Pose;
-use crate::multibody::{BlockMatrix, BodyId, Model};
+use crate::multibody::{BlockMatrix, BodyId, Pattern};
 use nalgebra::SMatrix;
 
 /// A gap between bodies.
@@ -43,11 +44,11 @@ pub enum Gap {
 }
 
 impl Gap {
-    /// `r += factor·∇C`, and the contact force when `touch`.
-    pub(super) fn add_force(&self, model: &Model, q: &[Pose], factor: f64, touch: bool, r: &mut [Pose]) {
+    /// `r += factor·∇C`, and the contact force when `touch`. `linear`: for small displacements.
+    pub fn add_force(&self, linear: bool, q: &[Pose], factor: f64, touch: bool, r: &mut [Pose]) {
         match self {
             Gap::Single { approach, capacitor, contact } => {
-                let m = approach.measure(q, model.linear);
+                let m = approach.measure(q, linear);
                 let mut first = factor * capacitor.at(m.value).slope;
                 if let (true, Some(contact)) = (touch, contact) {
                     first += contact.force(capacitor.distance(m.value)).0;
@@ -60,12 +61,12 @@ impl Gap {
                 }
             }
             Gap::Facing { ends, side, facing } => {
-                let z = facing_ends::values(model, ends, *side, q);
+                let z = facing_ends::values(linear, ends, *side, q);
                 let mut first = facing.at(&z).gradient * factor;
                 if touch {
                     first += facing.contact(&z).0;
                 }
-                let f = facing_ends::rows(model, ends, *side, q).0.transpose() * first;
+                let f = facing_ends::rows(linear, ends, *side, q).0.transpose() * first;
                 for (i, id) in facing_ends::bodies(ends).into_iter().enumerate() {
                     if let BodyId::Free(k) = id {
                         r[k] += f.fixed_rows::<3>(3 * i);
@@ -76,7 +77,7 @@ impl Gap {
                 if !touch {
                     return;
                 }
-                let m = approach.measure(q, model.linear);
+                let m = approach.measure(q, linear);
                 let first = stop.bearing(ways, m.value).0;
                 if first == 0.0 {
                     return;
@@ -91,11 +92,18 @@ impl Gap {
         }
     }
 
-    /// `tangent += factor·∇²C + contact stiffness`.
-    pub(super) fn add_tangent(&self, model: &Model, q: &[Pose], factor: f64, tangent: &mut BlockMatrix<f64, 3>) {
+    /// `tangent += factor·∇²C + contact stiffness`, on a pattern that couples its bodies.
+    /// `linear`: for small displacements.
+    pub fn add_tangent(
+        &self,
+        (pattern, linear): (&Pattern, bool),
+        q: &[Pose],
+        factor: f64,
+        tangent: &mut BlockMatrix<f64, 3>,
+    ) {
         match self {
             Gap::Single { approach, capacitor, contact } => {
-                let m = approach.measure(q, model.linear);
+                let m = approach.measure(q, linear);
                 let Capacitance { slope, curvature, .. } = capacitor.at(m.value);
                 let (mut first, mut second) = (factor * slope, factor * curvature);
                 if let Some(contact) = contact {
@@ -104,27 +112,27 @@ impl Gap {
                     second -= slope; // the distance shrinks as u grows
                 }
                 let h = m.hessian(first, second);
-                model.place(approach.a.body, approach.b.body).add(tangent, &h);
+                locate(pattern, approach.a.body, approach.b.body).add(tangent, &h);
             }
             Gap::Facing { ends, side, facing } => {
-                let z = facing_ends::values(model, ends, *side, q);
+                let z = facing_ends::values(linear, ends, *side, q);
                 let (field, (touch, stiffness)) = (facing.at(&z), facing.contact(&z));
                 let first = field.gradient * factor + touch;
                 let hz = field.hessian * factor + stiffness;
-                let (rows, bend) = facing_ends::rows(model, ends, *side, q);
+                let (rows, bend) = facing_ends::rows(linear, ends, *side, q);
                 let mut h: SMatrix<f64, 12, 12> = rows.transpose() * hz * rows;
                 for i in 0..4 {
                     // bodies a, b, c, d; ends 0 (a, c) and 1 (b, d)
                     h[(3 * i + 2, 3 * i + 2)] += first[2 * (i % 2)] * bend[i];
                 }
-                add_quad(model, &facing_ends::bodies(ends), &h, tangent);
+                add_quad(pattern, &facing_ends::bodies(ends), &h, tangent);
             }
             Gap::Stop { approach, ways, stop } => {
-                let m = approach.measure(q, model.linear);
+                let m = approach.measure(q, linear);
                 let (first, second) = stop.bearing(ways, m.value);
                 if first != 0.0 {
                     let h = m.hessian(first, second);
-                    model.place(approach.a.body, approach.b.body).add(tangent, &h);
+                    locate(pattern, approach.a.body, approach.b.body).add(tangent, &h);
                 }
             }
         }
@@ -132,7 +140,7 @@ impl Gap {
 }
 
 /// Adds the tangent over four bodies.
-fn add_quad(model: &Model, ids: &[BodyId; 4], h: &SMatrix<f64, 12, 12>, tangent: &mut BlockMatrix<f64, 3>) {
+fn add_quad(pattern: &Pattern, ids: &[BodyId; 4], h: &SMatrix<f64, 12, 12>, tangent: &mut BlockMatrix<f64, 3>) {
     for (i, &row) in ids.iter().enumerate() {
         for (j, &column) in ids.iter().enumerate() {
             let (BodyId::Free(row), BodyId::Free(column)) = (row, column) else { continue };
@@ -140,7 +148,7 @@ fn add_quad(model: &Model, ids: &[BodyId; 4], h: &SMatrix<f64, 12, 12>, tangent:
             if row == column {
                 tangent.diagonal[row] += block;
             } else if row > column
-                && let Some(at) = model.pattern.block(row, column)
+                && let Some(at) = pattern.block(row, column)
             {
                 tangent.below[at] += block;
             }

@@ -12,7 +12,7 @@ impl System {
     /// other gaps.
     pub fn line_load(&self, gap: usize, q: &[Pose], volts: f64) -> Option<(f64, f64)> {
         let Gap::Facing { ends, side, facing } = &self.gaps[gap] else { return None };
-        let z = facing_ends::values(&self.model, ends, *side, q);
+        let z = facing_ends::values(self.model.linear, ends, *side, q);
         let force = facing.at(&z).gradient * (-0.5 * volts * volts) + facing.contact(&z).0;
         Some(((force[0] + force[2]).abs() / facing.length, facing.closest(&z).0))
     }
@@ -23,7 +23,7 @@ impl System {
         let slope = match &self.gaps[gap] {
             Gap::Single { approach, capacitor, .. } => capacitor.at(approach.value(q, self.model.linear)).slope,
             Gap::Facing { ends, side, facing } => {
-                let gradient = facing.at(&facing_ends::values(&self.model, ends, *side, q)).gradient;
+                let gradient = facing.at(&facing_ends::values(self.model.linear, ends, *side, q)).gradient;
                 -(gradient[0] + gradient[2])
             }
             Gap::Stop { .. } => 0.0,
@@ -42,8 +42,8 @@ impl System {
                 (slope, curvature * along)
             }
             Gap::Facing { ends, side, facing } => {
-                let c = facing.at(&facing_ends::values(&self.model, ends, *side, q));
-                let dz = c.hessian * facing_ends::changes(&self.model, ends, *side, q, dq);
+                let c = facing.at(&facing_ends::values(self.model.linear, ends, *side, q));
+                let dz = c.hessian * facing_ends::changes(self.model.linear, ends, *side, q, dq);
                 (-(c.gradient[0] + c.gradient[2]), -(dz[0] + dz[2]))
             }
             Gap::Stop { .. } => return 0.0,

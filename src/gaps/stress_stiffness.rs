@@ -48,7 +48,7 @@ impl System {
                     pair(approach, factor * capacitor.at(u).slope + touch);
                 }
                 Gap::Facing { ends, side, facing } => {
-                    let z = facing_ends::values(&self.model, ends, *side, q);
+                    let z = facing_ends::values(self.model.linear, ends, *side, q);
                     let first = facing.at(&z).gradient * factor + facing.contact(&z).0;
                     pair(&ends[0], first[0]);
                     pair(&ends[1], first[2]);

@@ -66,7 +66,7 @@ impl System {
     /// has its own way with joints needs only this of a system.
     pub fn add_body_forces(&self, q: &[Pose], drive: &Drive, r: &mut [Pose]) {
         for (gap, &volts) in self.gaps.iter().zip(&drive.volts) {
-            gap.add_force(&self.model, q, -0.5 * volts * volts, true, r);
+            gap.add_force(self.model.linear, q, -0.5 * volts * volts, true, r);
         }
         self.add_loads(q, -drive.load, r);
         self.add_input_forces(q, drive, r);
@@ -75,7 +75,7 @@ impl System {
     /// `tangent +=` the share of gaps, contacts and dead loads in ∂r/∂q.
     pub fn add_body_tangent(&self, q: &[Pose], drive: &Drive, tangent: &mut BlockMatrix<f64, 3>) {
         for (gap, &volts) in self.gaps.iter().zip(&drive.volts) {
-            gap.add_tangent(&self.model, q, -0.5 * volts * volts, tangent);
+            gap.add_tangent((&self.model.pattern, self.model.linear), q, -0.5 * volts * volts, tangent);
         }
         self.add_load_tangent(q, -drive.load, tangent);
         self.add_input_tangent(q, drive, tangent);
@@ -107,7 +107,7 @@ impl System {
         forces::add_rest_change(&self.model, q, &change.rest(), out);
         for ((gap, &volts), &dv) in self.gaps.iter().zip(&drive.volts).zip(&change.volts) {
             if dv != 0.0 {
-                gap.add_force(&self.model, q, -volts * dv, false, out);
+                gap.add_force(self.model.linear, q, -volts * dv, false, out);
             }
         }
         if change.load != 0.0 {
@@ -121,7 +121,9 @@ impl System {
     pub fn capacitance(&self, gap: usize, q: &[Pose]) -> f64 {
         match &self.gaps[gap] {
             Gap::Single { approach, capacitor, .. } => capacitor.at(approach.value(q, self.model.linear)).value,
-            Gap::Facing { ends, side, facing } => facing.at(&facing_ends::values(&self.model, ends, *side, q)).value,
+            Gap::Facing { ends, side, facing } => {
+                facing.at(&facing_ends::values(self.model.linear, ends, *side, q)).value
+            }
             Gap::Stop { .. } => 0.0,
         }
     }
@@ -136,8 +138,8 @@ impl System {
                 capacitor.at(m.value).slope * (g.fixed_rows::<3>(0).dot(&da) + g.fixed_rows::<3>(3).dot(&db))
             }
             Gap::Facing { ends, side, facing } => {
-                let c = facing.at(&facing_ends::values(&self.model, ends, *side, q));
-                c.gradient.dot(&facing_ends::changes(&self.model, ends, *side, q, dq))
+                let c = facing.at(&facing_ends::values(self.model.linear, ends, *side, q));
+                c.gradient.dot(&facing_ends::changes(self.model.linear, ends, *side, q, dq))
             }
             Gap::Stop { .. } => 0.0,
         }
@@ -148,7 +150,9 @@ impl System {
     pub fn distance(&self, gap: usize, q: &[Pose]) -> f64 {
         match &self.gaps[gap] {
             Gap::Single { approach, capacitor, .. } => capacitor.distance(approach.value(q, self.model.linear)),
-            Gap::Facing { ends, side, facing } => facing.closest(&facing_ends::values(&self.model, ends, *side, q)).0,
+            Gap::Facing { ends, side, facing } => {
+                facing.closest(&facing_ends::values(self.model.linear, ends, *side, q)).0
+            }
             Gap::Stop { approach, ways, .. } => stop::nearer(ways, approach.value(q, self.model.linear)).0,
         }
     }
@@ -163,8 +167,8 @@ impl System {
             Gap::Single { approach, capacitor: Capacitor::Comb { .. }, .. } => along(approach),
             Gap::Single { approach, .. } => -along(approach),
             Gap::Facing { ends, side, facing } => {
-                let (_, weights) = facing.closest(&facing_ends::values(&self.model, ends, *side, q));
-                weights.dot(&facing_ends::changes(&self.model, ends, *side, q, dq))
+                let (_, weights) = facing.closest(&facing_ends::values(self.model.linear, ends, *side, q));
+                weights.dot(&facing_ends::changes(self.model.linear, ends, *side, q, dq))
             }
             Gap::Stop { approach, ways, .. } => {
                 stop::nearer(ways, approach.value(q, self.model.linear)).1 * along(approach)

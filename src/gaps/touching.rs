@@ -43,7 +43,7 @@ impl System {
             Gap::Single { contact: None, .. } => 0.0,
             Gap::Single { contact: Some(contact), .. } => contact.energy(self.distance(g, q)),
             Gap::Facing { ends, side, facing } => {
-                facing.contact_energy(&facing_ends::values(&self.model, ends, *side, q))
+                facing.contact_energy(&facing_ends::values(self.model.linear, ends, *side, q))
             }
             Gap::Stop { approach, ways, stop } => {
                 let u = approach.value(q, self.model.linear);
@@ -63,11 +63,11 @@ impl System {
                 if force == 0.0 { 0.0 } else { force * self.distance_slope(g, q, dq) }
             }
             Gap::Facing { ends, side, facing } => {
-                let force = facing.contact(&facing_ends::values(&self.model, ends, *side, q)).0;
+                let force = facing.contact(&facing_ends::values(self.model.linear, ends, *side, q)).0;
                 if force.x == 0.0 && force.z == 0.0 {
                     0.0
                 } else {
-                    force.dot(&facing_ends::changes(&self.model, ends, *side, q, dq))
+                    force.dot(&facing_ends::changes(self.model.linear, ends, *side, q, dq))
                 }
             }
             Gap::Stop { stop, .. } => {

@@ -21,7 +21,7 @@ pub use samples::{Samples, Sampling};
 pub use table::{SweepRow, SweepTable};
 
 use crate::budget::{self, Budget, Stopped};
-use crate::compile::CompileOptions;
+use crate::compile::{CompileError, CompileOptions, Drawn, draw};
 use crate::netlist::{Bundle, Setting, Source};
 use family::Family;
 use journal::Kept;
@@ -163,6 +163,14 @@ pub enum SweepError {
 pub fn check_names(spec: &SweepSpec, bundle: &Bundle, options: &CompileOptions) -> Result<(), SweepError> {
     spec.point_numbers()?;
     point::check_names(spec, &Source::new(bundle), options)
+}
+
+/// What is drawn at the first point, with what the netlist is warned of there.
+///
+/// # Errors
+/// What the point would have for an error.
+pub fn first_drawn(spec: &SweepSpec, bundle: &Bundle, options: &CompileOptions) -> Result<Drawn, CompileError> {
+    draw(&Source::new(bundle), &point::at(options, &spec.settings(0)))
 }
 
 /// Runs a sweep; under a budget, each point has all of its allowance, and the rows together have it once more. `progress` is told after every point, from any thread, and answers whether to go on.

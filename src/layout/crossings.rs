@@ -1,8 +1,8 @@
 //! How many times edges of polygons cut one another: what set operations on them lay out, known before they do.
 //!
-//! A sweep over x: edges that it has reached and not yet left lie in a tree over y, each at the O(log n) nodes that cover its range,
-//! and a new edge is tried with those whose range meets its own. O(n·log n) where edges are along x or y, and never more than
-//! all pairs.
+//! Contours are taken in runs of a few edges. A sweep over x: runs that it has reached and not yet left lie in a tree over y, each at the
+//! O(log n) nodes that cover its range, and the edges of a new run are tried with those of the runs whose range meets its own. O(n·log n)
+//! where edges are along x or y, and never more than all pairs.
 //!
 //! Reference: F. P. Preparata, M. I. Shamos, "Computational Geometry" (1985), 8.8 (rectangles that meet, by interval trees).
 
@@ -12,10 +12,17 @@ use thiserror::Error;
 /// Cuts that set operations take on: some 200 bytes each.
 pub const MOST_CUTS: usize = 4_000_000;
 const BYTES_PER_CUT: usize = 200;
+/// What counting holds for each edge.
+const BYTES_PER_EDGE: usize = 200;
+/// Pairs of runs that are tried: long lines side by side on a slope, none of which cut another, come to that.
+const MOST_TRIED: usize = 50_000_000;
 
 /// Polygons whose union could be too large to hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
-#[error("its polygons cut one another in more than {MOST_CUTS} places, about point {} {} of its grid", .at[0], .at[1])]
+#[error(
+    "its polygons cut one another in more than {MOST_CUTS} places, or many long slanted ones lie side by side, about point {} {} of its \
+     grid", .at[0], .at[1]
+)]
 pub struct Tangled {
     /// Where the counting ended [database units].
     pub at: Point,
@@ -26,13 +33,14 @@ pub struct Tangled {
 /// # Errors
 /// [`Tangled`] beyond [`MOST_CUTS`].
 pub(super) fn bounded<'a>(polygons: impl Iterator<Item = &'a Polygon>) -> Result<(), Tangled> {
-    let mut edges: Vec<Edge> = polygons.flat_map(|p| &p.contours).flat_map(|c| edges_of(c)).collect();
+    let edges: Vec<Vec<Edge>> = polygons.flat_map(|p| &p.contours).map(|c| edges_of(c).collect()).collect();
+    let all = edges.iter().map(Vec::len).sum::<usize>();
     // fewer pairs than cuts that are taken on
-    if edges.len().saturating_mul(edges.len()) / 2 <= MOST_CUTS {
+    if all.saturating_mul(all) / 2 <= MOST_CUTS {
         return Ok(());
     }
-    edges.sort_unstable_by_key(|e| e.a);
-    let cuts = Sweep::new(&edges).count(MOST_CUTS)?;
+    crate::budget::lay_out(all.saturating_mul(BYTES_PER_EDGE));
+    let cuts = Sweep::new(runs(&edges)).count(MOST_CUTS)?;
     crate::budget::lay_out(cuts.saturating_mul(BYTES_PER_CUT));
     Ok(())
 }
@@ -58,6 +66,10 @@ impl Edge {
         self.a[1].max(self.b[1])
     }
 
+    fn apart(&self, other: &Self) -> bool {
+        self.b[0] < other.a[0] || other.b[0] < self.a[0] || self.high() < other.low() || other.high() < self.low()
+    }
+
     /// On which side of the edge's line a point lies.
     fn side(&self, p: Point) -> i128 {
         let [ux, uy, vx, vy] =
@@ -67,6 +79,9 @@ impl Edge {
 
     /// True when one of the two is divided where they meet: not for edges that share their ends alone, and not for equal ones.
     fn cuts(&self, other: &Self) -> bool {
+        if self.apart(other) {
+            return false;
+        }
         let (p, q) = (self.side(other.a), self.side(other.b));
         let (r, s) = (other.side(self.a), other.side(self.b));
         if (p, q, r, s) == (0, 0, 0, 0) {
@@ -78,54 +93,96 @@ impl Edge {
     }
 }
 
-/// Edges in the tree, by the nodes that cover their range of y.
-struct Sweep<'a> {
+/// Edges of a contour one after the other, and the box around them.
+#[derive(Debug, Clone, Copy)]
+struct Run<'a> {
     edges: &'a [Edge],
+    low: Point,
+    high: Point,
+}
+
+/// Most edges of a run.
+const RUN: usize = 8;
+
+/// The runs of contours from left to right.
+fn runs(contours: &[Vec<Edge>]) -> Vec<Run<'_>> {
+    let run = |edges| {
+        let run = Run { edges, low: [i32::MAX; 2], high: [i32::MIN; 2] };
+        edges.iter().fold(run, |run: Run, e| Run {
+            low: [run.low[0].min(e.a[0]), run.low[1].min(e.low())],
+            high: [run.high[0].max(e.b[0]), run.high[1].max(e.high())],
+            ..run
+        })
+    };
+    let mut runs: Vec<Run> = contours.iter().flat_map(|c| c.chunks(RUN)).map(run).collect();
+    runs.sort_by_key(|r| r.low);
+    runs
+}
+
+impl Run<'_> {
+    /// Cuts among its own edges.
+    fn own(&self) -> usize {
+        let before = |k: usize| self.edges[..k].iter();
+        self.edges.iter().enumerate().map(|(k, e)| before(k).filter(|f| e.cuts(f)).count()).sum()
+    }
+
+    fn cuts(&self, other: &Self) -> usize {
+        self.edges.iter().map(|e| other.edges.iter().filter(|f| e.cuts(f)).count()).sum()
+    }
+}
+
+/// Runs in the tree, by the nodes that cover their range of y.
+struct Sweep<'a> {
+    runs: Vec<Run<'a>>,
     /// Ends of ranges, in order.
     places: Vec<i32>,
     /// Leaves, a power of two.
     leaves: usize,
     at: Vec<Vec<u32>>,
-    /// Edges at a node and below.
+    /// Runs at a node and below.
     below: Vec<u32>,
-    /// By edge, the last one that was tried with it.
-    tried: Vec<u32>,
+    /// By run, the last one that was tried with it.
+    last: Vec<u32>,
+    /// Pairs that were tried.
+    tried: usize,
 }
 
 impl<'a> Sweep<'a> {
-    fn new(edges: &'a [Edge]) -> Self {
-        let mut places: Vec<i32> = edges.iter().flat_map(|e| [e.low(), e.high()]).collect();
+    fn new(runs: Vec<Run<'a>>) -> Self {
+        let mut places: Vec<i32> = runs.iter().flat_map(|r| [r.low[1], r.high[1]]).collect();
         places.sort_unstable();
         places.dedup();
         let leaves = places.len().next_power_of_two();
         let (at, below) = (vec![Vec::new(); 2 * leaves], vec![0; 2 * leaves]);
-        Self { edges, places, leaves, at, below, tried: vec![u32::MAX; edges.len()] }
+        let last = vec![u32::MAX; runs.len()];
+        Self { runs, places, leaves, at, below, last, tried: 0 }
     }
 
     fn count(&mut self, most: usize) -> Result<usize, Tangled> {
         let mut cuts = 0;
-        for k in 0..self.edges.len() {
+        for k in 0..self.runs.len() {
             crate::budget::check();
-            let range = [self.edges[k].low(), self.edges[k].high()].map(|y| self.places.partition_point(|p| *p < y));
-            cuts += self.meet(k, range, 1, [0, self.leaves - 1]);
-            if cuts > most {
-                return Err(Tangled { at: self.edges[k].a });
+            let run = self.runs[k];
+            let range = [run.low[1], run.high[1]].map(|y| self.places.partition_point(|p| *p < y));
+            cuts += run.own() + self.meet(k, range, 1, [0, self.leaves - 1]);
+            if cuts > most || self.tried > MOST_TRIED {
+                return Err(Tangled { at: run.low });
             }
             self.enter(k, range, 1, [0, self.leaves - 1]);
         }
         Ok(cuts)
     }
 
-    /// Cuts of an edge with those at a node and below whose ranges meet its own; those that the sweep has left are dropped.
+    /// Cuts of a run with those at a node and below whose ranges meet its own; those that the sweep has left are dropped.
     fn meet(&mut self, k: usize, range: [usize; 2], node: usize, [first, last]: [usize; 2]) -> usize {
         if self.below[node] == 0 || range[1] < first || last < range[0] {
             return 0;
         }
-        let edge = self.edges[k];
+        let run = self.runs[k];
         let (mut cuts, mut i) = (0, 0);
         while let Some(&other) = self.at[node].get(i) {
-            let found = &self.edges[other as usize];
-            if found.b[0] < edge.a[0] {
+            let found = &self.runs[other as usize];
+            if found.high[0] < run.low[0] {
                 self.at[node].swap_remove(i);
                 let mut up = node;
                 while up > 0 {
@@ -134,8 +191,9 @@ impl<'a> Sweep<'a> {
                 }
                 continue;
             }
-            if std::mem::replace(&mut self.tried[other as usize], k as u32) != k as u32 {
-                cuts += usize::from(edge.cuts(found));
+            if std::mem::replace(&mut self.last[other as usize], k as u32) != k as u32 {
+                self.tried += 1;
+                cuts += run.cuts(found);
             }
             i += 1;
         }
@@ -173,9 +231,8 @@ mod tests {
     use proptest::prelude::*;
 
     fn count(polygons: &[Polygon]) -> usize {
-        let mut edges: Vec<Edge> = polygons.iter().flat_map(|p| &p.contours).flat_map(|c| edges_of(c)).collect();
-        edges.sort_unstable_by_key(|e| e.a);
-        Sweep::new(&edges).count(usize::MAX).unwrap()
+        let edges: Vec<Vec<Edge>> = polygons.iter().flat_map(|p| &p.contours).map(|c| edges_of(c).collect()).collect();
+        Sweep::new(runs(&edges)).count(usize::MAX).unwrap()
     }
 
     fn bars(n: i32) -> Vec<Polygon> {

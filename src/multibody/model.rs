@@ -229,11 +229,6 @@ impl Model {
         self.joints[k].whole(self.section(&self.joints[k]))
     }
 
-    /// Where a pair's blocks lie.
-    pub(crate) fn place(&self, a: BodyId, b: BodyId) -> Place {
-        locate(&self.pattern, a, b)
-    }
-
     /// The mass matrix' diagonal of one body.
     #[inline]
     pub fn mass(&self, body: usize) -> Pose {
@@ -283,7 +278,8 @@ impl Model {
     }
 }
 
-fn locate(pattern: &Pattern, a: BodyId, b: BodyId) -> Place {
+/// Where a pair's blocks lie on a pattern.
+pub(crate) fn locate(pattern: &Pattern, a: BodyId, b: BodyId) -> Place {
     let index = |id| match id {
         BodyId::Ground => NONE,
         BodyId::Free(k) => k as u32,

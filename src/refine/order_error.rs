@@ -34,7 +34,7 @@
 use super::reference::{Compared, Pencil, compare};
 use super::span::{Span, spans};
 use crate::discretize::bar::bar;
-use crate::discretize::frame::{Elements, Frame, FrameOptions, assemble};
+use crate::discretize::frame::{Elements, Frame, FrameGaps, FrameOptions, assemble};
 use crate::discretize::{Discretized, cubic, order};
 use crate::multibody::linear_system::LinearSystem;
 use crate::multibody::planar::Pose;
@@ -154,7 +154,8 @@ fn by_frame(
     shapes: &[Vec<Pose>],
 ) -> Option<OrderError> {
     let elements = Elements::Beams(parts.beams.iter().map(|b| b.len() - 1).collect());
-    let frame = assemble(structure, &FrameOptions { elements, shear: options.shear, undamped: true }).ok()?;
+    let gaps = FrameGaps::LeftOut;
+    let frame = assemble(structure, &FrameOptions { elements, shear: options.shear, undamped: true, gaps }).ok()?;
     let system = &frame.system;
     let mut shift = 0.0;
     let mut factor = system.combine(1.0, 0.0, 0.0);

@@ -122,23 +122,27 @@ impl Continuation {
         traced: &mut Traced,
     ) -> Option<Place> {
         if here.ds * next.ds < 0.0 {
-            let fold = self.find_fold(family, here, next, step);
+            let (fold, located) = self.find_fold(family, here, next, step);
             // a fold changes the inertia; where s turns back without, this is a branch that comes back to its path
             let crossing = here.negative == next.negative;
             traced.events.push((if crossing { Event::Bifurcation } else { Event::Fold }, traced.points.len()));
+            traced.rough.extend((!located).then_some(traced.points.len()));
             traced.points.push(point(&fold));
             return if crossing { self.rejoin(family, &fold) } else { None };
         }
         if here.negative == next.negative {
             return None;
         }
-        let at = self.find_bifurcation(family, here, next.negative, step);
+        let (at, located) = self.find_bifurcation(family, here, next.negative, step);
         traced.events.push((Event::Bifurcation, traced.points.len()));
+        traced.rough.extend((!located).then_some(traced.points.len()));
         traced.points.push(point(&at));
         if self.options.branch == Branch::Stay || next.negative < here.negative {
             return None;
         }
-        self.branch_off(family, &at)
+        let branch = self.branch_off(family, &at);
+        traced.stayed.extend(branch.is_none().then_some(traced.points.len() - 1));
+        branch
     }
 
     /// The point at the last s exactly, from the two points around it.

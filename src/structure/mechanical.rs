@@ -149,4 +149,6 @@ pub struct Yield {
     pub stress: f64,
     /// Temperature at which no strength is left [K].
     pub softening: f64,
+    /// What it has yielded so far [1]; negative: shorter. 0 as drawn.
+    pub strain: f64,
 }

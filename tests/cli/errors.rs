@@ -43,6 +43,24 @@ fn a_netlist_with_a_slip() {
     assert!(message.contains("bad.net:4") && message.contains("positive"), "{message}");
 }
 
+/// What an analysis would ignore is refused, not swallowed.
+#[test]
+fn options_of_another_analysis() {
+    let bench = Bench::new(&[("plate.net", PLATE), ("beam.net", CANTILEVER)]);
+    for (words, option) in [
+        ("sweep plate.net --param gap=1u,2u --analysis pullin --port drive=5", "--port"),
+        ("sweep plate.net --param gap=1u,2u --analysis modes --signals m.x", "--signals"),
+        ("sweep plate.net --param gap=1u,2u --count 3", "--count"),
+        ("sweep plate.net --param gap=1u,2u --max 9", "--max"),
+        ("sweep plate.net --param gap=1u,2u --threads 1 --to unix:///nowhere", "--threads"),
+        ("tran beam.net --stop 1u --solver frame --method tr-bdf2", "--method"),
+        ("tran beam.net --stop 1u --solver frame --step 1n", "--step"),
+    ] {
+        let message = fails(&bench, words);
+        assert!(message.contains(option), "{words}: {message}");
+    }
+}
+
 /// A part that nothing holds has no equilibrium: the message names it.
 #[test]
 fn a_structure_that_can_move_freely() {

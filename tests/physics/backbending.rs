@@ -1,7 +1,7 @@
 //! Backbending: hot arms that were heated too far are shorter ever after.
 
 use crate::{close, model, node};
-use bimorph::analysis::backbending::backbend;
+use bimorph::analysis::backbending::{backbend, static_backbent};
 use bimorph::analysis::statics::static_equilibrium;
 use bimorph::compile::{CompileOptions, Compiled, Junctions, compile};
 use bimorph::netlist::{Bundle, Setting};
@@ -40,13 +40,14 @@ fn a_clamped_bar_yields_to_its_strength() {
 }
 
 fn bank() -> Compiled {
+    bank_with(CompileOptions::default())
+}
+
+fn bank_with(options: CompileOptions) -> Compiled {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/bank/bank.net");
     let set = vec![("comb".to_owned(), Setting::Number(0.0))];
-    compile(
-        &Bundle::read(&path, &[]).unwrap(),
-        &CompileOptions { set, junctions: Junctions::Centreline, ..CompileOptions::default() },
-    )
-    .unwrap()
+    compile(&Bundle::read(&path, &[]).unwrap(), &CompileOptions { set, junctions: Junctions::Centreline, ..options })
+        .unwrap()
 }
 
 /// The bank bends down while it is hot. Heated beyond the strength of its hot arms and cooled again it rests bent up, by
@@ -67,6 +68,25 @@ fn a_bank_rests_bent_the_other_way() {
     let held = backbend(&bank, &volts("heat", 2.0)).unwrap();
     assert!(held.strains.iter().all(|(_, e)| *e == 0.0));
     assert_eq!(rest(&held.compiled), rest(&bank));
+}
+
+/// The same through the front that users use, on the mesh that it takes for itself: at three tolerances the yoke rests where the same
+/// bank rests on eight times the segments within the tolerance, and the estimate says so.
+#[test]
+fn what_has_yielded_stays_on_every_mesh() {
+    let at = |tol: f64, segments: Option<usize>| {
+        let bank = bank_with(CompileOptions { tol, segments, ..CompileOptions::default() });
+        let (fitted, found, _, strains) = static_backbent(&bank, &volts("heat", 3.2), &[]).unwrap();
+        assert!(strains.iter().any(|(_, e)| *e < -1e-5), "{strains:?}");
+        (node(&found, "yoke").y, fitted.order.estimated_error)
+    };
+    let (exact, _) = at(1e-3, Some(24));
+    assert!(exact > 1e-7, "{exact}");
+    for tol in [1e-2, 1e-3, 1e-4] {
+        let (y, told) = at(tol, None);
+        assert!(told.is_some_and(|told| told <= tol), "{tol}: {told:?}");
+        close(y, exact, tol);
+    }
 }
 
 /// A mechanism without strengths is told so.

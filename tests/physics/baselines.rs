@@ -5,7 +5,7 @@ use bimorph::analysis::frame::{frame, frame_modes, frame_statics, frame_transien
 use bimorph::analysis::modes::modes;
 use bimorph::analysis::transient::{TransientOptions, transient};
 use bimorph::compile::{CompileOptions, Compiled, Junctions, compile};
-use bimorph::discretize::frame::{Elements, FrameOptions};
+use bimorph::discretize::frame::{Elements, FrameGaps, FrameOptions};
 use bimorph::netlist::{Bundle, Setting};
 use bimorph::solve::baseline::SolverKind;
 use std::path::Path;
@@ -63,7 +63,7 @@ fn fine_bank() -> Compiled {
 
 fn fine_modes(elements: usize, shear: bool) -> Vec<f64> {
     let compiled = fine_bank();
-    let options = FrameOptions { elements: Elements::Each(elements), shear, undamped: false };
+    let options = FrameOptions { elements: Elements::Each(elements), shear, undamped: false, gaps: FrameGaps::LeftOut };
     let frame = frame_with(&compiled, &options).unwrap();
     frame_modes(&compiled, &frame, 10, &[]).unwrap().0.frequencies_hz
 }

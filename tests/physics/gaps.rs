@@ -1,6 +1,7 @@
 //! Combs, plates and facing beams.
 
 use crate::{balance, close, model, node};
+use bimorph::analysis::frame::{frame, frame_modes};
 use bimorph::analysis::modes::modes;
 use bimorph::analysis::pull_in::pull_in;
 use bimorph::compile::CompileOptions;
@@ -96,32 +97,49 @@ fn facing_beams() {
     assert!(0.0 < release && release < 0.8 * found.pull_in_v, "{found:?}");
 }
 
+/// Two arms of two beams each that face each other across a gap under a voltage.
+fn facing_arms(volts: f64) -> String {
+    format!(
+        "process s = [ Poisson=0.3 Youngsmodulus=165e9 density=2300 viscosity=1.78e-5 fluid=2e-6 permittivity=8.854e-12
+           sheetresistance=20 stress=0 straingradient=0 thermalexpansion=2.6e-6 ambienttemperature=0 h=550u ]
+         anchor s [A] [l=5u w=10u oz=pi]
+         beam2de s [A b] [l=10u w=4u h=40u R=100]
+         beam2de s [b c] [l=50u w=4u h=40u R=100]
+         beam2de s [D E] [l=50u w=4u h=40u R=100]
+         beam2de s [E F] [l=10u w=4u h=40u R=100]
+         gap2dforce s [b c D E] [l=50u w1=4u w2=4u gap=4.834u]
+         anchor s [F] [l=5u w=10u]
+         Vsrc * [A G] [V={volts}]
+         eground * [G] []
+         eground * [F] []"
+    )
+}
+
 /// As SUGAR 2 computes, two tilted cantilevers that attract one another stand where it puts them. Source: SUGAR 2 under Octave on
 /// its gap-closing actuator (electrodes 550 µm high), at 40 and 100 V: y and rotation of a free end, eleven digits of which hold.
 #[test]
 fn facing_beams_as_sugar() {
-    let text = |volts: f64| {
-        format!(
-            "process s = [ Poisson=0.3 Youngsmodulus=165e9 density=2300 viscosity=1.78e-5 fluid=2e-6 permittivity=8.854e-12
-               sheetresistance=20 stress=0 straingradient=0 thermalexpansion=2.6e-6 ambienttemperature=0 h=550u ]
-             anchor s [A] [l=5u w=10u oz=pi]
-             beam2de s [A b] [l=10u w=4u h=40u R=100]
-             beam2de s [b c] [l=50u w=4u h=40u R=100]
-             beam2de s [D E] [l=50u w=4u h=40u R=100]
-             beam2de s [E F] [l=10u w=4u h=40u R=100]
-             gap2dforce s [b c D E] [l=50u w1=4u w2=4u gap=4.834u]
-             anchor s [F] [l=5u w=10u]
-             Vsrc * [A G] [V={volts}]
-             eground * [G] []
-             eground * [F] []"
-        )
-    };
     let as_sugar = CompileOptions { as_sugar: true, ..CompileOptions::default() };
     for (volts, y, rz) in
         [(40.0, -7.7283509311554e-9, -1.71963306618205e-4), (100.0, -4.91847747700838e-8, -1.09440895995529e-3)]
     {
-        let c = node(&balance(&model(&text(volts), &as_sugar), &[]), "c");
+        let c = node(&balance(&model(&facing_arms(volts), &as_sugar), &[]), "c");
         close(c.y, y, 1e-11);
         close(c.rz, rz, 1e-11);
+    }
+}
+
+/// Their modes under voltage, one cubic element for each beam: the eigenvalues of the matrices that SUGAR 2.0 makes, symmetric part
+/// (`cho_mode` itself takes them as they are, and differs from that by up to 2.1e-6), to 5e-9.
+#[test]
+fn modes_of_facing_beams_as_sugar() {
+    let as_sugar = CompileOptions { as_sugar: true, ..CompileOptions::default() };
+    for (volts, wanted) in [(40.0, [1522092.33007423, 1523834.83686117]), (100.0, [1508020.75559287, 1519279.55184219])]
+    {
+        let compiled = model(&facing_arms(volts), &as_sugar);
+        let found = frame_modes(&compiled, &frame(&compiled).unwrap(), 2, &[]).unwrap().0;
+        for (found, wanted) in found.frequencies_hz.iter().zip(wanted) {
+            close(*found, wanted, 5e-9);
+        }
     }
 }

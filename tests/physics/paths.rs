@@ -1,7 +1,7 @@
 //! Equilibrium paths by arc length: buckling, post-buckling, snap-through, pull-in and what lies behind it.
 
 use crate::{close, model};
-use bimorph::analysis::continuation::{ContinuationRequest, ContinuationResult, Growing, trace};
+use bimorph::analysis::continuation::{ContinuationRequest, ContinuationResult, Growing, trace, trace_fitted};
 use bimorph::compile::{CompileOptions, Compiled, Junctions, compile};
 use bimorph::netlist::{Bundle, Setting};
 use bimorph::solve::continuation::Branch;
@@ -74,6 +74,39 @@ fn column() {
     assert_eq!(straight.negative.last(), Some(&1));
     assert!(straight.signals[0].2.iter().all(|y| y.abs() < 1e-12));
     close(*straight.signals[1].2.last().unwrap(), -1.2 * EULER * L / (E * W * W), 1e-6);
+}
+
+/// The mesh of a path holds the tolerance without being told how fine it must be: Euler's load and the bend at 1.2 times that, each against
+/// the same on 128 segments; the estimate is within the tolerance and no smaller than a third of the error. `--linear`, which cannot
+/// buckle, says so.
+#[test]
+fn the_mesh_of_a_path_holds_the_tolerance() {
+    let to = 1.2 * EULER;
+    let found = |options: &CompileOptions| {
+        let at = |force: f64| scene("column/column.net", &[("F", force)], options);
+        let (first, last) = (at(0.0), at(to));
+        let request = ContinuationRequest {
+            growing: Growing::Parameter(&last),
+            from: 0.0,
+            to,
+            voltages: vec![],
+            signals: vec!["middle.y".to_owned()],
+            branch: Branch::Plus,
+            points: 3000,
+        };
+        trace_fitted(&first, &request, &mut |_| true).unwrap()
+    };
+    let both = |path: &ContinuationResult| [path.bifurcations[0].value, *path.signals[0].2.last().unwrap()];
+    let exact = both(&found(&CompileOptions { segments: Some(128), ..CompileOptions::default() }).1);
+    for tol in [1e-2, 1e-3, 1e-4] {
+        let (fitted, path) = found(&CompileOptions { tol, ..CompileOptions::default() });
+        let told = fitted.order.estimated_error.unwrap();
+        let error = both(&path).iter().zip(exact).map(|(a, b)| (a / b - 1.0).abs()).fold(0.0, f64::max);
+        assert!(error <= tol && told <= tol && 3.0 * told >= error, "{tol}: off by {error}, told {told}");
+    }
+    let (linear, path) = found(&CompileOptions { linear: true, ..CompileOptions::default() });
+    assert!(path.bifurcations.is_empty());
+    assert!(linear.warnings.items.iter().any(|d| d.message.contains("would buckle")), "{:?}", linear.warnings);
 }
 
 /// Two segments find Euler's load of a column pinned at both ends, π²·E·I/l², within 1 % (its half is a cantilever of one

@@ -7,7 +7,7 @@ use bimorph::analysis::frame::{frame_modes, frame_with};
 use bimorph::analysis::modes::{ModesResult, modes};
 use bimorph::compile::{CompileOptions, Compiled};
 use bimorph::discretize::Scheme;
-use bimorph::discretize::frame::{Elements, FrameOptions};
+use bimorph::discretize::frame::{Elements, FrameGaps, FrameOptions};
 use bimorph::multibody::BlockMatrix;
 use bimorph::multibody::planar::Pose;
 
@@ -271,7 +271,8 @@ fn thick_beams() {
         (compiled, found)
     };
     let (compiled, fine) = thick(16);
-    let options = FrameOptions { elements: Elements::Each(64), shear: true, undamped: true };
+    let (elements, gaps) = (Elements::Each(64), FrameGaps::LeftOut);
+    let options = FrameOptions { elements, shear: true, undamped: true, gaps };
     let frame = frame_with(&compiled, &options).unwrap();
     let want = frame_modes(&compiled, &frame, 3, &[]).unwrap().0.frequencies_hz;
     let errors = |found: &ModesResult| -> Vec<f64> {

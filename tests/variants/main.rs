@@ -178,6 +178,19 @@ fn rows_tell_what_the_commands_tell() {
         let told: Vec<bool> = table.rows.iter().map(|row| row.warning.contains("W041: the linear model")).collect();
         assert_eq!(told, [false, true, true], "{:?}", table.rows);
     }
+    // beyond Euler's load modes grow; a part that is pulled in, and one that stays closed
+    let buckled = SweepAnalysis::Modes { count: 1, voltages: Vec::new() };
+    let linear = CompileOptions { linear: true, ..CompileOptions::default() };
+    let table = swept(pressed, &["F=1u,40u"], buckled, &linear, Shard::default());
+    let told: Vec<bool> = table.rows.iter().map(|row| row.warning.contains("the equilibrium is unstable")).collect();
+    assert_eq!(told, [false, true], "{:?}", table.rows);
+    let plate = "param V=1\nanchor * [f] [l=1u w=1u h=1u]\nmass2d * [m] [m=1e-10]\nguide2d * [m] []\nspring2d * [f m] [kx=1]\n\
+                 anchor * [e] [l=1u w=1u h=1u]\ngap plategap2d * [m e] [A=1e-8 gap=2u]\neground * [e] []\nVsrc * [m e] [V=V]\n";
+    let outputs = vec!["m.x".to_owned()];
+    let still = SweepAnalysis::Static { outputs, voltages: Vec::new() };
+    let table = swept(plate, &["V=1,9"], still, &CompileOptions::default(), Shard::default());
+    let told: Vec<bool> = table.rows.iter().map(|row| row.warning.contains("pulled in on the way")).collect();
+    assert_eq!(told, [false, true], "{:?}", table.rows);
     let pulled = include_str!("../netlists/accuracy/cantilever_gap.net").replacen("n = 8 ", "param n=8 ", 1);
     let closing = SweepAnalysis::PullIn { port: None, max: 200.0 };
     let table = swept(&pulled, &["n=1,2"], closing, &CompileOptions::default(), Shard::default());

@@ -244,6 +244,12 @@ pub fn harmonic(
         _ => None,
     };
     let (values, lost) = swept(&mut exact, sum.as_ref().filter(|_| options.by_modes), &frequencies_hz, &known, watch)?;
+    if let Some(error) = modal_error.filter(|error| *error > compiled.options.tol) {
+        warnings.push(format!(
+            "the sum over modes is up to {error:.1e} off the exact response, more than the tolerance {:e}; leave --by-modes away",
+            compiled.options.tol
+        ));
+    }
     if lost > 0 {
         warnings.push(format!(
             "nothing damps a resonance at {lost} of the frequencies: the response has no bound there, and no value is given"

@@ -100,7 +100,10 @@ pub(super) fn poles(exact: &mut Exact<'_>, sum: &Sum, band: [f64; 2]) -> (Vec<Ro
             (Some(i), Some(k)) => -sum.damping[(i, k)] / all,
             _ => 0.0,
         });
-        let guesses = state.eigenvalues().unwrap_or_default();
+        let guesses = state.eigenvalues();
+        // without them poles of this group are missing
+        rough += usize::from(guesses.is_err());
+        let guesses = guesses.unwrap_or_default();
         for guess in guesses.into_iter().map(|s| Complex::new(s.re, s.im) * all).filter(|s| s.im >= 0.0) {
             if !Root::new(guess).within(wide) {
                 continue;

@@ -18,10 +18,10 @@ use std::borrow::Cow;
 
 /// Error of a deflection for the share of its distance that a gap along beams leaves out: found on a cantilever of 1 to 8 pieces, where
 /// a deflection near the fold is off by 1.8 times that share, and release by 2 times.
-pub(super) const OF_DEFLECTION: f64 = 2.0;
+pub(in super::super) const OF_DEFLECTION: f64 = 2.0;
 
 /// Share of the largest displacement below which errors are relative to that.
-const SMALL: f64 = 1.0 / 30.0;
+pub(super) const SMALL: f64 = 1.0 / 30.0;
 
 /// The mesh for the equilibrium at these voltages, from `segments` upwards, and the equilibrium on it.
 pub(super) fn order(
@@ -140,7 +140,7 @@ fn outputs(model: &Compiled, point: &OperatingPoint) -> Vec<Output> {
 }
 
 /// The longest beam, which stands for the size of the mechanism [m].
-fn size(model: &Compiled) -> f64 {
+pub(super) fn size(model: &Compiled) -> f64 {
     model.structure.beams.iter().map(|b| b.length).fold(model.parts.system.length_scale, f64::max)
 }
 

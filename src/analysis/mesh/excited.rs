@@ -67,6 +67,7 @@ pub(super) fn order(moving: &Compiled, options: &TransientOptions<'_>) -> Result
         }
     }
     let tol = moving.options.tol;
+    let rates = options.signals.iter().any(|name| is_rate(name));
     let mut count = FIRST;
     loop {
         let mesh = match given {
@@ -76,18 +77,29 @@ pub(super) fn order(moving: &Compiled, options: &TransientOptions<'_>) -> Result
                 merged(&still, &counted)
             }
         };
-        let (modes, left) = excited(moving, options, &mesh.segments, count)?;
+        let (mut modes, mut left) = excited(moving, options, &mesh.segments, count)?;
+        if rates {
+            left *= faster(&mut modes);
+        }
         if left > NEGLIGIBLE * tol && modes.len() >= count && count < MOST {
             count = (2 * count).min(MOST);
             continue;
         }
-        let Some(highest) = modes.iter().rposition(|m| m.amplitude > NEGLIGIBLE * tol) else { return Ok(still) };
+        // what is in none of the modes may be off by all that it swings
+        let left = if left > NEGLIGIBLE * tol { 2f64.sqrt() * left } else { 0.0 };
+        let at_least = |order: ModelOrder| ModelOrder {
+            estimated_error: order.estimated_error.map(|error| error.max(left)),
+            ..order
+        };
+        let Some(highest) = modes.iter().rposition(|m| m.amplitude > NEGLIGIBLE * tol) else {
+            return Ok(at_least(still));
+        };
         let tolerances: Vec<f64> = modes[..=highest].iter().map(|m| tolerance(m, options.stop, tol)).collect();
         let mut analyse = |segments: &[usize]| frequencies(moving, voltages, segments, &tolerances);
         if given {
             let swings: Vec<f64> = modes[..=highest].iter().map(|m| 2f64.sqrt() * m.amplitude).collect();
             let estimated_error = told(&moving.options, &still.segments, &swings, &mut analyse);
-            return Ok(merged(&still, &ModelOrder { estimated_error, ..still.clone() }));
+            return Ok(at_least(merged(&still, &ModelOrder { estimated_error, ..still.clone() })));
         }
         // the estimates of frequencies have been found too small: a part of the tolerance is theirs, and what is told is the estimate
         let sharper = tolerances.iter().map(|t| (counted::SAFETY * t).max(SHARPEST)).collect();
@@ -96,11 +108,30 @@ pub(super) fn order(moving: &Compiled, options: &TransientOptions<'_>) -> Result
         let order = ModelOrder { estimated_error: order.estimated_error.map(|e| counted::SAFETY * e), ..order };
         let mesh = merged(&still, &order);
         if order.estimated_error.is_some() {
-            return Ok(mesh);
+            return Ok(at_least(mesh));
         }
         let fitted = doubling::fit(&moving.structure, &moving.options, mesh.segments.clone(), &mut analyse);
-        return Ok(fitted.map_or(mesh, |fitted| merged(&still, &fitted)));
+        return Ok(at_least(fitted.map_or(mesh, |fitted| merged(&still, &fitted))));
     }
+}
+
+/// A signal that is the rate of a displacement.
+fn is_rate(name: &str) -> bool {
+    name.rsplit_once('.').is_some_and(|(_, part)| ["vx", "vy", "vrz"].contains(&part))
+}
+
+/// Counts each mode by its share in rates where that is more than in displacements; and how many times as much what is left counts,
+/// which swings no slower than the last.
+fn faster(modes: &mut [Excited]) -> f64 {
+    let fastest = modes.iter().map(|m| m.amplitude * m.frequency).fold(0.0, f64::max);
+    if fastest == 0.0 {
+        return 1.0;
+    }
+    let largest = modes.iter().map(|m| m.amplitude).fold(0.0, f64::max);
+    for mode in modes.iter_mut() {
+        mode.amplitude = mode.amplitude.max(largest * mode.amplitude * mode.frequency / fastest);
+    }
+    modes.last().map_or(1.0, |last| (largest * last.frequency / fastest).max(1.0))
 }
 
 /// The estimate of a mesh as it is: a mode that has lost its phase is wrong by what it swings, and by no more.

@@ -25,11 +25,12 @@ pub(crate) fn modes_fitted(
     let (order, found) = for_modes(compiled, count, voltages)?;
     let found = found.filter(|(segments, _)| *segments == order.segments);
     let fitted = on(compiled, order)?;
-    let found = match found {
+    let (result, curves) = match found {
         Some((_, found)) => found,
         None => modes_with_curves(&fitted, count, voltages)?,
     };
-    Ok((fitted, found))
+    let estimated_error = fitted.order.estimated_error;
+    Ok((fitted, (ModesResult { estimated_error, ..result }, curves)))
 }
 
 /// Modes with the shapes of their beams.

@@ -12,8 +12,7 @@ use super::super::{AnalysisError, PortVoltages};
 use super::equilibrium::{self, told_of_static};
 use super::frequencies::{frequency_outputs, loaded, worst};
 use super::meshed::meshed;
-use super::pull_in::{points_of_pull_in, pull_in_outputs};
-use super::warnings::of_pieces;
+use super::pull_in::{pull_in_outputs, told_of_pull_in};
 use super::{Request, fitted};
 use crate::compile::Compiled;
 use crate::netlist::Diagnostic;
@@ -62,19 +61,25 @@ pub(crate) fn judged(compiled: &Compiled, request: &Request<'_>) -> Result<Judge
 /// What the analysis has against the model.
 pub(crate) fn searched(compiled: &Compiled, request: &Request<'_>) -> Result<Judged, AnalysisError> {
     let own = fitted(compiled, request)?;
-    let (answer, told) = match *request {
+    let (answer, warnings) = match *request {
         Request::Static { voltages } => {
             let (point, told) = told_of_static(&own, operating_point(&own, voltages)?);
-            (Answer::Static(result_at(&own, &point)), told)
+            let result = result_at(&own, &point);
+            let warnings = coded(told).into_iter().chain(result.told()).collect();
+            (Answer::Static(result), warnings)
         }
-        Request::Modes { count, voltages } => (Answer::Modes(modes(&own, count, voltages)?), Vec::new()),
+        Request::Modes { count, voltages } => {
+            let found = modes(&own, count, voltages)?;
+            let warnings = found.warnings.clone();
+            (Answer::Modes(found), warnings)
+        }
         Request::PullIn { port, max } => {
             let found = pull_in(&own, port, max)?;
-            let told = of_pieces(&own, &points_of_pull_in(&own, &found));
-            (Answer::PullIn(found), told.into_iter().collect())
+            let warnings = coded(told_of_pull_in(&own, &found)).into_iter().chain(found.told()).collect();
+            (Answer::PullIn(found), warnings)
         }
     };
-    Ok(Judged { answer, estimated_error: own.order.estimated_error, warnings: coded(told), holds: true })
+    Ok(Judged { answer, estimated_error: own.order.estimated_error, warnings, holds: true })
 }
 
 /// Warnings as a table has them.
@@ -90,8 +95,10 @@ fn within(compiled: &Compiled, error: Option<f64>) -> bool {
 fn still(compiled: &Compiled, voltages: &PortVoltages) -> Result<Judged, AnalysisError> {
     let (point, estimated_error) = equilibrium::judged(compiled, voltages)?;
     let (point, told) = told_of_static(compiled, point);
-    let answer = Answer::Static(result_at(compiled, &point));
-    Ok(Judged { answer, estimated_error, warnings: coded(told), holds: within(compiled, estimated_error) })
+    let result = result_at(compiled, &point);
+    let warnings = coded(told).into_iter().chain(result.told()).collect();
+    let answer = Answer::Static(result);
+    Ok(Judged { answer, estimated_error, warnings, holds: within(compiled, estimated_error) })
 }
 
 fn swinging(compiled: &Compiled, count: usize, voltages: &PortVoltages) -> Result<Judged, AnalysisError> {
@@ -108,7 +115,8 @@ fn swinging(compiled: &Compiled, count: usize, voltages: &PortVoltages) -> Resul
     let moved = if loaded { equilibrium::judged(compiled, voltages)?.1 } else { Some(0.0) };
     let estimated_error = moved.zip(own).map(|(a, b)| a.max(b));
     let holds = all && sure && within(compiled, moved);
-    Ok(Judged { answer: Answer::Modes(found), estimated_error, warnings: Vec::new(), holds })
+    let warnings = found.warnings.clone();
+    Ok(Judged { answer: Answer::Modes(found), estimated_error, warnings, holds })
 }
 
 /// Frequencies compared with those of twice the segments.
@@ -139,11 +147,6 @@ fn closing(compiled: &Compiled, port: Option<&str>, max: f64) -> Result<Judged, 
         Ok::<_, AnalysisError>(pull_in_outputs(&pull_in(&*meshed(compiled, segments)?, port, max)?))
     })?;
     let estimated_error = order.estimated_error;
-    let told = coded(of_pieces(compiled, &points_of_pull_in(compiled, &found)));
-    Ok(Judged {
-        answer: Answer::PullIn(found),
-        estimated_error,
-        warnings: told,
-        holds: within(compiled, estimated_error),
-    })
+    let warnings = coded(told_of_pull_in(compiled, &found)).into_iter().chain(found.told()).collect();
+    Ok(Judged { answer: Answer::PullIn(found), estimated_error, warnings, holds: within(compiled, estimated_error) })
 }

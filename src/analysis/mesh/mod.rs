@@ -5,7 +5,9 @@
 //! |---|---|---|
 //! | static | the deformed state, compared with that of twice the segments | `equilibrium` |
 //! | modes | the highest mode asked for; about a loaded state, that state and its frequencies too | `frequencies` |
+//! | strains that stay | those of heated beams that yield, compared with those of twice the segments | `yielded` |
 //! | pull-in | both voltages, compared with those of twice the segments | `pull_in` |
+//! | path | its folds, bifurcations and end, compared with those of twice the segments | `path` |
 //! | frequency response | the response itself and the modes within the band, compared with those of twice the segments | `in_band` |
 //! | transient | the states it starts from and goes to, and the modes that the difference of the two excites | `excited` |
 //!
@@ -18,8 +20,10 @@ mod frequencies;
 pub(crate) mod given;
 mod in_band;
 mod meshed;
+mod path;
 mod pull_in;
 mod warnings;
+mod yielded;
 
 use super::linear_stress::left_out;
 use super::statics::{OperatingPoint, operating_point};
@@ -27,17 +31,22 @@ use super::transient::TransientOptions;
 use super::{AnalysisError, PortVoltages};
 use crate::compile::Compiled;
 use crate::multibody::planar::Pose;
+use crate::netlist::Diagnostic;
 use crate::refine::model_order::ModelOrder;
+pub(super) use equilibrium::OF_DEFLECTION;
 pub(crate) use equilibrium::static_fitted;
 use frequencies::for_modes;
 pub(crate) use frequencies::modes_fitted;
 use meshed::on;
+pub(crate) use path::path_fitted;
 use pull_in::for_pull_in;
 pub(crate) use pull_in::pull_in_fitted;
-use warnings::warn_of_stress;
+pub(super) use warnings::of_share_in_pieces;
+use warnings::{of_pieces, of_stress};
 
-pub use warnings::warnings;
-pub(crate) use warnings::{WARNING, beyond};
+pub(crate) use warnings::WARNING;
+pub use warnings::{beyond, warnings};
+pub(crate) use yielded::backbent_fitted;
 
 /// What a mesh is for.
 #[derive(Debug, Clone, Copy)]
@@ -94,11 +103,18 @@ pub fn fitted_in_time(
     let order = order_in_time(moving, options)?;
     let start = options.release.map(|start| on(start, order.clone())).transpose()?;
     let mut moving = on(moving, order)?;
-    if moving.options.linear {
-        let share = left_out_in_time(&moving, start.as_ref(), &options.voltages);
-        warn_of_stress(&mut moving, share);
-    }
+    let told = told_of_run(&moving, start.as_ref(), &options.voltages);
+    moving.warnings.items.extend(told);
     Ok((moving, start))
+}
+
+/// What a run leaves out: the stiffness of stress in a linear model, and what beams bend between the ends of a gap along them, as far as
+/// that is seen where the run goes to.
+pub(crate) fn told_of_run(moving: &Compiled, start: Option<&Compiled>, voltages: &PortVoltages) -> Vec<Diagnostic> {
+    let share = if moving.options.linear { left_out_in_time(moving, start, voltages) } else { None };
+    let end = if moving.structure.beam_gaps.is_empty() { None } else { operating_point(moving, voltages).ok() };
+    let points: Vec<(OperatingPoint, f64)> = end.map(|end| (end, OF_DEFLECTION)).into_iter().collect();
+    of_stress(moving, share).into_iter().chain(of_pieces(moving, &points)).collect()
 }
 
 /// The model on the mesh for a frequency response.

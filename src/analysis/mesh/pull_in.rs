@@ -1,17 +1,22 @@
 //! The mesh for pull-in: both voltages, compared with those of twice the segments.
 
 use super::super::AnalysisError;
+use super::super::linear_stress::left_out;
 use super::super::pull_in::{PullInResult, pull_in};
 use super::super::statics::{OperatingPoint, operating_point};
 use super::equilibrium::OF_DEFLECTION;
 use super::meshed::{chosen, meshed, on};
-use super::warnings::warn_of_pieces;
+use super::warnings::{of_pieces, of_stress};
 use crate::compile::Compiled;
+use crate::netlist::Diagnostic;
 use crate::refine::doubling::{self, Output};
 use crate::refine::model_order::ModelOrder;
 
 /// Error of a pull-in voltage for that share: a third of it, found as [`OF_DEFLECTION`].
 const OF_PULL_IN: f64 = 1.0 / 3.0;
+
+/// Share of the pull-in voltage that stands for the fold itself, next to which nothing has an equilibrium for sure.
+const NEXT: f64 = 0.98;
 
 /// What is compared of pull-in.
 pub(super) fn pull_in_outputs(found: &PullInResult) -> Vec<Output> {
@@ -35,9 +40,18 @@ pub(crate) fn pull_in_fitted(
         Some((_, result)) => PullInResult { estimated_error: fitted.order.estimated_error, ..result },
         None => pull_in(&fitted, port, max)?,
     };
-    let points = points_of_pull_in(&fitted, &result);
-    warn_of_pieces(&mut fitted, &points);
+    let told = told_of_pull_in(&fitted, &result);
+    fitted.warnings.items.extend(told);
     Ok((fitted, result))
+}
+
+/// What a pull-in is warned of beside its mesh: what a linear model leaves out at its voltage, and gaps in too few pieces.
+pub(super) fn told_of_pull_in(fitted: &Compiled, result: &PullInResult) -> Vec<Diagnostic> {
+    let points = points_of_pull_in(fitted, result);
+    let before = || operating_point(fitted, &[(result.port.clone(), NEXT * result.pull_in_v)]).ok();
+    let point = if fitted.options.linear { before() } else { None };
+    let share = point.and_then(|point| left_out(fitted, &point, &point.q));
+    of_stress(fitted, share).into_iter().chain(of_pieces(fitted, &points)).collect()
 }
 
 /// Where gaps along beams may have too few pieces for a pull-in, and how much that counts: next to the fold; and closed, where as
@@ -51,7 +65,7 @@ pub(super) fn points_of_pull_in(fitted: &Compiled, result: &PullInResult) -> Vec
         let point = operating_point(fitted, &[(result.port.clone(), volts * result.pull_in_v)]);
         point.ok().map(|point| (point, times))
     };
-    [(0.98, OF_PULL_IN), (1.02, OF_DEFLECTION * release)].into_iter().filter_map(at).collect()
+    [(NEXT, OF_PULL_IN), (1.02, OF_DEFLECTION * release)].into_iter().filter_map(at).collect()
 }
 
 /// The mesh for pull-in, and the results of every mesh that was looked at.

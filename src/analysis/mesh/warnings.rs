@@ -23,18 +23,15 @@ pub fn warnings(fitted: &Compiled) -> impl Iterator<Item = String> {
 }
 
 /// What to say of an estimate that is beyond the tolerance, or missing.
-pub(crate) fn beyond(tol: f64, estimated_error: Option<f64>) -> Option<String> {
+pub fn beyond(tol: f64, estimated_error: Option<f64>) -> Option<String> {
     match estimated_error {
         Some(error) if error <= 1.05 * tol => None,
-        Some(error) => Some(format!("the mesh may be off by {error:.1e}, more than the tolerance {tol:e}")),
-        None => Some(format!("nothing tells how far the mesh is off: the tolerance {tol:e} is not confirmed")),
+        Some(error) if error.is_finite() => {
+            Some(format!("the mesh may be off by {error:.1e}, more than the tolerance {tol:e}"))
+        }
+        // on twice the segments something is there that was not, or the other way round
+        _ => Some(format!("nothing tells how far the mesh is off: the tolerance {tol:e} is not confirmed")),
     }
-}
-
-/// Says so where a linear model leaves out more than the tolerance.
-pub(super) fn warn_of_stress(compiled: &mut Compiled, share: Option<f64>) {
-    let told = of_stress(compiled, share);
-    compiled.warnings.items.extend(told);
 }
 
 /// What a linear model leaves out, where that is more than the tolerance.
@@ -50,21 +47,19 @@ pub(super) fn of_stress(compiled: &Compiled, share: Option<f64>) -> Option<Diagn
     Some(warning(STRESS, message, "leave --linear away; modes have the stiffness of stress with it too"))
 }
 
-/// Says so where a gap along beams has too few pieces at one of these equilibria, whose results are off by so many times the share of
-/// its distance that is left out.
-pub(super) fn warn_of_pieces(compiled: &mut Compiled, points: &[(OperatingPoint, f64)]) {
-    let told = of_pieces(compiled, points);
-    compiled.warnings.items.extend(told);
-}
-
-/// The same for who keeps no warnings in a model.
+/// Where a gap along beams has too few pieces at one of these equilibria, whose results are off by so many times the share of its
+/// distance that is left out.
 pub(super) fn of_pieces(compiled: &Compiled, points: &[(OperatingPoint, f64)]) -> Option<Diagnostic> {
-    let tol = compiled.options.tol;
     let one = |(point, times): &(OperatingPoint, f64)| {
         let (name, share) = gap_pieces::left_out(compiled, &point.q, &point.volts)?;
         Some((name.to_owned(), times * share))
     };
-    let worst = points.iter().filter_map(one).max_by(|a, b| a.1.total_cmp(&b.1));
+    of_share_in_pieces(compiled, points.iter().filter_map(one).max_by(|a, b| a.1.total_cmp(&b.1)))
+}
+
+/// The same where the gap that leaves out most is known, and how far it may be off.
+pub(in super::super) fn of_share_in_pieces(compiled: &Compiled, worst: Option<(String, f64)>) -> Option<Diagnostic> {
+    let tol = compiled.options.tol;
     let (name, error) = worst.filter(|(_, error)| *error > tol)?;
     let message = format!(
         "`{name}` acts on the ends of its beams, which would bend between them too: it may be off by {error:.1e}, more than the \

@@ -3,7 +3,7 @@
 use super::super::contact_range::within_contact_range;
 use super::super::signal::Signal;
 use super::super::stability::Stability;
-use super::super::statics::{operating_point, source_vector};
+use super::super::statics::{operating_point, source_vector, told_at};
 use super::super::{AnalysisError, Watch};
 use super::crossings::Crossings;
 use super::options::{TransientOptions, check};
@@ -53,7 +53,7 @@ pub(in crate::analysis) fn record(
     let signals: Vec<Signal> =
         options.signals.iter().map(|name| Signal::find(compiled, name)).collect::<Result<_, _>>()?;
     let sources = source_vector(compiled, &options.voltages)?;
-    let (mut motion, rise) = start(compiled, options)?;
+    let (mut motion, rise, begun) = start(compiled, options)?;
     let ramp = Ramp::new(&system.electrics, &sources, &sources, &rise, options.stop);
     let mut drive = system.electrics.drive();
     ramp.at(0.0, &mut drive);
@@ -101,16 +101,20 @@ pub(in crate::analysis) fn record(
         estimated_error: compiled.order.estimated_error,
         step_error: None,
         events: crossings.events,
-        warnings: stability.told().into_iter().collect(),
+        warnings: begun.into_iter().chain(stability.told()).collect(),
     })
 }
 
-/// Where a run begins, and how much warmer its heaters are there [K]: at rest as drawn, or in the equilibrium of what is
-/// released.
-fn start(compiled: &Compiled, options: &TransientOptions<'_>) -> Result<(Motion, Vec<f64>), AnalysisError> {
+/// Where a run begins, how much warmer its heaters are there [K], and what there is to tell of that: at rest as drawn, or in the
+/// equilibrium of what is released.
+fn start(
+    compiled: &Compiled,
+    options: &TransientOptions<'_>,
+) -> Result<(Motion, Vec<f64>, Vec<String>), AnalysisError> {
     let system = &compiled.parts.system;
     let mut motion = Motion::zeros(system.bodies());
     let mut rise = vec![0.0; system.electrics.heating.heaters.len()];
+    let mut told = Vec::new();
     if let Some(start) = options.release {
         let point = operating_point(start, &options.voltages)?;
         if point.q.len() != motion.q.len() {
@@ -121,6 +125,7 @@ fn start(compiled: &Compiled, options: &TransientOptions<'_>) -> Result<(Motion,
         }
         motion.q.copy_from_slice(&point.q);
         rise.copy_from_slice(&point.rise);
+        told = told_at(start, &point);
     }
-    Ok((motion, rise))
+    Ok((motion, rise, told.into_iter().map(|way| format!("the equilibrium that it is released from: {way}")).collect()))
 }

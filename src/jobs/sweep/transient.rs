@@ -43,8 +43,10 @@ struct Shared {
 /// A point on its mesh.
 struct Prepared {
     compiled: Compiled,
-    /// How far its steps may be off, and where that was found.
-    step_error: Option<(f64, &'static str)>,
+    /// How far its steps may be off, none: not compared; and where that was found.
+    step_error: (Option<f64>, &'static str),
+    /// What its run leaves out.
+    told: Vec<String>,
 }
 
 /// What all points have in common.
@@ -126,19 +128,21 @@ impl<'a> Transients<'a> {
         match shared.filter(|shared| alike(&shared.beams, &drawn.structure.beams)) {
             Some(shared) => {
                 let compiled = drawn.on(shared.order.clone()).map_err(|error| error.to_string())?;
-                Ok(Prepared {
-                    compiled,
-                    step_error: shared.step_error.map(|error| (error, "in the middle of the grid")),
-                })
+                Ok(self.prepared(compiled, (shared.step_error, "in the middle of the grid")))
             }
             None => {
                 let compiled = drawn.compile().map_err(|error| brief(&error))?;
                 let (compiled, _) =
                     mesh::fitted_in_time(&compiled, &self.transient()).map_err(|error| error.to_string())?;
-                let step_error = self.steps(&compiled, go_on).map(|error| (error, "by the end of the run"));
-                Ok(Prepared { compiled, step_error })
+                let step_error = self.steps(&compiled, go_on);
+                Ok(self.prepared(compiled, (step_error, "by the end of the run")))
             }
         }
+    }
+
+    fn prepared(&self, compiled: Compiled, step_error: (Option<f64>, &'static str)) -> Prepared {
+        let told = mesh::told_of_run(&compiled, None, &self.transient().voltages);
+        Prepared { step_error, told: told.iter().map(|d| format!("{}: {}", d.code, d.message)).collect(), compiled }
     }
 
     /// The mesh that is fine enough at every probe.
@@ -176,7 +180,7 @@ impl<'a> Transients<'a> {
     }
 
     fn found(&self, point: &Prepared, end: RunEnd) -> Result<Found, String> {
-        let Prepared { compiled, step_error } = point;
+        let Prepared { compiled, step_error: (step_error, place), told } = point;
         let options = self.transient();
         let mut values = Vec::with_capacity(end.values.len());
         for (name, value) in options.signals.iter().zip(end.values) {
@@ -189,8 +193,12 @@ impl<'a> Transients<'a> {
         let estimated_error = compiled.order.estimated_error;
         let beyond = mesh::beyond(self.options.tol, estimated_error);
         let beyond = beyond.map(|message| format!("{}: {message}", mesh::WARNING));
-        let steps = step_error.and_then(|(error, place)| step_error::beyond(&options, error, place));
-        let warnings: Vec<String> = beyond.into_iter().chain(steps).chain(end.warnings).collect();
+        let steps = match step_error {
+            Some(error) => step_error::beyond(&options, *error, place),
+            None => Some(step_error::unknown(&options)),
+        };
+        let told = told.iter().cloned();
+        let warnings: Vec<String> = beyond.into_iter().chain(told).chain(steps).chain(end.warnings).collect();
         Ok(Found { values, estimated_error, warning: warnings.join("; ") })
     }
 }

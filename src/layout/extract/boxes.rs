@@ -19,7 +19,8 @@ fn join(a: &Extent, b: &Extent) -> Extent {
 }
 
 fn overlap(a: &Extent, b: &Extent) -> bool {
-    (0..2).all(|i| a[0][i] <= b[1][i] && b[0][i] <= a[1][i])
+    // all four comparisons at once cost less than a branch for each
+    (a[0][0] <= b[1][0]) & (b[0][0] <= a[1][0]) & (a[0][1] <= b[1][1]) & (b[0][1] <= a[1][1])
 }
 
 /// Many boxes, found by place.

@@ -185,7 +185,7 @@ pub(super) fn beam2det(site: &mut Site<'_, '_>) -> Result<(), Reported> {
             return Err(site.error("E060", message, "give the temperature at which no strength is left [K]"));
         }
         let beam = site.drawing.structure.beams.len();
-        site.drawing.structure.yields.push(Yield { beam, stress, softening });
+        site.drawing.structure.yields.push(Yield { beam, stress, softening, strain: 0.0 });
     }
     site.bow(&beam)?;
     site.drawing.add_beam(site.instance.span, beam, true);

@@ -65,13 +65,23 @@ pub fn modes_to_wire(result: &ModesResult) -> proto::ModesResponse {
         errors: result.errors.iter().map(|e| e.unwrap_or(f64::NAN)).collect(),
         deflection_m: result.deflection_m,
         warnings: result.warnings.clone(),
+        estimated_error: result.estimated_error,
     }
 }
 
 /// Modes back.
 pub fn modes_from_wire(wire: proto::ModesResponse) -> ModesResult {
-    let proto::ModesResponse { frequencies_hz, residuals, nodes, shapes, unknowns, errors, deflection_m, warnings } =
-        wire;
+    let proto::ModesResponse {
+        frequencies_hz,
+        residuals,
+        nodes,
+        shapes,
+        unknowns,
+        errors,
+        deflection_m,
+        warnings,
+        estimated_error,
+    } = wire;
     let shape = |s: proto::Shape| {
         let motions = s.x.iter().zip(&s.y).zip(&s.rz).map(|((&x, &y), &rz)| NodeMotion { x, y, rz });
         nodes.iter().cloned().zip(motions).collect()
@@ -80,7 +90,8 @@ pub fn modes_from_wire(wire: proto::ModesResponse) -> ModesResult {
     // a server that sends no estimates, or none for a mode
     let mut errors: Vec<_> = errors.into_iter().map(|e| e.is_finite().then_some(e)).collect();
     errors.resize(frequencies_hz.len(), None);
-    ModesResult { frequencies_hz, shapes, residuals, errors, unknowns: size(unknowns), deflection_m, warnings }
+    let unknowns = size(unknowns);
+    ModesResult { frequencies_hz, shapes, residuals, errors, estimated_error, unknowns, deflection_m, warnings }
 }
 
 /// Pull-in as it travels.

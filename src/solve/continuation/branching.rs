@@ -6,8 +6,8 @@ use crate::multibody::planar::Pose;
 use crate::solve::family::Blend;
 
 impl Continuation {
-    /// Illinois on s′ over the step.
-    pub(super) fn find_fold(&mut self, family: &mut Blend, here: &Place, next: &Place, step: f64) -> Place {
+    /// Illinois on s′ over the step; and whether it came to its end.
+    pub(super) fn find_fold(&mut self, family: &mut Blend, here: &Place, next: &Place, step: f64) -> (Place, bool) {
         let (mut a, mut fa, mut b, mut fb) = (0.0, here.ds, step, next.ds);
         let mut best = next.clone();
         for _ in 0..40 {
@@ -16,7 +16,7 @@ impl Continuation {
             let f = place.ds;
             best = place;
             if f.abs() < 1e-9 || (b - a).abs() < 1e-12 * step {
-                break;
+                return (best, true);
             }
             if f * fb < 0.0 {
                 (a, fa) = (b, fb);
@@ -25,11 +25,17 @@ impl Continuation {
             }
             (b, fb) = (middle, f);
         }
-        best
+        (best, false)
     }
 
-    /// Bisection on the number of negative pivots; the place on the near side.
-    pub(super) fn find_bifurcation(&mut self, family: &mut Blend, here: &Place, after: usize, step: f64) -> Place {
+    /// Bisection on the number of negative pivots; the place on the near side, and whether it came to its end.
+    pub(super) fn find_bifurcation(
+        &mut self,
+        family: &mut Blend,
+        here: &Place,
+        after: usize,
+        step: f64,
+    ) -> (Place, bool) {
         let (mut low, mut high) = (0.0, step);
         let mut best = here.clone();
         for _ in 0..40 {
@@ -40,10 +46,10 @@ impl Continuation {
                 None => break,
             }
             if high - low < 1e-8 * step {
-                break;
+                return (best, true);
             }
         }
-        best
+        (best, false)
     }
 
     /// First point on the branch that leaves along the null vector.

@@ -47,6 +47,10 @@ pub struct Traced {
     pub points: Vec<PathPoint>,
     /// What happened, with the index of its point.
     pub events: Vec<(Event, usize)>,
+    /// Points of events that were not located to rounding: the path was lost between its points there.
+    pub rough: Vec<usize>,
+    /// Points of bifurcations where no branch was found, so that the path goes straight on.
+    pub stayed: Vec<usize>,
     /// Why it ends.
     pub end: PathEnd,
     /// Newton iterations, each with one factorization.

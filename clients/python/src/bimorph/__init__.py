@@ -8,7 +8,7 @@ V, A, C, K, Hz.
 import importlib.metadata
 
 from .client import Client, Model
-from .conversion import Conversion, Piece
+from .conversion import Conversion, LayoutWarning, Piece
 from .errors import (
     BimorphError,
     Diagnostic,
@@ -44,6 +44,7 @@ __all__ = [
     "BimorphError",
     "Client",
     "Conversion",
+    "LayoutWarning",
     "Diagnostic",
     "FrequencyResponse",
     "InvalidRequest",

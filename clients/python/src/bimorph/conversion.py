@@ -10,6 +10,14 @@ LAYOUTS = frozenset({".cif", ".gds", ".gdsii", ".gds2", ".sf"})
 """Extensions of layout files."""
 
 
+_NAMED = 5
+"""Pieces that are told one by one."""
+
+
+class LayoutWarning(UserWarning):
+    """What a layout's conversion has to tell, where only its netlist was asked for."""
+
+
 @dataclass(frozen=True)
 class Piece:
     """A piece of a drawing that is in no part of the mechanism."""
@@ -44,3 +52,14 @@ class Conversion:
     """The pieces of that."""
     notes: tuple[str, ...] = ()
     """What was approximated or left out, in words."""
+
+    def told(self) -> list[str]:
+        """What there is to know before its numbers are believed, as sentences."""
+        lost = [
+            f"{piece.area_m2 * 1e12:.4g} µm² of layer {piece.layer} not understood at "
+            f"{piece.box_m[0] * 1e6:.4g}, {piece.box_m[1] * 1e6:.4g} µm: {piece.why}"
+            for piece in self.unrecognised[:_NAMED]
+        ]
+        if len(self.unrecognised) > _NAMED:
+            lost.append(f"{self.unrecognised_m2 * 1e12:.4g} µm² not understood in all, in {len(self.unrecognised)} pieces")
+        return [*lost, *self.notes]

@@ -47,7 +47,8 @@ class Run:
 
 
 def run(deck: str | os.PathLike[str], *, remote: str | None = None, timeout: float = 600.0) -> Run:
-    """Runs a deck: a path, or its text (anything with a line break). The netlists that a text names are found from the working directory.
+    """Runs a deck: a path, or its text (anything with a line break). The files that a text names (netlists, ``.include``, ``.lib``) are found
+    from the working directory.
 
     ``remote`` is the address of a server that steps every device of the deck.
 
@@ -73,11 +74,18 @@ def run(deck: str | os.PathLike[str], *, remote: str | None = None, timeout: flo
 
 
 _FILE = re.compile(r"""(\bfile\s*=\s*")([^"]+)(")""", re.IGNORECASE)
+_INCLUDED = re.compile(r"""^([ \t]*\.(?:include|inc|lib)[ \t]+)(["']?)([^"'\s]+)\2""", re.IGNORECASE | re.MULTILINE)
 
 
 def _absolute(text: str) -> str:
-    """The deck lies in another folder than the netlists that it names."""
-    return _FILE.sub(lambda m: m[1] + os.path.abspath(m[2]) + m[3], text)
+    """The deck lies in another folder than the files that it names."""
+
+    def included(found: re.Match[str]) -> str:
+        # `.lib NAME` begins a section too
+        path = os.path.abspath(found[3])
+        return f'{found[1]}"{path}"' if os.path.isfile(path) else found[0]
+
+    return _INCLUDED.sub(included, _FILE.sub(lambda m: m[1] + os.path.abspath(m[2]) + m[3], text))
 
 
 def _reason(said: str) -> str:

@@ -52,6 +52,8 @@ class StaticResult:
     """Whether it jumped on the way: it pulled in, snapped through or buckled."""
     warnings: tuple[str, ...] = ()
     """What the numbers do not say by themselves."""
+    free_motions: tuple[str, ...] = ()
+    """Motions that nothing resists noticeably and no load excites; they are held where they are."""
 
     def to_pandas(self) -> pandas.DataFrame:
         """Displacement [m] and rotation [rad] of every node."""
@@ -60,7 +62,9 @@ class StaticResult:
 
     def _repr_html_(self) -> str:
         rows = ((name, node.x, node.y, node.rz) for name, node in self.nodes.items())
-        note = showing.note(self.estimated_error, self.warnings)
+        way = "pulled in on the way" if self.pulled_in else "snapped through or buckled on the way" if self.jumped else ""
+        held = [f"held, because no load excites it: {motion}" for motion in self.free_motions]
+        note = showing.note(self.estimated_error, [*filter(None, [way]), *held, *self.warnings])
         return showing.table(["node", "x [m]", "y [m]", "rz [rad]"], rows, note)
 
 
@@ -82,6 +86,8 @@ class ModesResult:
     """Largest displacement of the equilibrium that the modes are about [m]."""
     warnings: tuple[str, ...] = ()
     """What may surprise about these modes."""
+    estimated_error: float | None = None
+    """Largest estimated relative error by the mesh, of every frequency and of the equilibrium that they are about [1]; None without one."""
 
     def to_pandas(self) -> pandas.DataFrame:
         """Frequency [Hz], residual and estimated error, by number from 1."""
@@ -90,7 +96,9 @@ class ModesResult:
 
     def _repr_html_(self) -> str:
         rows = zip(range(1, len(self.frequencies_hz) + 1), self.frequencies_hz, self.errors)
-        return showing.table(["mode", "frequency [Hz]", "error [1]"], rows, showing.note(None, self.warnings))
+        return showing.table(
+            ["mode", "frequency [Hz]", "error [1]"], rows, showing.note(self.estimated_error, self.warnings)
+        )
 
 
 @dataclass(frozen=True)

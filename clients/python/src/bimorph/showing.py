@@ -49,7 +49,7 @@ def table(head: Sequence[str], rows: Iterable[Sequence[object]], note: str = "")
 
 def note(estimated_error: float | None, warnings: Iterable[str]) -> str:
     """What stands below a table: how far its numbers may be off, and what they do not say."""
-    error = "" if estimated_error is None else f"estimated error {estimated_error:.1e}"
+    error = "no estimate of its error" if estimated_error is None else f"estimated error {estimated_error:.1e}"
     return " · ".join(filter(None, [error, *warnings]))
 
 

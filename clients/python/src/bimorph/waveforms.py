@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -70,6 +71,28 @@ def drive(
                 progress(now / stop)
     signals = {name: np.array(column) for name, column in columns.items()}
     return TransientResult(output, signals, dict(session.signals), len(times) - 1, 0, session.unknowns)
+
+
+def told(found: TransientResult, finer: TransientResult | None, tol: float) -> TransientResult:
+    """The result with how far it may be off: its distance from a finer run, of each unit's amplitude."""
+    if finer is None:
+        said = f"nothing tells how far mesh and steps are off: the tolerance {tol:g} is not confirmed"
+        return replace(found, warnings=(*found.warnings, said))
+    amplitude: dict[str, float] = {}
+    for name, values in finer.signals.items():
+        unit = finer.units[name]
+        amplitude[unit] = max(amplitude.get(unit, 0.0), float(np.ptp(values)))
+    errors = [
+        float(np.sqrt(np.mean((values - finer.signals[name]) ** 2))) / amplitude[found.units[name]]
+        for name, values in found.signals.items()
+        if amplitude[found.units[name]] > 0.0
+    ]
+    error = max(errors, default=0.0)
+    warnings = found.warnings
+    if error > tol:
+        said = f"mesh and steps may be off by {error:.1e} of the amplitude, more than the tolerance {tol:g}; give band or more segments"
+        warnings = (*warnings, said)
+    return replace(found, estimated_error=error, warnings=warnings)
 
 
 def _apart(times: NDArray[np.float64], stop: float) -> NDArray[np.float64]:

@@ -1,0 +1,171 @@
+//! The mesh for an equilibrium path: its folds, bifurcations and end are compared with those of twice the segments.
+//!
+//! A branch and its mirror image are one as far as a mesh is concerned: where the finer mesh comes out on the other one, it is traced
+//! once more the other way.
+
+use super::super::continuation::{ContinuationRequest, ContinuationResult, CriticalPoint, Growing, trace};
+use super::super::linear_stress::left_out;
+use super::super::statics::operating_point;
+use super::super::{AnalysisError, PortVoltages, Watch};
+use super::equilibrium::{OF_DEFLECTION, SMALL, size};
+use super::meshed::{chosen, meshed, on};
+use super::warnings::{of_share_in_pieces, of_stress};
+use crate::compile::Compiled;
+use crate::refine::doubling::{self, Output};
+use crate::refine::model_order::ModelOrder;
+use crate::solve::continuation::Branch;
+
+/// Folds that are compared, and bifurcations: the first.
+const MOST_EVENTS: usize = 8;
+/// Results that differ by more than this share are of another branch.
+const OTHER_BRANCH: f64 = 0.3;
+
+/// The path on the mesh for it.
+///
+/// # Errors
+/// See [`trace`].
+pub(crate) fn path_fitted(
+    compiled: &Compiled,
+    request: &ContinuationRequest<'_>,
+    watch: Watch<'_>,
+) -> Result<(Compiled, ContinuationResult), AnalysisError> {
+    let mut search = Search { compiled, request, watch, known: Vec::new(), stopped: false };
+    let segments = compiled.order.segments.clone();
+    let mut analyse = |segments: &[usize]| search.follow(segments);
+    let order = match chosen(compiled) {
+        true => doubling::estimate(&compiled.options, segments, &mut analyse)?,
+        false => doubling::fit(&compiled.structure, &compiled.options, segments, &mut analyse)?,
+    };
+    if search.stopped {
+        return Err(AnalysisError::Cancelled);
+    }
+    if !search.known.iter().any(|(known, _)| *known == order.segments) {
+        search.follow(&order.segments)?;
+    }
+    let of_mesh = search.known.into_iter().find(|(known, _)| *known == order.segments);
+    let lost = || AnalysisError::NotConverged { detail: "no mesh has a path".into() };
+    let (_, result) = of_mesh.ok_or_else(lost)?;
+    // a path that ends elsewhere on twice the segments is not compared at its end
+    let order = ModelOrder { estimated_error: order.estimated_error.filter(|e| e.is_finite()), ..order };
+    let mut fitted = on(compiled, order)?;
+    let share = if fitted.options.linear { left_out_at_end(&fitted, request) } else { None };
+    let worst = result.in_pieces.as_ref().map(|(name, share)| (name.clone(), OF_DEFLECTION * share));
+    let told: Vec<_> = of_stress(&fitted, share).into_iter().chain(of_share_in_pieces(&fitted, worst)).collect();
+    fitted.warnings.items.extend(told);
+    Ok((fitted, result))
+}
+
+/// Paths on one mesh after the other.
+struct Search<'a, 'w> {
+    compiled: &'a Compiled,
+    request: &'a ContinuationRequest<'a>,
+    watch: Watch<'w>,
+    known: Vec<(Vec<usize>, ContinuationResult)>,
+    stopped: bool,
+}
+
+impl Search<'_, '_> {
+    fn follow(&mut self, segments: &[usize]) -> Result<Vec<Output>, AnalysisError> {
+        let mut result = self.on(segments, self.request.branch)?;
+        let mut outputs = self.outputs(&result);
+        let first = self.known.first().map(|(_, first)| self.outputs(first));
+        if let Some(first) = first
+            && !result.bifurcations.is_empty()
+            && apart(&first, &outputs) > OTHER_BRANCH
+        {
+            let other = match self.request.branch {
+                Branch::Plus => Branch::Minus,
+                Branch::Minus => Branch::Plus,
+                Branch::Stay => Branch::Stay,
+            };
+            let mirrored = self.on(segments, other)?;
+            let its = self.outputs(&mirrored);
+            if apart(&first, &its) <= OTHER_BRANCH {
+                (result, outputs) = (mirrored, its);
+            }
+        }
+        self.known.push((segments.to_vec(), result));
+        Ok(outputs)
+    }
+
+    fn on(&mut self, segments: &[usize], branch: Branch) -> Result<ContinuationResult, AnalysisError> {
+        let model = meshed(self.compiled, segments)?;
+        let last = match self.request.growing {
+            Growing::Parameter(last) => Some(meshed(last, segments)?),
+            _ => None,
+        };
+        let growing = last.as_deref().map_or_else(|| self.request.growing.clone(), Growing::Parameter);
+        let request = ContinuationRequest { growing, branch, ..self.request.clone() };
+        let found = trace(&model, &request, self.watch);
+        self.stopped |= matches!(found, Err(AnalysisError::Cancelled));
+        found
+    }
+
+    /// What is compared.
+    fn outputs(&self, found: &ContinuationResult) -> Vec<Output> {
+        let way = self.request.from.abs().max(self.request.to.abs());
+        let output =
+            |value: f64, largest: f64| Output { value, scale: value.abs().max(SMALL * largest).max(f64::MIN_POSITIVE) };
+        let none = Output { value: f64::NAN, scale: 1.0 };
+        let moved = found.last.iter().map(|(_, m)| m.x.hypot(m.y)).fold(0.0, f64::max);
+        // what turns the size of the mechanism by what it moves
+        let turned = found.last.iter().map(|(_, m)| m.rz.abs()).fold(moved / size(self.compiled), f64::max);
+        let of_unit = |unit: &str| {
+            let of = found.signals.iter().filter(|s| s.1 == unit).flat_map(|s| &s.2);
+            let least = match unit {
+                "m" => moved,
+                "rad" => turned,
+                _ => 0.0,
+            };
+            of.fold(least, |m: f64, v| m.max(v.abs()))
+        };
+        let largest: Vec<f64> = found.signals.iter().map(|s| of_unit(&s.1)).collect();
+        let mut outputs = Vec::new();
+        let mut at = |point: Option<(f64, usize)>| {
+            outputs.push(point.map_or(none, |(value, _)| output(value, way)));
+            outputs.extend(found.signals.iter().zip(&largest).map(|(s, most)| match point {
+                Some((_, k)) => output(s.2[k], *most),
+                None => none,
+            }));
+        };
+        for list in [&found.folds, &found.bifurcations] {
+            (0..MOST_EVENTS).for_each(|k| at(list.get(k).map(|c: &CriticalPoint| (c.value, c.point))));
+        }
+        // where it ends for want of points is nowhere in particular
+        let ends = ["arrived", "turned back"].contains(&found.end);
+        at(found.values.last().map(|value| (*value, found.values.len() - 1)).filter(|_| ends));
+        outputs.extend(found.last.iter().flat_map(|(_, m)| {
+            let of_node = m.x.hypot(m.y).max(SMALL * moved).max(f64::MIN_POSITIVE);
+            let shift = |value| Output { value, scale: of_node };
+            if ends { [shift(m.x), shift(m.y), output(m.rz, turned)] } else { [none; 3] }
+        }));
+        outputs
+    }
+}
+
+/// The largest difference of two paths, as a share.
+fn apart(first: &[Output], other: &[Output]) -> f64 {
+    let one = |(a, b): (&Output, &Output)| {
+        if a.value.is_nan() || b.value.is_nan() { 0.0 } else { (a.value - b.value).abs() / a.scale.max(b.scale) }
+    };
+    first.iter().zip(other).map(one).fold(0.0, f64::max)
+}
+
+/// What stress would change at the end of the path of a linear model.
+fn left_out_at_end(fitted: &Compiled, request: &ContinuationRequest<'_>) -> Option<f64> {
+    let mut volts: Vec<(String, f64)> = request.voltages.clone();
+    let share = |model: &Compiled, volts: &PortVoltages| {
+        let point = operating_point(model, volts).ok()?;
+        left_out(model, &point, &point.q)
+    };
+    match request.growing {
+        Growing::Port(name) => {
+            volts.retain(|(port, _)| port != name);
+            volts.push((name.to_owned(), request.to));
+            share(fitted, &volts)
+        }
+        Growing::Parameter(last) => share(meshed(last, &fitted.order.segments).ok()?.as_ref(), &volts),
+        // in proportion to the loads
+        Growing::Loads => share(fitted, &volts).map(|share| share * request.to.abs().max(request.from.abs())),
+    }
+}
