@@ -18,13 +18,16 @@ const CORRECTIONS: usize = 60;
 /// The stress keeps within this share of the cold strength.
 const TOLERANCE: f64 = 1e-6;
 
+/// Permanent strains of beams by name [1]; negative: shorter.
+pub type Strains = Vec<(String, f64)>;
+
 /// A backbent mechanism.
 #[derive(Debug, Clone)]
 pub struct Backbent {
     /// The mechanism with its hot arms shortened.
     pub compiled: Compiled,
     /// Permanent strain of each beam that can yield [1], by name; negative: shorter.
-    pub strains: Vec<(String, f64)>,
+    pub strains: Strains,
     /// Yield stress over Young's modulus of each [1]: what their strains are small against.
     pub bearable: Vec<f64>,
 }
@@ -80,7 +83,7 @@ pub fn static_backbent(
     compiled: &Compiled,
     raised: &PortVoltages,
     voltages: &PortVoltages,
-) -> Result<(Compiled, StaticResult, BeamMotions, Vec<(String, f64)>), AnalysisError> {
+) -> Result<(Compiled, StaticResult, BeamMotions, Strains), AnalysisError> {
     let bent = backbent_fitted(compiled, raised)?;
     let of_strains = bent.compiled.order.estimated_error;
     let (mut fitted, mut result, curves) = static_fitted(&bent.compiled, voltages)?;

@@ -35,6 +35,28 @@ def test_a_waveform_drives_a_run(plate: bimorph.Model) -> None:
     assert np.ptp(still) <= 1e-9 * still[0]
 
 
+def test_a_waveform_tells_how_far_it_is_off(client: bimorph.Client) -> None:
+    """A clamped beam of one segment that is driven through its resonance: the run says that it is off by more than its tolerance, and one on
+    32 segments that it is not. Without the comparison nothing is claimed."""
+    net = (
+        "process p = [Youngsmodulus=165e9 density=2300 h=2u]\nanchor p [a] [l=5u w=5u]\nbeam2d p [a b] [l=100u w=2u]\n"
+        "anchor * [e] [l=1u w=1u h=1u]\ngap plategap2d * [b e] [A=1e-10 gap=2u oz=pi/2]\neground * [e] []\ndrive port * [b e] []"
+    )
+    waves = {"drive": ([0.0, 1e-6], [0.0, 5.0])}
+
+    def run(segments: int, **more: bool) -> bimorph.TransientResult:
+        model = client.compile(bimorph.Netlist.text(net), segments=segments)
+        return model.transient(2e-5, ["b.y"], points=101, inputs=waves, **more)
+
+    coarse, fine = run(1), run(32)
+    error = float(np.sqrt(np.mean((coarse.signals["b.y"] - fine.signals["b.y"]) ** 2)) / np.ptp(fine.signals["b.y"]))
+    assert coarse.estimated_error is not None and fine.estimated_error is not None
+    assert error / 3 < coarse.estimated_error and coarse.estimated_error > 1e-3 and "may be off by" in coarse.warnings[0]
+    assert fine.estimated_error <= 1e-3 and not fine.warnings
+    alone = run(1, estimate=False)
+    assert alone.estimated_error is None and "nothing tells" in alone.warnings[0]
+
+
 def test_waveforms_are_checked(plate: bimorph.Model) -> None:
     """Each fault of a waveform is told with the port's name."""
     for wave, word in [(([0.0, 1.0], [1.0]), "as many"), (([0.0, 0.0], [1.0, 2.0]), "ascend"), (([0.0], [np.nan]), "finite")]:
@@ -135,6 +157,10 @@ A1 %gd [in 0] %v [x] plate
     assert np.allclose(K * x, EPS * AREA * volts**2 / (2 * (GAP - x) ** 2), rtol=1e-5)
     with pytest.raises(bimorph.BimorphError, match="nosuch.net"):
         spice.run(deck.replace("plate.net", "nosuch.net"))
+    # what a text includes is found from the working directory too
+    (tmp_path / "source.inc").write_text("V1 in 0 3\n")
+    included = spice.run(deck.replace("V1 in 0 3", ".include source.inc"))
+    assert np.array_equal(included["v(x)"], run["v(x)"])
 
 
 def test_fixtures(pytester: pytest.Pytester, program: str, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -154,3 +154,12 @@ def test_layouts_go_through_the_server(program: str, client: bimorph.Client, tmp
         client.convert(broken)
     with pytest.raises(bimorph.InvalidRequest, match="known ones are polymumps, soi"):
         client.convert(tmp_path / "spring.gds", process="other")
+
+
+def test_what_a_layout_has_lost_is_told(client: bimorph.Client, tmp_path: Path) -> None:
+    """Compiled at once, a drawing warns of what is in no part of its model: here a layer that the process does not know."""
+    path = tmp_path / "beam.cif"
+    boxes = ["L ANCHOR1; B 2000 2000 1000 1000;", "L POLY1; B 4000 4000 1000 1000; B 10000 200 8000 1000;", "L XYZ; B 1000 1000 20000 1000;"]
+    path.write_text("DS 1 1 1;\n9 BEAM;\n" + "\n".join(boxes) + "\nDF;\nC 1;\nE\n")
+    with pytest.warns(bimorph.LayoutWarning, match="100 µm² of layer XYZ not understood"):
+        assert client.compile(path).unknowns > 0

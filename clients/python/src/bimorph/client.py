@@ -274,7 +274,7 @@ class Model:
         source.options.tol = 0.1 * self._tol()
         if not source.options.HasField("band_hz") or source.options.HasField("segments"):
             source.options.segments = 2 * source.options.segments or _MANY
-        return Model(self._channel, self._channel.call("Compile", source), source)
+        return Model(self._channel, self._channel.call("Compile", source).model, source)
 
     def __repr__(self) -> str:
         return f"Model({self.id[:8]}…, ports={list(self.ports)}, {self.unknowns} unknowns)"

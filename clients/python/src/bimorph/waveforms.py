@@ -16,6 +16,10 @@ Waveform = tuple[ArrayLike, ArrayLike]
 and after."""
 
 
+_STILL = 1e-6
+"""Share of a signal's size below which its changes are rounding."""
+
+
 def checked(inputs: Mapping[str, Waveform]) -> dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]]:
     """Waveforms as arrays.
 
@@ -81,7 +85,8 @@ def told(found: TransientResult, finer: TransientResult | None, tol: float) -> T
     amplitude: dict[str, float] = {}
     for name, values in finer.signals.items():
         unit = finer.units[name]
-        amplitude[unit] = max(amplitude.get(unit, 0.0), float(np.ptp(values)))
+        # what hardly moves is compared with where it stands
+        amplitude[unit] = max(amplitude.get(unit, 0.0), float(np.ptp(values)), _STILL * float(np.abs(values).max()))
     errors = [
         float(np.sqrt(np.mean((values - finer.signals[name]) ** 2))) / amplitude[found.units[name]]
         for name, values in found.signals.items()
