@@ -3,7 +3,8 @@
 
 use bimorph::analysis::AnalysisError;
 use bimorph::analysis::harmonic::grid::Spacing;
-use bimorph::analysis::harmonic::{HarmonicOptions, HarmonicResult, harmonic, harmonic_fitted};
+use bimorph::analysis::harmonic::{HarmonicOptions, HarmonicResult, harmonic};
+use bimorph::analysis::mesh::harmonic_fitted;
 use bimorph::analysis::statics::static_equilibrium;
 use bimorph::compile::{CompileOptions, Compiled, Formulation, compile};
 use bimorph::device::local::LocalDevice;

@@ -1,7 +1,6 @@
 //! What a mechanism is after it was heated too far once: its hot arms shortened, see [`crate::gaps::backbending`].
-use super::mesh::backbent_fitted;
-use super::statics::{StaticResult, operating_point, static_fitted};
-use super::{AnalysisError, BeamMotions, PortVoltages};
+use super::statics::operating_point;
+use super::{AnalysisError, PortVoltages};
 use crate::compile::Compiled;
 use crate::discretize::yielded;
 use crate::gaps::backbending::Strength;
@@ -70,26 +69,6 @@ pub fn backbend(compiled: &Compiled, voltages: &PortVoltages) -> Result<Backbent
     let strains = arms.iter().map(|a| (beams[a.beam].name.clone(), -a.strain)).collect();
     let bearable = arms.iter().map(|a| a.strength.cold / beams[a.beam].material.youngs_modulus).collect();
     Ok(Backbent { compiled: bent, strains, bearable })
-}
-
-/// Where a mechanism rests at `voltages` after its ports were raised to `raised` once: the model, the equilibrium, the displacement of
-/// points along every beam, and permanent strains by name.
-///
-/// The mesh holds the tolerance for the strains and for the equilibrium; the estimate is the sum of both errors.
-///
-/// # Errors
-/// See [`backbend`].
-pub fn static_backbent(
-    compiled: &Compiled,
-    raised: &PortVoltages,
-    voltages: &PortVoltages,
-) -> Result<(Compiled, StaticResult, BeamMotions, Strains), AnalysisError> {
-    let bent = backbent_fitted(compiled, raised)?;
-    let of_strains = bent.compiled.order.estimated_error;
-    let (mut fitted, mut result, curves) = static_fitted(&bent.compiled, voltages)?;
-    let both = fitted.order.estimated_error.zip(of_strains).map(|(a, b)| a + b);
-    (fitted.order.estimated_error, result.estimated_error) = (both, both);
-    Ok((fitted, result, curves, bent.strains))
 }
 
 fn arms(compiled: &Compiled) -> Vec<Arm> {

@@ -81,18 +81,6 @@ pub struct ContinuationResult {
     pub warnings: Vec<String>,
 }
 
-/// The path of equilibria on the mesh for it, with the model on that mesh.
-///
-/// # Errors
-/// See [`AnalysisError`].
-pub fn trace_fitted(
-    compiled: &Compiled,
-    request: &ContinuationRequest<'_>,
-    watch: Watch<'_>,
-) -> Result<(Compiled, ContinuationResult), AnalysisError> {
-    super::mesh::path_fitted(compiled, request, watch)
-}
-
 /// Traces the path of equilibria from the one at `from`.
 ///
 /// # Errors

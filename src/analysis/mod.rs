@@ -21,6 +21,7 @@ pub mod statics;
 pub mod step_error;
 pub mod transient;
 
+use serde::Serialize;
 use thiserror::Error;
 
 /// Told how far a long analysis has come, as a fraction 0…1; answers whether to go on.
@@ -84,11 +85,22 @@ pub enum AnalysisError {
     Cancelled,
 }
 
+/// Displacement of a node from its drawn place.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct NodeMotion {
+    /// Along x [m].
+    pub x: f64,
+    /// Along y [m].
+    pub y: f64,
+    /// Rotation about z [rad].
+    pub rz: f64,
+}
+
 /// Displacement of nodes, by name, in netlist order.
-pub type NodeMotions = Vec<(String, statics::NodeMotion)>;
+pub type NodeMotions = Vec<(String, NodeMotion)>;
 
 /// Displacement of points along beams, equally spaced, ends included, beam by beam in the order of the structure.
-pub type BeamMotions = Vec<Vec<statics::NodeMotion>>;
+pub type BeamMotions = Vec<Vec<NodeMotion>>;
 
 /// Voltages on ports for a whole analysis: (port name, volts). Ports not named are at 0 V.
 pub type PortVoltages = [(String, f64)];

@@ -1,6 +1,5 @@
 //! Natural frequencies and shapes about the operating point.
 use super::gap_pieces;
-use super::mesh::{OF_DEFLECTION, of_share_in_pieces};
 use super::signal::{Signal, View};
 use super::statics::{NodeMotion, operating_point, told_at};
 use super::{AnalysisError, BeamMotions, NodeMotions, PortVoltages};
@@ -58,19 +57,6 @@ pub fn modes(compiled: &Compiled, count: usize, voltages: &PortVoltages) -> Resu
     Ok(modes_with_curves(compiled, count, voltages)?.0)
 }
 
-/// The same on the mesh that holds the tolerance, which comes with it, and the displacement of points along every beam.
-///
-/// # Errors
-/// See [`modes`].
-pub fn modes_fitted(
-    compiled: &Compiled,
-    count: usize,
-    voltages: &PortVoltages,
-) -> Result<(Compiled, ModesResult, Vec<BeamMotions>), AnalysisError> {
-    let (fitted, (result, curves)) = super::mesh::modes_fitted(compiled, count, voltages)?;
-    Ok((fitted, result, curves))
-}
-
 /// The same, with the displacement of points along every beam for pictures, mode by mode.
 ///
 /// # Errors
@@ -97,7 +83,7 @@ pub fn modes_with_curves(
         let point = operating_point(compiled, voltages)?;
         way = told_at(compiled, &point);
         let share = gap_pieces::left_out(compiled, &point.q, &point.volts);
-        in_pieces = share.map(|(name, share)| (name.to_owned(), OF_DEFLECTION * share));
+        in_pieces = share.map(|(name, share)| (name.to_owned(), gap_pieces::OF_DEFLECTION * share));
         let mut rise = point.rise.clone();
         system.electrics.steady(&point.sources, &mut rise, &mut drive);
         point.q
@@ -132,7 +118,7 @@ pub fn modes_with_curves(
     let forces = if loaded { axial_forces(&compiled.structure, &compiled.parts, &q, &drive) } else { Vec::new() };
     let mut errors = estimated(compiled, &tangent, &forces, &found);
     let mut warnings = told(compiled, count, &q, &found.lambda);
-    warnings.extend(of_share_in_pieces(compiled, in_pieces).map(|d| d.message));
+    warnings.extend(gap_pieces::told(compiled, in_pieces));
     warnings.extend(way.into_iter().map(|way| format!("the equilibrium that these modes are about: {way}")));
     errors.truncate(count);
     found.lambda.truncate(count);

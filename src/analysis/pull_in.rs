@@ -64,18 +64,6 @@ impl PullInResult {
     }
 }
 
-/// [`pull_in`] on the mesh that holds the tolerance, which comes with it.
-///
-/// # Errors
-/// See [`pull_in`].
-pub fn pull_in_fitted(
-    compiled: &Compiled,
-    port: Option<&str>,
-    max: f64,
-) -> Result<(Compiled, PullInResult), AnalysisError> {
-    super::mesh::pull_in_fitted(compiled, port, max)
-}
-
 /// Follows the equilibrium up to `max` volts on `port` (none: the first port, else the first source of the netlist), then
 /// down again. The other ports stay at 0 V, the netlist's other sources at their voltage.
 ///

@@ -1,4 +1,5 @@
 //! Static equilibrium.
+pub use super::NodeMotion;
 use super::contact_range::within_contact_range;
 use super::signal::{Signal, View};
 use super::{AnalysisError, BeamMotions, PortVoltages};
@@ -8,17 +9,6 @@ use crate::solve::SolveError;
 use crate::solve::equilibrium::{Equilibrium, EquilibriumOptions, Path};
 use crate::solve::path::SourcePath;
 use serde::Serialize;
-
-/// Displacement of a node from its drawn place.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
-pub struct NodeMotion {
-    /// Along x [m].
-    pub x: f64,
-    /// Along y [m].
-    pub y: f64,
-    /// Rotation about z [rad].
-    pub rz: f64,
-}
 
 /// A static equilibrium.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -99,19 +89,6 @@ pub fn static_with_curves(
 ) -> Result<(StaticResult, BeamMotions), AnalysisError> {
     let point = operating_point(compiled, voltages)?;
     Ok((result_at(compiled, &point), beam_motions(compiled, &point.q)))
-}
-
-/// [`static_with_curves`] on the mesh that holds the tolerance, which comes with it.
-///
-/// # Errors
-/// See [`AnalysisError`].
-pub fn static_fitted(
-    compiled: &Compiled,
-    voltages: &PortVoltages,
-) -> Result<(Compiled, StaticResult, BeamMotions), AnalysisError> {
-    let (fitted, point) = super::mesh::static_fitted(compiled, voltages)?;
-    let (result, curves) = (result_at(&fitted, &point), beam_motions(&fitted, &point.q));
-    Ok((fitted, result, curves))
 }
 
 /// What there is to tell of an equilibrium.

@@ -4,9 +4,8 @@ use super::failure::Failure;
 use super::model::{Context, ModelArgs, Named, warn_of, warn_of_mesh};
 use super::output::OutputArgs;
 use super::{progress, report, statics, value};
-use bimorph::analysis::continuation::{
-    ContinuationRequest, ContinuationResult, CriticalPoint, Growing, trace, trace_fitted,
-};
+use bimorph::analysis::continuation::{ContinuationRequest, ContinuationResult, CriticalPoint, Growing, trace};
+use bimorph::analysis::mesh::path_fitted;
 use bimorph::analysis::statics::NodeMotion;
 use bimorph::compile::{Compiled, compile};
 use bimorph::netlist::Setting;
@@ -135,7 +134,7 @@ impl PathCommand {
             let found = trace(first, &request, &mut progress::watch(&bar))?;
             request.signals = busiest(&found);
         }
-        let result = trace_fitted(first, &request, &mut progress::watch(&bar));
+        let result = path_fitted(first, &request, &mut progress::watch(&bar));
         bar.finish_and_clear();
         let (fitted, result) = result?;
         warn_of_mesh(first, &fitted);

@@ -3,7 +3,7 @@
 use super::failure::Failure;
 use super::output::{check_folder, write};
 use super::{interrupt, statics, value};
-use bimorph::analysis::statics::static_fitted;
+use bimorph::analysis::mesh::static_fitted;
 use bimorph::compile::{CompileOptions, compile};
 use bimorph::front::{self, Asked};
 use bimorph::netlist::Setting;

@@ -8,8 +8,8 @@ use super::rpc::{Calls, Reply};
 use super::work::{Results, guarded};
 use super::{proto, status};
 use crate::analysis::integrator::Integrator;
+use crate::analysis::mesh;
 use crate::analysis::transient::TransientOptions;
-use crate::analysis::{harmonic, mesh, modes, pull_in, statics};
 use crate::options::Value;
 use crate::options::analysis::{MODES_COUNT, PULL_IN_MAX, TRAN_POINTS, TRAN_RHO, TRAN_STEP, TRAN_STOP};
 use std::sync::Arc;
@@ -34,8 +34,7 @@ impl Calls {
     pub(super) async fn statics(&self, request: proto::StaticRequest) -> Reply<proto::StaticResponse> {
         let voltages = voltages(request.voltages)?;
         let job = move |model: &Model| {
-            let (fitted, mut result, _) =
-                statics::static_fitted(&model.compiled, &voltages).map_err(status::analysis)?;
+            let (fitted, mut result, _) = mesh::static_fitted(&model.compiled, &voltages).map_err(status::analysis)?;
             result.warnings.extend(mesh::warnings(&fitted));
             Ok(results::static_to_wire(&result))
         };
@@ -56,7 +55,7 @@ impl Calls {
                 return Err(status::limit("mode_work", most, work));
             }
             let (fitted, mut result, _) =
-                modes::modes_fitted(&model.compiled, count, &voltages).map_err(status::analysis)?;
+                mesh::modes_fitted(&model.compiled, count, &voltages).map_err(status::analysis)?;
             result.warnings.extend(mesh::warnings(&fitted));
             Ok(results::modes_to_wire(&result))
         };
@@ -79,7 +78,7 @@ impl Calls {
         }
         let job = move |model: &Model| {
             let (fitted, mut result) =
-                harmonic::harmonic_fitted(&model.compiled, &options, &mut |_| true).map_err(status::analysis)?;
+                mesh::harmonic_fitted(&model.compiled, &options, &mut |_| true).map_err(status::analysis)?;
             result.warnings.extend(mesh::warnings(&fitted));
             Ok(convert::harmonic::result_to_wire(&result))
         };
@@ -93,7 +92,7 @@ impl Calls {
         let port = (!request.port.is_empty()).then_some(request.port);
         let job = move |model: &Model| {
             let (fitted, mut result) =
-                pull_in::pull_in_fitted(&model.compiled, port.as_deref(), max).map_err(status::analysis)?;
+                mesh::pull_in_fitted(&model.compiled, port.as_deref(), max).map_err(status::analysis)?;
             result.warnings.extend(mesh::warnings(&fitted));
             Ok(results::pull_in_to_wire(&result))
         };

@@ -1,7 +1,8 @@
 //! Backbending: hot arms that were heated too far are shorter ever after.
 
 use crate::{close, model, node};
-use bimorph::analysis::backbending::{backbend, static_backbent};
+use bimorph::analysis::backbending::backbend;
+use bimorph::analysis::mesh::static_backbent;
 use bimorph::analysis::statics::static_equilibrium;
 use bimorph::compile::{CompileOptions, Compiled, Junctions, compile};
 use bimorph::netlist::{Bundle, Setting};

@@ -1,7 +1,8 @@
 //! Equilibrium paths by arc length: buckling, post-buckling, snap-through, pull-in and what lies behind it.
 
 use crate::{close, model};
-use bimorph::analysis::continuation::{ContinuationRequest, ContinuationResult, Growing, trace, trace_fitted};
+use bimorph::analysis::continuation::{ContinuationRequest, ContinuationResult, Growing, trace};
+use bimorph::analysis::mesh::path_fitted;
 use bimorph::compile::{CompileOptions, Compiled, Junctions, compile};
 use bimorph::netlist::{Bundle, Setting};
 use bimorph::solve::continuation::Branch;
@@ -94,7 +95,7 @@ fn the_mesh_of_a_path_holds_the_tolerance() {
             branch: Branch::Plus,
             points: 3000,
         };
-        trace_fitted(&first, &request, &mut |_| true).unwrap()
+        path_fitted(&first, &request, &mut |_| true).unwrap()
     };
     let both = |path: &ContinuationResult| [path.bifurcations[0].value, *path.signals[0].2.last().unwrap()];
     let exact = both(&found(&CompileOptions { segments: Some(128), ..CompileOptions::default() }).1);

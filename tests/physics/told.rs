@@ -2,9 +2,10 @@
 
 use super::{close, node};
 use bimorph::analysis::mesh::fitted_in_time;
-use bimorph::analysis::modes::{modes, modes_fitted};
-use bimorph::analysis::pull_in::pull_in_fitted;
-use bimorph::analysis::statics::static_fitted;
+use bimorph::analysis::mesh::modes_fitted;
+use bimorph::analysis::mesh::pull_in_fitted;
+use bimorph::analysis::mesh::static_fitted;
+use bimorph::analysis::modes::modes;
 use bimorph::analysis::step_error::with_step_error;
 use bimorph::analysis::transient::{TransientOptions, TransientResult, transient};
 use bimorph::analysis::{AnalysisError, chart};

@@ -1,9 +1,10 @@
 //! A model on a server and the same model in process give the same bits: trials, small signals, analyses and sweeps.
 
 use super::running::{DEADLINE, PLATE, Running, bundle, start_with};
-use bimorph::analysis::harmonic::{HarmonicOptions, harmonic_fitted};
+use bimorph::analysis::harmonic::HarmonicOptions;
 use bimorph::analysis::integrator::Integrator;
 use bimorph::analysis::mesh::fitted_in_time;
+use bimorph::analysis::mesh::harmonic_fitted;
 use bimorph::analysis::step_error::with_step_error;
 use bimorph::analysis::transient::{TransientOptions, transient};
 use bimorph::analysis::{modes::modes_fitted, pull_in::pull_in_fitted, statics::static_fitted};

@@ -1,7 +1,7 @@
 //! The response of the whole model to one drive at a complex frequency: one factorization of K + sC + s²M, one solve.
 
-use super::HarmonicOptions;
 use super::named::{Row, drive_port, row, unit};
+use super::options::HarmonicOptions;
 use crate::analysis::AnalysisError;
 use crate::analysis::statics::{OperatingPoint, operating_point};
 use crate::compile::Compiled;

@@ -1,6 +1,6 @@
 //! The frequencies of a response: those of an even grid, and more about each resonance, so that no peak falls between two of them.
 
-use super::roots::Root;
+use super::root::Root;
 
 /// How the frequencies of the even grid lie.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -5,31 +5,30 @@
 //! | `named` | what drives and what is seen, by name |
 //! | `exact` | the response of the whole model at a complex frequency |
 //! | `modal` | the same as a sum over modes, with static correction |
-//! | `roots` | poles and zeros |
+//! | `options` | what is asked for |
+//! | `root`, `roots` | poles and zeros |
 //! | [`grid`] | the frequencies |
 //!
-//! The mesh for it is chosen by [`super::mesh`].
+//! The mesh for it is chosen by `analysis::mesh`.
 
 pub(crate) mod exact;
 pub mod grid;
 pub(crate) mod modal;
 pub(crate) mod named;
+mod options;
+mod root;
 mod roots;
 
 use super::{AnalysisError, Watch};
 use crate::compile::Compiled;
-use crate::options::Value;
-use crate::options::analysis::{AC_FROM, AC_MODES, AC_POINTS, AC_TO};
 use exact::Exact;
-use grid::Spacing;
 use modal::Sum;
 use nalgebra::Complex;
 use std::f64::consts::TAU;
 
-pub use roots::Root;
+pub use options::{HarmonicOptions, MOST_VALUES};
+pub use root::Root;
 
-/// Frequencies times signals at most: each value is a complex number in doubles.
-pub const MOST_VALUES: usize = 50_000_000;
 /// Modes within the band beyond which poles, zeros and points about resonances are left out.
 const MOST_MODES: usize = 100;
 /// Modes are known to this multiple of the band, where they are not too many.
@@ -42,31 +41,6 @@ const MOST_ZEROS: usize = 8;
 const COMPARED: usize = 60;
 /// Share of the sum of its parts below which a value is a zero of the curve.
 const ZERO: f64 = 0.01;
-
-/// What is asked for.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct HarmonicOptions {
-    /// What is driven: `NODE.fx`, `NODE.fy`, `NODE.m`, a port, `BEAM.T`, `frame.ax`, `frame.ay`, `frame.wz`.
-    pub drive: String,
-    /// Signals wanted, `PORT.i` among them; none: what the driven place itself answers.
-    pub signals: Vec<String>,
-    /// Lowest frequency [Hz].
-    pub from: f64,
-    /// Highest frequency [Hz].
-    pub to: f64,
-    /// Points of the even grid, or of each decade of it.
-    pub points: usize,
-    /// How the even grid lies.
-    pub spacing: Spacing,
-    /// No points about resonances and zeros: the even grid alone.
-    pub even: bool,
-    /// As a sum over modes with static correction instead of exactly.
-    pub by_modes: bool,
-    /// Modes of that sum; none: those to twice the highest frequency.
-    pub modes: Option<usize>,
-    /// Port voltages of the operating point.
-    pub voltages: Vec<(String, f64)>,
-}
 
 /// What a signal answers.
 #[derive(Debug, Clone, PartialEq)]
@@ -108,71 +82,6 @@ pub struct HarmonicResult {
     pub estimated_error: Option<f64>,
     /// What the numbers do not say by themselves.
     pub warnings: Vec<String>,
-}
-
-impl HarmonicOptions {
-    /// Refuses what cannot be computed, before anything is laid out for it.
-    ///
-    /// # Errors
-    /// [`AnalysisError::BadRequest`].
-    pub fn check(&self) -> Result<(), AnalysisError> {
-        let refused = |what: &str, detail: String| Err(AnalysisError::BadRequest { what: what.into(), detail });
-        let given = [(&AC_FROM, Value::Number(self.from)), (&AC_TO, Value::Number(self.to))];
-        for (option, value) in given.into_iter().chain([(&AC_POINTS, Value::Count(self.points))]) {
-            if let Err(e) = option.check(&value) {
-                return refused(option.name, format!("expected {}, got {}", e.expected, e.got));
-            }
-        }
-        if let Some(count) = self.modes
-            && let Err(e) = AC_MODES.check(&Value::Count(count))
-        {
-            return refused("modes", format!("expected {}, got {}", e.expected, e.got));
-        }
-        if self.from >= self.to {
-            return refused(
-                "to",
-                format!("expected a frequency above from ({:e} Hz), got {:e} Hz", self.from, self.to),
-            );
-        }
-        let most = crate::options::analysis::MOST_FREQUENCIES;
-        let count = grid::count(self.spacing, self.points, [self.from, self.to]).filter(|count| *count <= most);
-        let Some(count) = count else {
-            return refused("points", format!("expected at most {most} in all; take fewer, or a narrower band"));
-        };
-        if count.saturating_mul(self.signals.len().max(1)) > MOST_VALUES {
-            let got = self.signals.len();
-            return refused(
-                "points",
-                format!("{count} for {got} signals are more than {MOST_VALUES} values; take fewer"),
-            );
-        }
-        Ok(())
-    }
-}
-
-impl HarmonicOptions {
-    /// Bytes that the numbers of the answer take at most, as doubles.
-    pub fn bytes(&self) -> usize {
-        let even = grid::count(self.spacing, self.points, [self.from, self.to]).unwrap_or(usize::MAX);
-        let more = if self.even { 0 } else { grid::MOST_ADDED };
-        even.saturating_add(more).saturating_mul(1 + 2 * self.signals.len().max(1)).saturating_mul(8)
-    }
-}
-
-/// The response on the mesh that holds the tolerance, which comes with it.
-///
-/// # Errors
-/// See [`AnalysisError`].
-pub fn harmonic_fitted(
-    compiled: &Compiled,
-    options: &HarmonicOptions,
-    watch: Watch<'_>,
-) -> Result<(Compiled, HarmonicResult), AnalysisError> {
-    options.check()?;
-    let fitted = super::mesh::fitted_in_band(compiled, options)?;
-    let mut result = harmonic(&fitted, options, watch)?;
-    result.estimated_error = fitted.order.estimated_error;
-    Ok((fitted, result))
 }
 
 /// The response on the mesh as it is.

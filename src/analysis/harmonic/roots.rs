@@ -8,15 +8,13 @@
 
 use super::exact::Exact;
 use super::modal::Sum;
+use super::root::Root;
 use crate::device::small_signal::Law;
 use crate::solve::frequency::pole::pole;
 use faer::Mat;
 use nalgebra::{Complex, DMatrix};
-use serde::Serialize;
 use std::f64::consts::TAU;
 
-/// Real part that is rounding, as a share of |s|.
-const UNDAMPED: f64 = 1e-13;
 /// Steps of the secant rule at most, where they begin beside the guess, and a step that is rounding, as shares of |s|.
 const MOST_STEPS: usize = 40;
 const ASIDE: f64 = 1e-4;
@@ -30,41 +28,6 @@ const UNSEEN: f64 = 0.05;
 const SHIFTS: [f64; 3] = [0.37, 0.73, -0.53];
 /// Two of them that are nearer to each other than this share are one.
 const SAME: f64 = 1e-6;
-
-/// A pole or a zero, of each conjugate pair that in the upper half plane.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Root {
-    /// Real part [rad/s].
-    pub re: f64,
-    /// Imaginary part [rad/s].
-    pub im: f64,
-}
-
-impl Root {
-    fn new(s: Complex<f64>) -> Self {
-        let (re, im) = (if s.re.abs() <= UNDAMPED * s.norm() { 0.0 } else { s.re }, s.im.abs());
-        Self { re: re + 0.0, im: if im <= UNDAMPED * s.norm() { 0.0 } else { im } }
-    }
-
-    /// |s|/2π [Hz].
-    pub fn frequency_hz(&self) -> f64 {
-        self.re.hypot(self.im) / TAU
-    }
-
-    /// |s|/(2·|Re s|) [1]; none where nothing damps it.
-    pub fn quality(&self) -> Option<f64> {
-        (self.re != 0.0).then(|| self.re.hypot(self.im) / (2.0 * self.re.abs()))
-    }
-
-    /// Distance of the half-power points of a lightly damped resonance, |Re s|/π [Hz].
-    pub fn width_hz(&self) -> f64 {
-        self.re.abs() / (0.5 * TAU)
-    }
-
-    fn within(&self, [from, to]: [f64; 2]) -> bool {
-        (from..=to).contains(&self.frequency_hz())
-    }
-}
 
 fn sorted(mut roots: Vec<Root>) -> Vec<Root> {
     roots.sort_by(|a, b| a.frequency_hz().total_cmp(&b.frequency_hz()).then(a.re.total_cmp(&b.re)));

@@ -4,9 +4,12 @@
 //! hardly moves; that of a rotation likewise, and no smaller than what turns the size of the mechanism by a thirtieth of the largest
 //! displacement. The finer mesh starts from the state of the coarser one, so that both are on one branch.
 
+use super::super::gap_pieces::OF_DEFLECTION;
 use super::super::linear_stress::left_out;
-use super::super::statics::{OperatingPoint, operating_point, operating_point_near};
-use super::super::{AnalysisError, PortVoltages};
+use super::super::statics::{
+    OperatingPoint, StaticResult, beam_motions, operating_point, operating_point_near, result_at,
+};
+use super::super::{AnalysisError, BeamMotions, PortVoltages};
 use super::meshed::{chosen, meshed, on};
 use super::warnings::{of_pieces, of_stress};
 use crate::compile::Compiled;
@@ -15,10 +18,6 @@ use crate::refine::carry::carried;
 use crate::refine::doubling::{self, Output};
 use crate::refine::model_order::ModelOrder;
 use std::borrow::Cow;
-
-/// Error of a deflection for the share of its distance that a gap along beams leaves out: found on a cantilever of 1 to 8 pieces, where
-/// a deflection near the fold is off by 1.8 times that share, and release by 2 times.
-pub(in super::super) const OF_DEFLECTION: f64 = 2.0;
 
 /// Share of the largest displacement below which errors are relative to that.
 pub(super) const SMALL: f64 = 1.0 / 30.0;
@@ -144,19 +143,20 @@ pub(super) fn size(model: &Compiled) -> f64 {
     model.structure.beams.iter().map(|b| b.length).fold(model.parts.system.length_scale, f64::max)
 }
 
-/// The equilibrium on the mesh for it: [`fitted`], and what was found on the way.
+/// The equilibrium on the mesh for it, which comes with it, and the displacement of points along every beam.
 ///
 /// # Errors
 /// See [`fitted`].
-pub(crate) fn static_fitted(
+pub fn static_fitted(
     compiled: &Compiled,
     voltages: &PortVoltages,
-) -> Result<(Compiled, OperatingPoint), AnalysisError> {
+) -> Result<(Compiled, StaticResult, BeamMotions), AnalysisError> {
     let (order, point) = order(compiled, voltages, compiled.order.segments.clone())?;
     let mut fitted = on(compiled, order)?;
     let (point, told) = told_of_static(&fitted, point);
     fitted.warnings.items.extend(told);
-    Ok((fitted, point))
+    let (result, curves) = (result_at(&fitted, &point), beam_motions(&fitted, &point.q));
+    Ok((fitted, result, curves))
 }
 
 /// What an equilibrium is warned of beside its mesh: what a linear model leaves out, and gaps in too few pieces.

@@ -13,15 +13,15 @@ use crate::refine::model_order::ModelOrder;
 /// Modes beyond which none are compared with those of a finer mesh: their own estimates stand.
 const MOST_COMPARED: usize = 64;
 
-/// The modes on the mesh for them: [`fitted`], and what was found on the way.
+/// The modes on the mesh for them, which comes with them, and the displacement of points along every beam.
 ///
 /// # Errors
 /// See [`fitted`].
-pub(crate) fn modes_fitted(
+pub fn modes_fitted(
     compiled: &Compiled,
     count: usize,
     voltages: &PortVoltages,
-) -> Result<(Compiled, Shaped), AnalysisError> {
+) -> Result<(Compiled, ModesResult, Vec<BeamMotions>), AnalysisError> {
     let (order, found) = for_modes(compiled, count, voltages)?;
     let found = found.filter(|(segments, _)| *segments == order.segments);
     let fitted = on(compiled, order)?;
@@ -30,7 +30,7 @@ pub(crate) fn modes_fitted(
         None => modes_with_curves(&fitted, count, voltages)?,
     };
     let estimated_error = fitted.order.estimated_error;
-    Ok((fitted, (ModesResult { estimated_error, ..result }, curves)))
+    Ok((fitted, ModesResult { estimated_error, ..result }, curves))
 }
 
 /// Modes with the shapes of their beams.

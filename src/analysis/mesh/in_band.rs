@@ -13,10 +13,10 @@
 //! The responses that are compared are sums over the modes to twice the band with static correction: what such a sum leaves out is the
 //! same on both meshes. With too many modes in the band they are exact, and no modes are compared.
 
-use super::super::AnalysisError;
 use super::super::harmonic::exact::Exact;
 use super::super::harmonic::modal::{self, Sum};
-use super::super::harmonic::{BEYOND, GUARDS, HarmonicOptions};
+use super::super::harmonic::{BEYOND, GUARDS, HarmonicOptions, HarmonicResult, harmonic};
+use super::super::{AnalysisError, Watch};
 use super::equilibrium::told_of_static;
 use super::meshed::{chosen, meshed, on};
 use crate::compile::Compiled;
@@ -39,8 +39,24 @@ const MOST_MODES: usize = 64;
 /// Sizes below this share of the largest of a signal over the band are errors of that.
 const SMALL: f64 = 1e-9;
 
+/// The response on the mesh that holds the tolerance, which comes with it.
+///
+/// # Errors
+/// See [`AnalysisError`].
+pub fn harmonic_fitted(
+    compiled: &Compiled,
+    options: &HarmonicOptions,
+    watch: Watch<'_>,
+) -> Result<(Compiled, HarmonicResult), AnalysisError> {
+    options.check()?;
+    let fitted = fitted(compiled, options)?;
+    let mut result = harmonic(&fitted, options, watch)?;
+    result.estimated_error = fitted.order.estimated_error;
+    Ok((fitted, result))
+}
+
 /// The model on the mesh for a response.
-pub(in crate::analysis) fn fitted(compiled: &Compiled, options: &HarmonicOptions) -> Result<Compiled, AnalysisError> {
+pub(super) fn fitted(compiled: &Compiled, options: &HarmonicOptions) -> Result<Compiled, AnalysisError> {
     let fewer =
         HarmonicOptions { signals: options.signals.iter().take(MOST_SIGNALS).cloned().collect(), ..options.clone() };
     // every name is looked up once, whatever is compared

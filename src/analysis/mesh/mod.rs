@@ -25,6 +25,7 @@ mod pull_in;
 mod warnings;
 mod yielded;
 
+use super::gap_pieces::OF_DEFLECTION;
 use super::linear_stress::left_out;
 use super::statics::{OperatingPoint, operating_point};
 use super::transient::TransientOptions;
@@ -33,20 +34,19 @@ use crate::compile::Compiled;
 use crate::multibody::planar::Pose;
 use crate::netlist::Diagnostic;
 use crate::refine::model_order::ModelOrder;
-pub(super) use equilibrium::OF_DEFLECTION;
-pub(crate) use equilibrium::static_fitted;
+pub use equilibrium::static_fitted;
 use frequencies::for_modes;
-pub(crate) use frequencies::modes_fitted;
+pub use frequencies::modes_fitted;
+pub use in_band::harmonic_fitted;
 use meshed::on;
-pub(crate) use path::path_fitted;
+pub use path::path_fitted;
 use pull_in::for_pull_in;
-pub(crate) use pull_in::pull_in_fitted;
-pub(super) use warnings::of_share_in_pieces;
+pub use pull_in::pull_in_fitted;
 use warnings::{of_pieces, of_stress};
 
 pub(crate) use warnings::WARNING;
 pub use warnings::{beyond, warnings};
-pub(crate) use yielded::backbent_fitted;
+pub use yielded::static_backbent;
 
 /// What a mesh is for.
 #[derive(Debug, Clone, Copy)]
@@ -115,17 +115,6 @@ pub(crate) fn told_of_run(moving: &Compiled, start: Option<&Compiled>, voltages:
     let end = if moving.structure.beam_gaps.is_empty() { None } else { operating_point(moving, voltages).ok() };
     let points: Vec<(OperatingPoint, f64)> = end.map(|end| (end, OF_DEFLECTION)).into_iter().collect();
     of_stress(moving, share).into_iter().chain(of_pieces(moving, &points)).collect()
-}
-
-/// The model on the mesh for a frequency response.
-///
-/// # Errors
-/// See [`fitted`].
-pub fn fitted_in_band(
-    compiled: &Compiled,
-    options: &super::harmonic::HarmonicOptions,
-) -> Result<Compiled, AnalysisError> {
-    in_band::fitted(compiled, options)
 }
 
 /// What stress would change in the way that a linear run goes: from its first state to where it would rest.

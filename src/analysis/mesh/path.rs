@@ -4,10 +4,11 @@
 //! once more the other way.
 
 use super::super::continuation::{ContinuationRequest, ContinuationResult, CriticalPoint, Growing, trace};
+use super::super::gap_pieces::OF_DEFLECTION;
 use super::super::linear_stress::left_out;
 use super::super::statics::operating_point;
 use super::super::{AnalysisError, PortVoltages, Watch};
-use super::equilibrium::{OF_DEFLECTION, SMALL, size};
+use super::equilibrium::{SMALL, size};
 use super::meshed::{chosen, meshed, on};
 use super::warnings::{of_share_in_pieces, of_stress};
 use crate::compile::Compiled;
@@ -20,11 +21,11 @@ const MOST_EVENTS: usize = 8;
 /// Results that differ by more than this share are of another branch.
 const OTHER_BRANCH: f64 = 0.3;
 
-/// The path on the mesh for it.
+/// The path on the mesh for it, which comes with it.
 ///
 /// # Errors
 /// See [`trace`].
-pub(crate) fn path_fitted(
+pub fn path_fitted(
     compiled: &Compiled,
     request: &ContinuationRequest<'_>,
     watch: Watch<'_>,

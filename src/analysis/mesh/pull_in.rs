@@ -1,10 +1,10 @@
 //! The mesh for pull-in: both voltages, compared with those of twice the segments.
 
 use super::super::AnalysisError;
+use super::super::gap_pieces::OF_DEFLECTION;
 use super::super::linear_stress::left_out;
 use super::super::pull_in::{PullInResult, pull_in};
 use super::super::statics::{OperatingPoint, operating_point};
-use super::equilibrium::OF_DEFLECTION;
 use super::meshed::{chosen, meshed, on};
 use super::warnings::{of_pieces, of_stress};
 use crate::compile::Compiled;
@@ -24,11 +24,11 @@ pub(super) fn pull_in_outputs(found: &PullInResult) -> Vec<Output> {
     vec![output(found.pull_in_v), found.release_v.map_or(Output { value: f64::NAN, scale: 1.0 }, output)]
 }
 
-/// Pull-in on the mesh for it: [`fitted`], and what was found on the way.
+/// Pull-in on the mesh for it, which comes with it.
 ///
 /// # Errors
 /// See [`fitted`].
-pub(crate) fn pull_in_fitted(
+pub fn pull_in_fitted(
     compiled: &Compiled,
     port: Option<&str>,
     max: f64,

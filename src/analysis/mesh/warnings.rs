@@ -58,13 +58,8 @@ pub(super) fn of_pieces(compiled: &Compiled, points: &[(OperatingPoint, f64)]) -
 }
 
 /// The same where the gap that leaves out most is known, and how far it may be off.
-pub(in super::super) fn of_share_in_pieces(compiled: &Compiled, worst: Option<(String, f64)>) -> Option<Diagnostic> {
-    let tol = compiled.options.tol;
-    let (name, error) = worst.filter(|(_, error)| *error > tol)?;
-    let message = format!(
-        "`{name}` acts on the ends of its beams, which would bend between them too: it may be off by {error:.1e}, more than the \
-         tolerance {tol:e}"
-    );
+pub(super) fn of_share_in_pieces(compiled: &Compiled, worst: Option<(String, f64)>) -> Option<Diagnostic> {
+    let message = gap_pieces::told(compiled, worst)?;
     Some(warning(PIECES, message, "divide the beams: draw several gaps in a row between further nodes"))
 }
 

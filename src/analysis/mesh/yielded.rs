@@ -1,8 +1,9 @@
 //! The mesh for what yields: permanent strains, compared with those of twice the segments.
 
-use super::super::backbending::{Backbent, backbend};
-use super::super::{AnalysisError, PortVoltages};
-use super::equilibrium::SMALL;
+use super::super::backbending::{Backbent, Strains, backbend};
+use super::super::statics::StaticResult;
+use super::super::{AnalysisError, BeamMotions, PortVoltages};
+use super::equilibrium::{SMALL, static_fitted};
 use super::meshed::{chosen, meshed, on};
 use crate::compile::Compiled;
 use crate::options::CompileOptions;
@@ -11,11 +12,31 @@ use crate::refine::doubling::{self, Output};
 /// Share of the tolerance for the strains: the rest is for what comes after them.
 const SHARE: f64 = 0.25;
 
+/// Where a mechanism rests at `voltages` after its ports were raised to `raised` once: the model, the equilibrium, the displacement of
+/// points along every beam, and permanent strains by name.
+///
+/// The mesh holds the tolerance for the strains and for the equilibrium; the estimate is the sum of both errors.
+///
+/// # Errors
+/// See [`backbend`].
+pub fn static_backbent(
+    compiled: &Compiled,
+    raised: &PortVoltages,
+    voltages: &PortVoltages,
+) -> Result<(Compiled, StaticResult, BeamMotions, Strains), AnalysisError> {
+    let bent = backbent_fitted(compiled, raised)?;
+    let of_strains = bent.compiled.order.estimated_error;
+    let (mut fitted, mut result, curves) = static_fitted(&bent.compiled, voltages)?;
+    let both = fitted.order.estimated_error.zip(of_strains).map(|(a, b)| a + b);
+    (fitted.order.estimated_error, result.estimated_error) = (both, both);
+    Ok((fitted, result, curves, bent.strains))
+}
+
 /// A mechanism that was heated too far, on the mesh for its permanent strains.
 ///
 /// # Errors
 /// See [`backbend`].
-pub(crate) fn backbent_fitted(compiled: &Compiled, voltages: &PortVoltages) -> Result<Backbent, AnalysisError> {
+fn backbent_fitted(compiled: &Compiled, voltages: &PortVoltages) -> Result<Backbent, AnalysisError> {
     let mut analyse = |segments: &[usize]| {
         Ok::<_, AnalysisError>(outputs(&backbend(meshed(compiled, segments)?.as_ref(), voltages)?))
     };
