@@ -237,7 +237,11 @@ impl Sweep {
         };
         if let Some((option, _, of)) = given.iter().find(|(_, given, of)| *given && !of.contains(&self.analysis)) {
             let expected = of.iter().map(name).collect::<Vec<_>>().join(" or ");
-            return Err(Failure::bad(option, &format!("--analysis {expected} beside it"), name(&self.analysis)));
+            return Err(Failure::bad(
+                option,
+                format!("--analysis {expected} beside it").as_str(),
+                name(&self.analysis),
+            ));
         }
         if self.threads.is_some() && self.to.is_some() {
             return Err(Failure::bad(

@@ -1,11 +1,11 @@
 //! Values on the command line: numbers with netlist suffixes, `NAME=VALUE`, lists of names.
 
-use bimorph::jobs::sweep::parse;
+use bimorph::jobs::sweep;
 use bimorph::netlist::Setting;
 
 /// A number as netlists write it, with an optional suffix: `30u`, `1.2e6`, `-5`, `2*pi`.
 pub(crate) fn number(text: &str) -> Result<f64, String> {
-    match parse::number(text.trim()).map_or_else(|| Setting::parse(text).ok(), |x| Some(Setting::Number(x))) {
+    match sweep::number(text.trim()).map_or_else(|| Setting::parse(text).ok(), |x| Some(Setting::Number(x))) {
         Some(Setting::Number(value)) if value.is_finite() => Ok(value),
         _ => Err(format!("expected a number such as 2.1u, 30n or 1.2e6 (m milli, M mega), got \"{text}\"")),
     }

@@ -9,14 +9,14 @@
 //! force acts, which is the same push. The numbers of a cell follow from the seed and the cell's place alone: a
 //! step that is taken again, in other pieces, in another process, meets the same force, and trials stay pure.
 
-use super::DeviceError;
+pub use super::contract::Agitation;
+use super::contract::DeviceError;
 use crate::analysis::modes::modes;
 use crate::compile::Compiled;
 use crate::multibody::agitation::{self, BOLTZMANN};
 use crate::multibody::planar::Pose;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
-use serde::{Deserialize, Serialize};
 
 /// Band of what is not told, in lowest natural frequencies [1].
 const BAND: f64 = 20.0;
@@ -24,15 +24,6 @@ const BAND: f64 = 20.0;
 const HIGHEST: f64 = 1e12;
 /// Cells that one step may cross: beyond, the mean of the force says too little.
 const MOST_CELLS: f64 = 2.0;
-
-/// The agitation of an opened device.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
-pub struct Agitation {
-    /// Names the random numbers.
-    pub seed: u64,
-    /// Band of the force [Hz], above 0, at most 1e12; none: twenty times the lowest natural frequency, about the drawing.
-    pub band: Option<f64>,
-}
 
 /// An agitation of a model.
 #[derive(Debug, Clone)]

@@ -1,8 +1,8 @@
 //! What a trial answers: currents, charges, outputs and their partials from the state that it came to, and how long a step the
 //! circuit may take next.
 
-use super::local::Session;
 use super::ports::Answer;
+use super::session::Session;
 use super::shown::Shown;
 use super::states::Snapshot;
 use super::{Trial, TrialReply};

@@ -2,7 +2,7 @@
 //! like as a whole. Without derivatives, and without a trace.
 
 use super::DeviceError;
-use super::local::Session;
+use super::session::Session;
 use super::states::Snapshot;
 use crate::analysis::signal::{self, Signal, View};
 use crate::compile::Compiled;

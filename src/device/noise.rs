@@ -13,8 +13,9 @@
 //! An answer is that with nothing else changed: the current of a port whose voltage is held, the motion of one whose force
 //! is. Left out: fluctuations of temperature, and what Johnson's noise heats.
 
-use super::local::Session;
 use super::ports::Answer;
+use super::seen::{Seen, surroundings};
+use super::session::Session;
 use super::states::Snapshot;
 use super::{DeviceError, Token};
 use crate::analysis::signal::{Signal, View};
@@ -26,34 +27,6 @@ use crate::multibody::planar::Pose;
 use crate::solve::frequency::gyroscopic;
 use crate::solve::harmonic::ComplexPose;
 use nalgebra::Complex;
-
-/// Temperature of a mechanism whose netlist names none: 27 °C, as circuits have it [K].
-const ROOM: f64 = 300.15;
-
-/// Temperature of what surrounds the mechanism [K].
-pub(super) fn surroundings(compiled: &Compiled) -> f64 {
-    let ambient = compiled.structure.beams.iter().map(|beam| beam.material.ambient_temperature);
-    ambient.into_iter().find(|t| *t > 0.0).unwrap_or(ROOM)
-}
-
-/// What an answer sees of a displacement of each body, and of its rate of change: the same at every frequency.
-#[derive(Debug, Clone)]
-pub(super) struct Seen {
-    place: Vec<Pose>,
-    change: Vec<Pose>,
-}
-
-impl Seen {
-    fn nothing(bodies: usize) -> Self {
-        Self { place: vec![Pose::zeros(); bodies], change: vec![Pose::zeros(); bodies] }
-    }
-
-    /// Of a displacement that swings at `omega` [rad/s].
-    fn at(&self, omega: f64) -> Vec<ComplexPose> {
-        let one = |(place, change): (&Pose, &Pose)| place.zip_map(change, |p, c| Complex::new(p, omega * c));
-        self.place.iter().zip(&self.change).map(one).collect()
-    }
-}
 
 impl Session {
     /// Spectral densities of ports, then signals, about a state: row-major, complex.

@@ -4,9 +4,9 @@
 //! the one that they came from. Reading trusts nothing: lengths are bounded by the bytes that are there, and sizes by the
 //! model's.
 
+use super::contract::{Agitation, DeviceError, OpenRequest, Token, refused};
 use super::shown::Shown;
 use super::states::{Snapshot, States};
-use super::{Agitation, DeviceError, OpenRequest, Token};
 use crate::multibody::planar::Pose;
 use crate::solve::time::method::Motion;
 
@@ -61,11 +61,6 @@ pub(super) fn read(bytes: &[u8]) -> Result<(OpenRequest, States), DeviceError> {
         Some(read) if from.0.is_empty() => Ok(read),
         _ => Err(refused("the bytes of a snapshot", "something else, or a part of one")),
     }
-}
-
-/// What is wrong with the bytes of a snapshot.
-pub(super) fn refused(expected: &str, got: &str) -> DeviceError {
-    DeviceError::BadRequest { what: "snapshot", expected: expected.into(), got: got.into() }
 }
 
 struct Writer(Vec<u8>);

@@ -3,8 +3,8 @@
 //! [`Perturbed`] is the physics at any complex s [rad/s]: what a unit at a port does to the forces, and what is seen of the motion
 //! that follows. [`Session::respond`] asks at s = iω; [`crate::analysis::harmonic`] at poles and zeros, too.
 
-use super::local::Session;
 use super::ports::Answer;
+use super::session::Session;
 use super::states::Snapshot;
 use super::{DeviceError, SmallSignal, Token};
 use crate::analysis::signal::{Signal, View};

@@ -3,7 +3,7 @@
 
 use super::agitation::Shaken;
 use super::answer::STEP_SHARE;
-use super::local::Session;
+use super::session::Session;
 use super::states::Snapshot;
 use super::{Status, Trial, TrialReply};
 use crate::analysis::contact_range::within_contact_range;

@@ -10,6 +10,7 @@ use super::{proto, status};
 use crate::analysis::integrator::Integrator;
 use crate::analysis::mesh;
 use crate::analysis::transient::TransientOptions;
+use crate::compile::Compiled;
 use crate::options::Value;
 use crate::options::analysis::{MODES_COUNT, PULL_IN_MAX, TRAN_POINTS, TRAN_RHO, TRAN_STEP, TRAN_STOP};
 use std::sync::Arc;
@@ -158,6 +159,12 @@ impl Calls {
             let _sending = sending;
             let job = || {
                 let release = release.as_ref().map(|model| &*model.compiled);
+                // the mesh, too, holds the tolerance that the run asks for
+                let sharper = (tol < model.compiled.options.tol).then(|| {
+                    let mut sharper = Compiled::clone(&model.compiled);
+                    sharper.options.tol = tol;
+                    sharper
+                });
                 let options = TransientOptions {
                     stop,
                     signals,
@@ -171,7 +178,7 @@ impl Calls {
                     keep: false,
                     ..TransientOptions::default()
                 };
-                send_transient(&model.compiled, &options, outlet);
+                send_transient(sharper.as_ref().unwrap_or(&model.compiled), &options, outlet);
                 Ok(())
             };
             if let Err(status) = guarded(&budget, job) {

@@ -3,7 +3,7 @@
 //! A point depends on the design, the seed, its number and how many there are, and on nothing else: shards, threads and runs that go
 //! on later draw the same ones.
 
-use super::{SweepError, bad};
+use super::error::{SweepError, bad};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use std::str::FromStr;

@@ -1,7 +1,7 @@
 //! How a parameter varies: a distribution, by its quantiles.
 
-use super::parse::number;
-use super::{SweepError, bad};
+use super::error::{SweepError, bad};
+use crate::netlist::Setting;
 use std::str::FromStr;
 
 /// The distribution of one parameter.
@@ -138,6 +138,14 @@ pub(super) fn normal_score(u: f64) -> f64 {
     let r = (-tail.ln()).sqrt();
     let score = if r <= 5.0 { ratio(&C, &D, r - 1.6) } else { ratio(&E, &F, r - 5.0) };
     if q < 0.0 { -score } else { score }
+}
+
+/// A finite number as the netlist language writes it.
+pub fn number(text: &str) -> Option<f64> {
+    match Setting::parse(text) {
+        Ok(Setting::Number(value)) if value.is_finite() => Some(value),
+        _ => None,
+    }
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@
 //! the drawing has other beams) searches its own, as a point alone does. Which mesh a point gets depends on the
 //! grid and on the point alone, not on other points, on shards or on threads.
 
-use super::SweepSpec;
+use super::spec::{SweepSpec, at};
 use crate::analysis::AnalysisError;
 use crate::analysis::mesh::given::{Judged, judged};
 use crate::analysis::mesh::{self, Request};
@@ -61,7 +61,7 @@ impl<'a> Family<'a> {
 
     /// The middle of the grid.
     fn middle(&self) -> Option<Compiled> {
-        let options = super::point::at(self.options, &middle(self.spec));
+        let options = at(self.options, &middle(self.spec));
         draw(self.source, &options).ok()?.compile().ok()
     }
 }

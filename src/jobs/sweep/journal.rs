@@ -2,8 +2,8 @@
 //! is done, behind a line that names the sweep. Whoever goes on reads the points back to the same bits; a last line that is cut off
 //! was not finished, and its point is computed again.
 
-use super::SweepSpec;
 use super::point::{Found, Outcome, Value};
+use super::spec::SweepSpec;
 use crate::content::Fnv;
 use crate::netlist::Bundle;
 use crate::options::CompileOptions;

@@ -1,6 +1,8 @@
 //! Axes and shards as text: `w=1.8u:2.2u:21`, `w=1.8u,2u,2.2u`, `1/4`.
 
-use super::{Shard, SweepError, SweepParameter, bad};
+use super::distribution::number;
+use super::error::{SweepError, bad};
+use super::spec::{Shard, SweepParameter};
 use crate::netlist::Setting;
 use std::str::FromStr;
 
@@ -62,14 +64,6 @@ pub fn linear(low: f64, high: f64, count: usize) -> Vec<Setting> {
         if i + 1 == count && count > 1 { high } else { low + (high - low) * s }
     };
     (0..count).map(|i| Setting::Number(at(i))).collect()
-}
-
-/// A finite number as the netlist language writes it.
-pub fn number(text: &str) -> Option<f64> {
-    match Setting::parse(text) {
-        Ok(Setting::Number(value)) if value.is_finite() => Some(value),
-        _ => None,
-    }
 }
 
 #[cfg(test)]

@@ -1,7 +1,8 @@
 //! One point of a grid: compile with its parameter values, run the analysis, keep named numbers.
 
+use super::error::SweepError;
 use super::family::Family;
-use super::{SweepAnalysis, SweepError, SweepSpec};
+use super::spec::{SweepAnalysis, SweepSpec, at};
 use crate::analysis::mesh::given::{Answer, judged, searched};
 use crate::analysis::mesh::{self, Request};
 use crate::analysis::signal::Signal;
@@ -122,15 +123,6 @@ pub(super) fn check_names(spec: &SweepSpec, source: &Source, options: &CompileOp
         Some(name) => refused("outputs", OUTPUTS.to_owned(), format!("\"{name}\"")),
         None => Ok(()),
     }
-}
-
-/// Options with the settings of a point.
-pub(super) fn at(options: &CompileOptions, settings: &[(String, Setting)]) -> CompileOptions {
-    let mut options = options.clone();
-    let swept: HashSet<&str> = settings.iter().map(|(name, _)| name.as_str()).collect();
-    options.set.retain(|(name, _)| !swept.contains(name.as_str()));
-    options.set.extend_from_slice(settings);
-    options
 }
 
 fn solve(

@@ -1,8 +1,8 @@
 //! Samples of parameters that vary: distributions, a design, correlations.
 
 use super::design::{Cube, Design};
-use super::distribution::{Vary, normal_score};
-use super::{Distribution, SweepError, bad};
+use super::distribution::{Distribution, Vary, normal_score};
+use super::error::{SweepError, bad};
 use crate::netlist::Setting;
 use nalgebra::DMatrix;
 

@@ -1,7 +1,7 @@
 //! The rows of a sweep, and the same as CSV.
 
-use super::SweepSpec;
 use super::point::Outcome;
+use super::spec::SweepSpec;
 use crate::netlist::Setting;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;

@@ -8,8 +8,8 @@
 //! beyond the tolerance.
 
 use super::family::{alike, middle};
-use super::point::{Found, Outcome, Value, at, brief};
-use super::{SweepAnalysis, SweepSpec};
+use super::point::{Found, Outcome, Value, brief};
+use super::spec::{SweepAnalysis, SweepSpec, at};
 use crate::analysis::AnalysisError;
 use crate::analysis::mesh;
 use crate::analysis::side_by_side::{self, RunEnd};

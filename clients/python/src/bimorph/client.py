@@ -400,7 +400,8 @@ class Model:
         """Motion from 0 to ``stop`` [s] with port voltages held [V], at ``points`` equally spaced times.
 
         ``release`` is a variant of the same netlist whose static equilibrium is the initial state; without it the part
-        starts at rest as drawn. ``tol`` is the relative error of a step [1], 0: the model's. ``progress`` is told the
+        starts at rest as drawn. ``tol`` is the relative error of a step [1], 0: the model's; the mesh holds the
+        smaller of the two. ``progress`` is told the
         fraction done.
 
         ``inputs`` are waveforms of ports, ``{"heat": (times, volts)}``: straight lines between corners, constant before and after. The

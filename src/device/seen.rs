@@ -1,0 +1,34 @@
+//! What an answer sees of displacements, and what surrounds a mechanism.
+
+use crate::compile::Compiled;
+use crate::multibody::planar::Pose;
+use crate::solve::harmonic::ComplexPose;
+use nalgebra::Complex;
+
+/// Temperature of a mechanism whose netlist names none: 27 °C, as circuits have it [K].
+const ROOM: f64 = 300.15;
+
+/// Temperature of what surrounds the mechanism [K].
+pub(super) fn surroundings(compiled: &Compiled) -> f64 {
+    let ambient = compiled.structure.beams.iter().map(|beam| beam.material.ambient_temperature);
+    ambient.into_iter().find(|t| *t > 0.0).unwrap_or(ROOM)
+}
+
+/// What an answer sees of a displacement of each body, and of its rate of change: the same at every frequency.
+#[derive(Debug, Clone)]
+pub(super) struct Seen {
+    pub(super) place: Vec<Pose>,
+    pub(super) change: Vec<Pose>,
+}
+
+impl Seen {
+    pub(super) fn nothing(bodies: usize) -> Self {
+        Self { place: vec![Pose::zeros(); bodies], change: vec![Pose::zeros(); bodies] }
+    }
+
+    /// Of a displacement that swings at `omega` [rad/s].
+    pub(super) fn at(&self, omega: f64) -> Vec<ComplexPose> {
+        let one = |(place, change): (&Pose, &Pose)| place.zip_map(change, |p, c| Complex::new(p, omega * c));
+        self.place.iter().zip(&self.change).map(one).collect()
+    }
+}

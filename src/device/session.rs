@@ -1,0 +1,192 @@
+//! What is open of a device: its ports, its signals, its states, and the storage that every trial reuses.
+
+use super::agitation::Shaken;
+use super::ports::Ports;
+use super::seen::{Seen, surroundings};
+use super::states::{Snapshot, States};
+use super::{Description, DeviceError, Mode, OpenRequest, PortInfo, PortKind, SignalInfo, Token, Trial};
+use crate::analysis::signal::Signal;
+use crate::analysis::transient::first_step;
+use crate::budget;
+use crate::compile::Compiled;
+use crate::gaps::drive::Electrics;
+use crate::gaps::{Drive, System};
+use crate::multibody::BlockMatrix;
+use crate::multibody::planar::Pose;
+use crate::solve::equilibrium::{Equilibrium, EquilibriumOptions};
+use crate::solve::harmonic::{ComplexPose, Harmonic};
+use crate::solve::time::adaptive::Adaptive;
+use crate::solve::time::formulated::Formulated;
+use crate::solve::time::method::Motion;
+use std::sync::Arc;
+
+/// What is open: the choice of ports and signals, the states, and the storage that every trial reuses.
+#[derive(Debug)]
+pub(super) struct Session {
+    /// What it was opened with.
+    pub(super) opened: OpenRequest,
+    pub(super) ports: Ports,
+    pub(super) signals: Vec<Signal>,
+    pub(super) states: States,
+    pub(super) first_step: f64,
+    pub(super) equilibrium: Equilibrium,
+    /// Thermal agitation, if it was asked for.
+    pub(super) shaken: Option<Shaken>,
+    /// Carries ∂motion/∂(final voltage), one for each opened port.
+    pub(super) stepper: Adaptive<Formulated>,
+    pub(super) motion: Motion,
+    pub(super) rise: Vec<f64>,
+    pub(super) rise_slope: Vec<f64>,
+    pub(super) sources: Vec<f64>,
+    pub(super) unit: Vec<f64>,
+    pub(super) drive: Drive,
+    pub(super) change: Drive,
+    pub(super) zeros: Vec<Pose>,
+    pub(super) linear: Option<(Token, BlockMatrix<f64, 3>)>,
+    pub(super) harmonic: Harmonic,
+    /// What each answer sees of a displacement, about the state that was asked for its noise last.
+    pub(super) seen: Option<(Token, Vec<Seen>)>,
+    pub(super) response: Vec<ComplexPose>,
+}
+
+impl Session {
+    pub(super) fn open(compiled: &Compiled, request: &OpenRequest) -> Result<(Self, Description), DeviceError> {
+        let ports = Ports::find(compiled, &request.ports)?;
+        let own = ports.system.clone();
+        let system = own.as_deref().unwrap_or(&compiled.parts.system);
+        let electrics = &system.electrics;
+        let signals: Vec<Signal> = (request.signals.iter())
+            .map(|name| {
+                budget::check();
+                Signal::find(compiled, name)
+                    .map_err(|e| DeviceError::UnknownSignal { name: name.clone(), hint: e.to_string() })
+            })
+            .collect::<Result<_, _>>()?;
+        let description = Description {
+            ports: if request.ports.is_empty() {
+                let name = |&source: &usize| electrics.names[source].clone();
+                ports.sources.iter().map(|p| PortInfo { name: name(p), kind: PortKind::Electrical }).collect()
+            } else {
+                let kinds = request.ports.iter().zip(&ports.kinds);
+                kinds.map(|(name, &kind)| PortInfo { name: name.clone(), kind }).collect()
+            },
+            signals: (request.signals.iter().zip(&signals))
+                .map(|(name, s)| SignalInfo { name: name.clone(), unit: s.unit().into() })
+                .collect(),
+            unknowns: compiled.unknowns(),
+        };
+        let n = system.bodies();
+        // each port carries its sensitivity, and matrices of ports and signals go with every reply
+        budget::lay_out_matrix(ports.len(), 12 * n + 4 * ports.len() + 2 * signals.len());
+        let heaters = electrics.heating.heaters.len();
+        let first_step = first_step(system, f64::INFINITY);
+        let joints = match &compiled.joints {
+            Some(Ok(joints)) => Some(ports.joints(joints)),
+            Some(Err(unfit)) => {
+                return Err(DeviceError::BadRequest {
+                    what: "formulation",
+                    expected: format!("one that suits this mechanism ({unfit})"),
+                    got: compiled.options.formulation.name().into(),
+                });
+            }
+            None => None,
+        };
+        let shaken = match &request.noise {
+            Some(noise) => Some(Shaken::new(noise, compiled, surroundings(compiled))?),
+            None => None,
+        };
+        let session = Self {
+            opened: request.clone(),
+            shaken,
+            stepper: Adaptive::new(system, Formulated::new(system, joints.as_ref(), first_step, &ports.sources)),
+            ports,
+            signals,
+            states: States::default(),
+            first_step,
+            equilibrium: Equilibrium::new(system, EquilibriumOptions::default()),
+            motion: Motion::zeros(n),
+            rise: vec![0.0; heaters],
+            rise_slope: vec![0.0; heaters],
+            sources: vec![0.0; electrics.sources()],
+            unit: vec![0.0; electrics.sources()],
+            drive: electrics.drive(),
+            change: electrics.drive(),
+            zeros: vec![Pose::zeros(); n],
+            linear: None,
+            harmonic: Harmonic::new(system),
+            seen: None,
+            response: vec![ComplexPose::zeros(); n],
+        };
+        Ok((session, description))
+    }
+
+    /// Whether a state has the sizes and the sense that one of this session has.
+    pub(super) fn fits(&self, state: &Snapshot) -> bool {
+        let n = self.zeros.len();
+        let poses = |poses: &[Pose]| poses.len() == n && poses.iter().all(|p| p.iter().all(|x| x.is_finite()));
+        let numbers = |numbers: &[f64], count: usize| numbers.len() == count && numbers.iter().all(|x| x.is_finite());
+        let carried = self.stepper.method.state();
+        let alike = |(a, b): (&Motion, &Motion)| a.q.len() == b.q.len() && a.v.len() == b.v.len();
+        let followed = state.shown.followed();
+        poses(&state.q)
+            && poses(&state.v)
+            && numbers(&state.rise, self.rise.len())
+            && numbers(&state.sources, self.sources.len())
+            && state.next_step > 0.0
+            && state.elapsed >= 0.0
+            && (followed == 0 || followed == self.signals.len() + self.ports.len())
+            && (state.carried.is_empty()
+                || state.carried.len() == carried.len() && state.carried.iter().zip(carried).all(alike))
+    }
+
+    /// The state that a small signal is about.
+    pub(super) fn about(&mut self, token: Token, omega: f64) -> Result<Arc<Snapshot>, DeviceError> {
+        if !omega.is_finite() || omega < 0.0 {
+            return Err(DeviceError::BadRequest {
+                what: "omega",
+                expected: "a finite angular frequency of at least 0 rad/s".into(),
+                got: omega.to_string(),
+            });
+        }
+        self.states.get(token).ok_or(DeviceError::UnknownToken(token))
+    }
+
+    pub(super) fn check(&self, request: &Trial<'_>) -> Result<(), DeviceError> {
+        if request.voltages.len() != self.ports.len() {
+            return Err(DeviceError::BadRequest {
+                what: "voltages",
+                expected: format!("{} values, one for each opened port", self.ports.len()),
+                got: request.voltages.len().to_string(),
+            });
+        }
+        if let Some(v) = request.voltages.iter().find(|v| !v.is_finite()) {
+            return Err(DeviceError::BadRequest {
+                what: "voltages",
+                expected: "finite numbers".into(),
+                got: v.to_string(),
+            });
+        }
+        if request.mode == Mode::Transient && !(request.dt.is_finite() && request.dt > 0.0) {
+            return Err(DeviceError::BadRequest {
+                what: "dt",
+                expected: "a positive time in seconds".into(),
+                got: request.dt.to_string(),
+            });
+        }
+        Ok(())
+    }
+
+    /// The model as it was opened, with the inputs among its ports.
+    pub(super) fn system<'a>(own: &'a Option<Arc<System>>, compiled: &'a Compiled) -> &'a System {
+        own.as_deref().unwrap_or(&compiled.parts.system)
+    }
+
+    /// Fills in the source vector: opened ports as asked, the others at 0, the netlist's own sources.
+    pub(super) fn fill_sources(&mut self, electrics: &Electrics, given: &[f64]) {
+        self.sources.fill(0.0);
+        self.sources[electrics.ports..electrics.voltages()].copy_from_slice(&electrics.fixed);
+        for (&port, &value) in self.ports.sources.iter().zip(given) {
+            self.sources[port] = value;
+        }
+    }
+}

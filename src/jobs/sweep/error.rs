@@ -1,0 +1,44 @@
+//! Why a sweep has no table.
+
+use thiserror::Error;
+
+/// Why a sweep has no table. A point that fails is not an error of the sweep: its row says why.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum SweepError {
+    /// A specification that means nothing.
+    #[error("{what}: expected {expected}, got {got}")]
+    BadSpec {
+        /// Which part.
+        what: String,
+        /// What was expected.
+        expected: String,
+        /// What came.
+        got: String,
+    },
+    /// The progress callback said stop.
+    #[error("cancelled after {done} of {points} points")]
+    Cancelled {
+        /// Points finished.
+        done: u64,
+        /// Points of this shard.
+        points: u64,
+    },
+    /// The table would take more memory than the sweep may use.
+    #[error("the table needs more than {most} bytes; name the outputs that are wanted, or split the sweep into shards")]
+    TooLarge {
+        /// What it may use [byte].
+        most: usize,
+    },
+    /// The operating system gave no threads.
+    #[error("no worker threads: {reason}")]
+    Threads {
+        /// What it said.
+        reason: String,
+    },
+}
+
+/// What of a specification means nothing.
+pub(super) fn bad(what: String, expected: &str, got: &str) -> SweepError {
+    SweepError::BadSpec { what, expected: expected.to_owned(), got: got.to_owned() }
+}

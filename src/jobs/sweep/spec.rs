@@ -1,0 +1,159 @@
+//! What to sweep: the points of a grid and their parameters.
+
+use super::error::{SweepError, bad};
+use super::samples::Samples;
+use crate::compile::CompileOptions;
+use crate::netlist::Setting;
+use std::collections::HashSet;
+
+/// What to sweep.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SweepSpec {
+    /// The full grid of these is run; the last one varies fastest. Empty: one point, as the netlist stands.
+    pub parameters: Vec<SweepParameter>,
+    /// Samples that are drawn at every point of the grid, and vary faster than it.
+    pub samples: Option<Samples>,
+    /// What to compute at each point.
+    pub analysis: SweepAnalysis,
+    /// Which part of the grid to run.
+    pub shard: Shard,
+    /// Worker threads; none: one per core. The table does not depend on it.
+    pub threads: Option<usize>,
+}
+
+/// One axis of the grid.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SweepParameter {
+    /// A netlist parameter.
+    pub name: String,
+    /// The values it takes, in order. SI.
+    pub values: Vec<Setting>,
+}
+
+/// What to compute at each point.
+#[derive(Debug, Clone, PartialEq)]
+pub enum SweepAnalysis {
+    /// Static equilibrium.
+    Static {
+        /// Columns wanted: `NODE.x` [m], `NODE.y` [m], `NODE.rz` [rad], `PORT.i` [A], `PORT.q` [C], `BEAM.T` [K];
+        /// empty: x, y and rz of every node.
+        outputs: Vec<String>,
+        /// Port voltages by name [V].
+        voltages: Vec<(String, f64)>,
+    },
+    /// Natural frequencies [Hz].
+    Modes {
+        /// How many, from the lowest.
+        count: usize,
+        /// Port voltages of the operating point by name [V].
+        voltages: Vec<(String, f64)>,
+    },
+    /// Pull-in and release voltages [V].
+    PullIn {
+        /// Port or netlist source to raise; none: the first.
+        port: Option<String>,
+        /// Highest voltage tried [V].
+        max: f64,
+    },
+    /// Motion from rest, by Rodas4: signals at its end.
+    Transient {
+        /// End time [s].
+        stop: f64,
+        /// Columns wanted, as signals of a transient: `NODE.x` [m], `NODE.vx` [m/s], `BEAM.T` [K], `GAP.gap` [m], ….
+        outputs: Vec<String>,
+        /// Port voltages held during the run, by name [V].
+        voltages: Vec<(String, f64)>,
+    },
+}
+
+/// One of `count` equal parts of a grid: the points whose number modulo `count` is `index`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Shard {
+    /// From 0.
+    pub index: usize,
+    /// At least 1.
+    pub count: usize,
+}
+
+impl Default for Shard {
+    fn default() -> Self {
+        Self { index: 0, count: 1 }
+    }
+}
+
+impl SweepSpec {
+    /// Names of what varies, the slowest first.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        let varying = self.samples.iter().flat_map(|samples| &samples.asked.vary);
+        self.parameters.iter().map(|axis| axis.name.as_str()).chain(varying.map(|vary| vary.name.as_str()))
+    }
+
+    /// Samples at each point of the grid.
+    fn sample_count(&self) -> usize {
+        self.samples.as_ref().map_or(1, |samples| samples.asked.count)
+    }
+
+    /// Points of the whole grid with all samples, before sharding.
+    ///
+    /// # Errors
+    /// [`SweepError::BadSpec`] for an axis without values or a grid too large to number.
+    pub fn grid_points(&self) -> Result<usize, SweepError> {
+        self.parameters.iter().try_fold(self.sample_count(), |product, axis| {
+            if axis.values.is_empty() {
+                return Err(bad(format!("parameter {}", axis.name), "at least one value", "none"));
+            }
+            product
+                .checked_mul(axis.values.len())
+                .ok_or_else(|| bad("parameters".into(), "a grid that can be numbered", "too many points"))
+        })
+    }
+
+    /// Numbers of the points this shard runs.
+    ///
+    /// # Errors
+    /// [`SweepError::BadSpec`].
+    pub fn point_numbers(&self) -> Result<Vec<usize>, SweepError> {
+        let Shard { index, count } = self.shard;
+        if count == 0 || index >= count {
+            return Err(bad("shard".into(), "i/N with 0 <= i < N", &format!("{index}/{count}")));
+        }
+        let mut seen = HashSet::with_capacity(self.parameters.len());
+        for name in self.names() {
+            if !seen.insert(name) {
+                return Err(bad("parameters".into(), "each name once", &format!("\"{name}\" twice")));
+            }
+        }
+        Ok((index..self.grid_points()?).step_by(count).collect())
+    }
+
+    /// Values of every parameter at one point of the grid.
+    pub fn settings(&self, number: usize) -> Vec<(String, Setting)> {
+        let count = self.sample_count();
+        let mut settings = self.grid_settings(number / count);
+        settings.extend(self.samples.iter().flat_map(|samples| samples.values(number % count)));
+        settings
+    }
+
+    /// Values of the parameters of the grid at one of its points, samples aside.
+    fn grid_settings(&self, mut number: usize) -> Vec<(String, Setting)> {
+        let mut settings = Vec::with_capacity(self.parameters.len());
+        for axis in self.parameters.iter().rev() {
+            let n = axis.values.len().max(1);
+            if let Some(value) = axis.values.get(number % n) {
+                settings.push((axis.name.clone(), value.clone()));
+            }
+            number /= n;
+        }
+        settings.reverse();
+        settings
+    }
+}
+
+/// Options with the settings of a point.
+pub(super) fn at(options: &CompileOptions, settings: &[(String, Setting)]) -> CompileOptions {
+    let mut options = options.clone();
+    let swept: HashSet<&str> = settings.iter().map(|(name, _)| name.as_str()).collect();
+    options.set.retain(|(name, _)| !swept.contains(name.as_str()));
+    options.set.extend_from_slice(settings);
+    options
+}
