@@ -256,3 +256,18 @@ fn mirrored_gaps_come_back() {
         assert!((f / g - 1.0).abs() < 1e-9, "{before:?} became {after:?}\n{again}");
     }
 }
+
+/// Arcs and tapers, with a name and without, come back as their pieces: the same modes.
+#[test]
+fn arcs_and_tapers_come_back() {
+    let text = "process p = [Youngsmodulus=165e9 density=2300 h=2u]\nanchor p [a] [l=10u w=10u oz=pi]\n\
+        bow arc2d p [a b] [radius=40u alpha=pi/2 w=2u]\narc2d p [b c] [radius=30u alpha=-pi/3 w=2u oz=pi/2]\n\
+        taper2d p [c d] [l=50u w1=2u w2=5u oz=0.2]\n";
+    let (back, again) = there_and_back(text);
+    assert!(back.beams.len() > 20, "{again}");
+    for (f, g) in
+        frequencies(&Bundle::from_text("t.net", text)).iter().zip(frequencies(&Bundle::from_text("t.net", &again)))
+    {
+        assert!((f / g - 1.0).abs() < 1e-9, "{f} became {g}\n{again}");
+    }
+}

@@ -89,6 +89,7 @@ pub enum MaskError {
 /// # Errors
 /// See [`MaskError`].
 pub fn mask(structure: &Structure, process: &Process, format: Format, name: &str) -> Result<Mask, MaskError> {
+    let structure = &in_words(structure);
     let (lines, left) = of_structure::lines(structure);
     if lines.elements.len() > MOST {
         return Err(MaskError::Large { count: lines.elements.len() });
@@ -116,6 +117,19 @@ pub fn mask(structure: &Structure, process: &Process, format: Format, name: &str
         Format::Gds => write_gds::write(&library)?,
     };
     Ok(Mask { bytes, notes, polygons, labels, unit_m: library.unit_m })
+}
+
+/// The same with pieces of arcs and tapers (`arc.1`) called by a word (`arc.piece1`), as names of netlists are.
+fn in_words(structure: &Structure) -> Structure {
+    let mut structure = structure.clone();
+    let names = structure.nodes.iter_mut().map(|n| &mut n.name).chain(structure.beams.iter_mut().map(|b| &mut b.name));
+    for name in names {
+        if let Some((whole, piece)) = name.rsplit_once('.').filter(|(_, p)| p.starts_with(|c: char| c.is_ascii_digit()))
+        {
+            *name = format!("{whole}.piece{piece}");
+        }
+    }
+    structure
 }
 
 /// Letters, digits and `_` of a file's name.

@@ -133,7 +133,7 @@ fn arcs_and_tapers() {
         sheet.polygon("POLY1", &arc);
         sheet.rectangle("POLY1", [109.0, 50.0], [111.0, 80.0]);
         let text = agree(sheet.drawing(), reference, 4, 3e-3);
-        let counts = ["\ncircbeam", "\ntaper2d", "\nbeam2d"].map(|name| text.matches(name).count());
+        let counts = ["\narc2d", "\ntaper2d", "\nbeam2d"].map(|name| text.matches(name).count());
         assert_eq!(counts, [1, 1, 1], "{text}");
     }
 }

@@ -198,3 +198,12 @@ fn a_long_bond_pad() {
     let text = netlist(&found);
     assert!(text.contains("beam2det p1") && text.contains("heat port * "), "{text}");
 }
+
+/// Of labels that name nothing the first twenty are told, and how many more there are.
+#[test]
+fn few_labels_are_told() {
+    let mut sheet = chevron("a", "b");
+    (0..1000).for_each(|k| sheet.label("lost", [f64::from(k), 500.0]));
+    let notes = extracted(sheet.drawing()).notes;
+    assert!(notes.len() == 21 && notes[20].starts_with("980 more labels"), "{notes:?}");
+}

@@ -134,6 +134,7 @@ pub fn extract(drawing: &Drawing, process: &Process, options: &ExtractOptions) -
     arcs::arcs(&mut result, drawing.unit_m);
     result.drop_unused_nodes();
     names::name(&mut result, drawing, &labels);
+    names::told(&mut result);
     Ok(result)
 }
 

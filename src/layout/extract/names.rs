@@ -6,6 +6,9 @@ use super::nets::OnNet;
 use crate::layout::drawing::Drawing;
 use std::collections::HashSet;
 
+/// Labels that are told one by one.
+const TOLD: usize = 20;
+
 /// Names that mean something else in a netlist.
 const RESERVED: [&str; 9] = ["subnet", "param", "process", "for", "if", "else", "call", "uses", "pi"];
 
@@ -66,6 +69,18 @@ pub(super) fn name(result: &mut Extraction, drawing: &Drawing, nets: &[Option<On
                 break;
             }
         }
+    }
+}
+
+/// Leaves of what is told of labels the first few, and how many more there are.
+pub(super) fn told(result: &mut Extraction) {
+    let mut count = 0usize;
+    result.notes.retain(|note| {
+        count += usize::from(note.starts_with("label `"));
+        count <= TOLD || !note.starts_with("label `")
+    });
+    if count > TOLD {
+        result.notes.push(format!("{} more labels that name nothing, or what has a name already", count - TOLD));
     }
 }
 

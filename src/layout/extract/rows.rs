@@ -205,7 +205,7 @@ impl<'a> Rows<'a> {
                     ("w", Value::Wide(arc.width)),
                     ("oz", Value::Turn(start.sin().atan2(start.cos()))),
                 ];
-                let mut row = row("circbeam", name(arc.layer), vec![a, b], values);
+                let mut row = row("arc2d", name(arc.layer), vec![a, b], values);
                 row.values.extend(perforated(&self.found.layers[arc.layer], arc.porosity, false));
                 row
             }
