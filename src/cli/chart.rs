@@ -15,7 +15,8 @@ use bimorph::options::analysis::CHART_POINTS;
 use bimorph::results::atomic;
 use bimorph::results::format::Format;
 use bimorph::solve::baseline::SolverKind;
-use clap::{Args, ValueEnum};
+use clap::Args;
+use picture::Work;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -97,16 +98,6 @@ pub(crate) struct Chart {
     /// Write the chart to a file; its extension says what: .csv, .svg, .png, .html. Repeatable: one run fills them all
     #[arg(long, value_name = "FILE")]
     out: Vec<PathBuf>,
-}
-
-/// What stands for work.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Work {
-    /// Wall-clock time
-    #[default]
-    Time,
-    /// Passes over the model; multiplications of a step
-    Counts,
 }
 
 #[derive(Debug, Serialize)]

@@ -25,6 +25,7 @@
 pub(crate) mod bar;
 pub mod beam;
 pub mod cubic;
+mod error;
 pub mod frame;
 pub mod gap;
 pub mod junction;
@@ -38,6 +39,7 @@ pub mod scheme;
 pub mod yielded;
 
 pub use crate::options::{Junctions, Scheme};
+pub use error::{DiscretizeError, MOST_SEGMENTS};
 
 use crate::budget;
 use crate::gaps::{Load, Point, System};
@@ -45,10 +47,6 @@ use crate::multibody::{BodyId, Coupling, Damper, Joint, Model};
 use crate::options::CompileOptions;
 use crate::structure::Structure;
 use nalgebra::{Matrix2, Matrix3, Vector2};
-use thiserror::Error;
-
-/// Most segments of all beams together: with bodies, joints and their factors each takes about a kilobyte.
-pub const MOST_SEGMENTS: usize = 2_000_000;
 
 /// Of a segment's joint and points, about [byte].
 const SEGMENT_BYTES: usize = 600;
@@ -70,56 +68,6 @@ pub struct Discretized {
     pub heaters: Vec<usize>,
     /// Name of each gap of the system.
     pub gap_names: Vec<String>,
-}
-
-/// Why a drawing cannot become a model.
-#[derive(Debug, Clone, PartialEq, Error)]
-#[non_exhaustive]
-pub enum DiscretizeError {
-    /// A quantity that must be positive is not.
-    #[error("{element}: {quantity} is {value:e}, expected a positive number")]
-    NotPositive {
-        /// Element name.
-        element: String,
-        /// Which quantity.
-        quantity: &'static str,
-        /// Its value.
-        value: f64,
-    },
-    /// Sources or ports in a loop.
-    #[error("{source_name} closes a loop of ideal voltage sources; remove it or put a resistor in the loop")]
-    SourceLoop {
-        /// Name of the port or source.
-        source_name: String,
-    },
-    /// Conductances that cannot be computed with.
-    #[error(
-        "conductances are too large or too small to be computed with: {element} has the largest; check resistances"
-    )]
-    Conductances {
-        /// The element with the smallest resistance.
-        element: String,
-    },
-    /// A heater whose heat cannot leave.
-    #[error("{beam} is heated but nothing conducts its heat to an anchor; use beam2det for the beams in between")]
-    NoHeatSink {
-        /// Name of a beam in that part.
-        beam: String,
-    },
-    /// More segments than can be laid out.
-    #[error("{segments} segments in all, at most {MOST_SEGMENTS}; take a lower band, a larger tol, or fewer segments")]
-    TooFine {
-        /// Segments of all beams together.
-        segments: usize,
-    },
-    /// Everything is ground.
-    #[error("nothing can move: every node is anchored")]
-    NothingMoves,
-    /// No elements.
-    #[error(
-        "nothing is drawn: only layers, subnets and parameters here; name this file in `uses` of a netlist that has elements"
-    )]
-    NothingDrawn,
 }
 
 /// Turns a drawing into a system.

@@ -9,7 +9,7 @@
 //!
 //! With a band this is where [`model_order`](crate::refine::model_order) starts from.
 
-use super::{DiscretizeError, MOST_SEGMENTS};
+use super::error::{DiscretizeError, MOST_SEGMENTS};
 use crate::options::CompileOptions;
 use crate::structure::{Beam, Structure};
 

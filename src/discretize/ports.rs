@@ -3,7 +3,7 @@
 //! Sources are numbered ports first, then the netlist's voltage sources, then one for each gap with a fixed voltage (which
 //! touches no node).
 
-use super::DiscretizeError;
+use super::error::DiscretizeError;
 use super::rigid::Assembly;
 use crate::gaps::drive::Electrics;
 use crate::gaps::network::{Circuit, CircuitError};

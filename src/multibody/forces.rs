@@ -1,6 +1,7 @@
 //! Elastic forces, strain energy, tangent and damping of a model. One pass over the joints each, no allocation.
 
-use super::model::{Coupling, Model};
+use super::joint::Coupling;
+use super::model::Model;
 use super::planar::factored::FactoredTangent;
 use super::planar::{HalfTurn, JointKinematics, PairTangent, Pose, Symmetric};
 use super::section::{LaidJoint, NONE, Place, Section};

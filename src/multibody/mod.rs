@@ -27,6 +27,7 @@ pub mod body;
 pub mod double;
 pub mod factor;
 pub mod forces;
+pub mod joint;
 pub mod lanes;
 pub mod linear_system;
 pub mod model;
@@ -41,5 +42,6 @@ pub mod sine;
 
 pub use body::{Body, BodyName, Drag};
 pub use factor::{BlockMatrix, Scalar};
-pub use model::{BodyId, Coupling, Damper, Joint, Model, State};
+pub use joint::{BodyId, Coupling, Damper, Joint};
+pub use model::{Model, State};
 pub use pattern::Pattern;

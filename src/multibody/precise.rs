@@ -6,7 +6,8 @@
 
 use super::double::{Double, DoublePose};
 use super::forces::RestStrain;
-use super::model::{BodyId, Coupling, Model};
+use super::joint::{BodyId, Coupling};
+use super::model::Model;
 use super::planar::Pose;
 use super::planar::factored::FactoredTangent;
 use super::section::{NONE, Place};

@@ -2,7 +2,7 @@
 //! arms, its bodies and where its couplings lie. Fifty-six bytes a joint instead of some two hundred and fifty, most of
 //! which every sweep over the joints would have to read.
 
-use super::model::{BodyId, Joint};
+use super::joint::{BodyId, Joint};
 use super::planar::{JointFrame, Symmetric};
 use nalgebra::{Matrix2, Matrix3, Vector2};
 use std::collections::HashMap;

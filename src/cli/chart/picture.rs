@@ -1,10 +1,20 @@
 //! A chart as a picture: one panel for each part.
 
-use super::Work;
 use bimorph::analysis::chart::{Chart, ChartPoint, Measured, Part};
 use bimorph::results::plot::Picture;
 use bimorph::results::plot::axis::quantity;
 use bimorph::results::plot::loglog::{self, Curve, LogChart, Panel, Slope};
+use clap::ValueEnum;
+
+/// What stands for work.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Work {
+    /// Wall-clock time
+    #[default]
+    Time,
+    /// Passes over the model; multiplications of a step
+    Counts,
+}
 
 /// Draws a chart.
 pub(super) fn draw(title: &str, chart: &Chart, work: Work) -> Picture {
