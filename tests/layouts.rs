@@ -135,6 +135,13 @@ fn labels_that_say_too_little_are_one_error_with_its_place() {
     line.text = "2: arm beam2d p1 [root".to_owned();
     let error = convert::convert(&drawing, None).unwrap_err().to_string();
     assert!(error.contains("is no netlist line: expected NAME MODEL PROCESS [nodes]"), "{error}");
+    // a word of the language would make another statement of the line, and read a file called `arm`
+    for line in ["2: uses arm * [root] []", "2: a.for mass2d * [root] [m=1]", "2: arm beam2d p1 [root if] []"] {
+        let mut drawing = drawn_beam();
+        drawing.labels.iter_mut().find(|l| l.text.contains("beam2d")).unwrap().text = line.to_owned();
+        let error = convert::convert(&drawing, None).unwrap_err().to_string();
+        assert!(error.contains("no words of the language"), "{line}: {error}");
+    }
 }
 
 #[test]

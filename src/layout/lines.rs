@@ -89,7 +89,9 @@ impl Line {
         let nodes: Vec<String> = nodes.split_whitespace().map(str::to_owned).collect();
         let good = is_full_name(name) && is_name(model) && (process == "*" || is_name(process));
         if !good || nodes.is_empty() || !nodes.iter().all(|n| is_full_name(n)) {
-            return Err(fault("names of letters, digits, `_`, indices and dots, and at least one node"));
+            return Err(fault(
+                "names of letters, digits, `_`, indices and dots, no words of the language, and at least one node",
+            ));
         }
         let parameters = pairs(rest.trim()).ok_or_else(|| fault("[name=value …] with numbers behind the nodes"))?;
         Ok(Self { name: name.to_owned(), model: model.to_owned(), process: process.to_owned(), nodes, parameters })
@@ -119,9 +121,14 @@ fn pairs(text: &str) -> Option<Vec<(String, f64)>> {
     inside.split_whitespace().map(pair).collect()
 }
 
-/// A word of netlists.
+/// Words that mean something else in a netlist than a name.
+pub(crate) const RESERVED: [&str; 9] = ["subnet", "param", "process", "for", "if", "else", "call", "uses", "pi"];
+
+/// A word of netlists that is a name.
 pub(crate) fn is_name(text: &str) -> bool {
-    text.starts_with(|c: char| c.is_ascii_alphabetic()) && text.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_')
+    !RESERVED.contains(&text)
+        && text.starts_with(|c: char| c.is_ascii_alphabetic())
+        && text.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_')
 }
 
 /// Words with whole indices, joined by dots: "q.A.b(1).hot", "D(1,2)".

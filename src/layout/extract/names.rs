@@ -4,13 +4,11 @@ use super::Extraction;
 use super::boxes::Boxes;
 use super::nets::OnNet;
 use crate::layout::drawing::Drawing;
+use crate::layout::lines::RESERVED;
 use std::collections::HashSet;
 
 /// Labels that are told one by one.
 const TOLD: usize = 20;
-
-/// Names that mean something else in a netlist.
-const RESERVED: [&str; 9] = ["subnet", "param", "process", "for", "if", "else", "call", "uses", "pi"];
 
 /// Names all nodes; `nets` says for each label what conductor it stands on.
 pub(super) fn name(result: &mut Extraction, drawing: &Drawing, nets: &[Option<OnNet>]) {
