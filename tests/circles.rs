@@ -13,8 +13,6 @@ const KNOWN: &[(&str, usize)] = &[
     ("layout/extract/model", 3),
     ("layout/gds", 2),
     ("multibody/rcr/closures", 18),
-    ("netlist", 26),
-    ("netlist/bundle", 4),
     ("service/analyses", 10),
     ("service/connection", 2),
     ("service/keeper", 2),

@@ -18,7 +18,6 @@ const LONG_FILES: &[&str] = &[
     "src/layout/lines/of_structure.rs",
     "src/layout/process.rs",
     "src/netlist/sugar3/builtins.rs",
-    "src/netlist/sugar3/evaluate.rs",
     "tests/netlist_library.rs",
     "tests/service/attacks.rs",
 ];

@@ -159,3 +159,6 @@ pub(crate) struct Program {
     /// True when an included file is missing: names it would have defined are then unknown.
     pub(crate) incomplete: bool,
 }
+
+/// The predefined constant `pi`.
+pub(crate) const PI_SLOT: Slot = Slot { global: true, index: 0 };

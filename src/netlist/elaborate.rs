@@ -1,13 +1,12 @@
 //! Runs a resolved program: definitions, loops and subnets become elements of a drawing.
 
-use super::ast::{Expr, Name, Program, Slot, Statement};
+use super::ast::{Expr, Name, PI_SLOT, Program, Slot, Statement};
 use super::drawing::Drawing;
-use super::evaluate::PI_SLOT;
 use super::rotation::Rotation;
 use super::setting::Setting;
 use super::sink::{Reported, Sink};
 use super::source::Span;
-use super::value::{Value, short};
+use super::value::{LayerValues, Value, short};
 use crate::structure::NodeId;
 use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, HashMap, HashSet};
@@ -19,9 +18,6 @@ const DEEPEST_RUN: usize = 400;
 const MOST_STEPS: usize = 30_000_000;
 /// Elements and subnet instances that one netlist may build; nodes it may name.
 const MOST_ELEMENTS: usize = 300_000;
-
-/// A layer's entries, evaluated: its own before its parent's.
-pub(crate) type LayerValues<'p> = Arc<Vec<(&'p str, Value)>>;
 
 /// Variables and nodes of the netlist or of one subnet instance.
 pub(super) struct Frame {

@@ -1,14 +1,11 @@
 //! Values of expressions in the frame at hand.
 
-use super::ast::{Binary, Expr, ExprKind, Slot};
+use super::ast::{Binary, Expr, ExprKind};
 use super::elaborate::Elaborator;
 use super::functions;
 use super::sink::Reported;
 use super::source::Span;
 use super::value::Value;
-
-/// The predefined constant `pi`.
-pub(crate) const PI_SLOT: Slot = Slot { global: true, index: 0 };
 
 impl<'p> Elaborator<'p> {
     pub(super) fn evaluate(&mut self, expr: &'p Expr) -> Result<Value, Reported> {

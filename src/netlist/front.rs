@@ -1,13 +1,22 @@
 //! Front ends: what is drawn in one language or another becomes a structure, parameters and messages. Nothing after this knows
 //! where a drawing came from.
 
-use super::Loaded;
 use super::bundle::Bundle;
 use super::diagnostic::Diagnostics;
-use super::foreign;
 use super::setting::Setting;
-use super::sugar2::Sugar2;
+use crate::structure::Structure;
 use std::fmt::Debug;
+
+/// What a netlist elaborates to.
+#[derive(Debug, Clone)]
+pub struct Loaded {
+    /// The drawing.
+    pub structure: Structure,
+    /// Parameters of the netlist with the values they took, in order of appearance.
+    pub parameters: Vec<(String, Setting)>,
+    /// Warnings.
+    pub warnings: Diagnostics,
+}
 
 /// A drawing that has been read in its own language. What is drawn depends on the values of parameters too.
 pub trait FrontEnd: Debug + Send + Sync {
@@ -18,19 +27,5 @@ pub trait FrontEnd: Debug + Send + Sync {
     fn load(&self, set: &[(String, Setting)]) -> Result<Loaded, Diagnostics>;
 }
 
-/// Reads a bundle by the language of its root: SUGAR 3 where its first line that decides is Lua, else SUGAR 2.
-pub(crate) fn read(bundle: &Bundle) -> Box<dyn FrontEnd> {
-    #[cfg(feature = "lua")]
-    if bundle.is_program() {
-        return Box::new(super::sugar3::Sugar3::new(bundle));
-    }
-    Box::new(Sugar2::new(bundle))
-}
-
-impl Bundle {
-    /// True when the root is a SUGAR 3 netlist: a program, in Lua.
-    pub fn is_program(&self) -> bool {
-        let root = self.files.get(&self.root).map_or("", String::as_str);
-        matches!(foreign::kind(root, 0), foreign::Kind::Lua(_))
-    }
-}
+/// Reads a bundle in one language.
+pub(crate) type Read = fn(&Bundle) -> Box<dyn FrontEnd>;

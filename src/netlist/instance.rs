@@ -2,12 +2,12 @@
 
 use super::ast::{Element, Layer, LayerRef};
 use super::drawing::{ELEMENT_BYTES, Fact, NAME_COPIES};
-use super::elaborate::{Elaborator, Frame, LayerValues};
+use super::elaborate::{Elaborator, Frame};
 use super::elements::{self, Argument, Arguments, Instance};
 use super::rotation::Rotation;
 use super::sink::Reported;
 use super::source::Span;
-use super::value::Value;
+use super::value::{LayerValues, Value};
 use crate::budget;
 use crate::structure::NodeId;
 use std::collections::HashMap;
@@ -129,7 +129,7 @@ impl<'p> Elaborator<'p> {
                         layer_name: layer.map(|l| &*self.program.layers[l].name.name),
                     },
                 };
-                elements::build(&instance, &mut self.drawing, self.sink)
+                elements::build(&instance, &mut self.drawing, self.sink, super::sugar2::read)
             }
         }
     }

@@ -7,7 +7,7 @@ use super::ast::{Def, Element, Expr, ExprKind, Ident, LayerRef, Name, Program, S
 use super::elements;
 use super::functions;
 use super::sink::Sink;
-use super::suggest::did_you_mean;
+use super::suggest::{MOST_LISTED, did_you_mean};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
@@ -27,7 +27,7 @@ pub(crate) fn resolve(program: &mut Program, sink: &mut Sink) {
         layers_used: 0,
     };
     let pi = resolver.define(&Arc::from("pi"));
-    debug_assert_eq!(pi, super::evaluate::PI_SLOT);
+    debug_assert_eq!(pi, super::ast::PI_SLOT);
     let mut statements = std::mem::take(&mut program.statements);
     // A subnet may be used before its text (SUGAR has no such rule, but no other meaning either) unless an element of
     // that name is built in.
@@ -282,5 +282,5 @@ impl Resolver<'_> {
 }
 
 fn listed<'a>(names: impl Iterator<Item = &'a Arc<str>>) -> String {
-    names.take(super::MOST_LISTED).map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", ")
+    names.take(MOST_LISTED).map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", ")
 }

@@ -1,12 +1,5 @@
 //! Values given to netlist parameters from outside.
 
-use super::ast::Statement;
-use super::bundle::Bundle;
-use super::diagnostic::Diagnostics;
-use super::parser;
-use super::sink::Sink;
-use super::source::Span;
-
 /// A value given to a netlist parameter from outside.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Setting {
@@ -14,33 +7,4 @@ pub enum Setting {
     Number(f64),
     /// A string.
     Text(String),
-}
-
-impl Setting {
-    /// Reads a value as the netlist language writes it: `2.1u`, `-3`, `pi/4`, `deg(30)`, `'text'`. A bare word that is
-    /// no constant (`poly`) is a string.
-    ///
-    /// # Errors
-    /// The text is no expression of constants.
-    pub fn parse(text: &str) -> Result<Self, Diagnostics> {
-        let text = text.trim();
-        let word = |c: char| c.is_ascii_alphanumeric() || c == '_';
-        if text.starts_with(|c: char| c.is_ascii_alphabetic()) && text.chars().all(word) && text != "pi" {
-            return Ok(Self::Text(text.to_owned()));
-        }
-        // On one line, so that messages show all of it.
-        let line = text.replace(['\n', '\r'], " ");
-        let bundle = Bundle::from_text("setting", &format!("param value = {line}"));
-        let mut sink = Sink::new(&bundle.root);
-        let program = parser::parse(&bundle, &mut sink);
-        if !sink.failed() && !matches!(program.statements.as_slice(), [Statement::Param { .. }]) {
-            sink.error("E049", Span::NOWHERE, format!("`{line}` is more than one value"), "give one value");
-        }
-        if sink.failed() {
-            return Err(sink.finish(&bundle));
-        }
-        let loaded = super::load(&bundle, &[])?;
-        let value = loaded.parameters.into_iter().next().map(|(_, value)| value);
-        value.ok_or_else(|| Diagnostics::none(&bundle))
-    }
 }

@@ -4,11 +4,13 @@ use super::ast::{Program, Statement};
 use super::bundle::Bundle;
 use super::diagnostic::Diagnostics;
 use super::elaborate::Elaborator;
-use super::front::FrontEnd;
+use super::finish::finish;
+use super::front::{FrontEnd, Loaded};
 use super::setting::Setting;
 use super::sink::Sink;
 use super::source::Span;
-use super::{Loaded, MOST_LISTED, finish, parser, resolve, suggest};
+use super::suggest::MOST_LISTED;
+use super::{parser, resolve, suggest};
 use std::collections::HashSet;
 
 /// A SUGAR 2 netlist that has been parsed.
@@ -97,4 +99,9 @@ fn check_settings(program: &Program, set: &[(String, Setting)], sink: &mut Sink)
         }
         sink.error("E048", Span::NOWHERE, format!("the netlist has no parameter `{name}` to set"), help);
     }
+}
+
+/// A bundle in SUGAR 2, whatever it looks like.
+pub(crate) fn read(bundle: &Bundle) -> Box<dyn FrontEnd> {
+    Box::new(Sugar2::new(bundle))
 }

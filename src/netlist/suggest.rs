@@ -1,5 +1,8 @@
 //! "Did you mean": the nearest known name.
 
+/// Longer lists of names are cut in messages.
+pub(crate) const MOST_LISTED: usize = 40;
+
 /// No name longer than this [characters] is compared.
 const LONGEST: usize = 64;
 

@@ -59,3 +59,6 @@ pub(crate) fn short(x: f64) -> String {
     }
     format!("{}e{exponent}", digits.trim_end_matches('0').trim_end_matches('.'))
 }
+
+/// A layer's entries, evaluated: its own before its parent's.
+pub(crate) type LayerValues<'p> = std::sync::Arc<Vec<(&'p str, Value)>>;

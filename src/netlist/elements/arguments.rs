@@ -1,12 +1,12 @@
 //! The parameters of an element: given in its list, or taken from its layer.
 
 use super::super::drawing::Drawing;
-use super::super::elaborate::LayerValues;
+use super::super::front::Read;
 use super::super::rotation::Rotation;
 use super::super::sink::{Reported, Sink};
 use super::super::source::Span;
-use super::super::value::{Value, short};
-use super::table::meaning;
+use super::super::value::{LayerValues, Value, short};
+use super::meaning::meaning;
 use crate::structure::NodeId;
 
 /// A length beyond this is a forgotten suffix rather than a part of a microsystem [m].
@@ -50,6 +50,8 @@ pub(crate) struct Site<'a, 'p> {
     pub(crate) instance: &'a Instance<'p>,
     pub(crate) drawing: &'a mut Drawing,
     pub(crate) sink: &'a mut Sink,
+    /// Reads an expression in a string, as SUGAR 2.
+    pub(crate) read: Read,
 }
 
 impl Site<'_, '_> {

@@ -10,6 +10,7 @@ mod gap;
 mod load;
 mod lumped;
 mod material;
+mod meaning;
 mod pinned;
 mod pressure;
 mod section;
@@ -22,12 +23,18 @@ pub(crate) use arguments::{Argument, Arguments, Instance, Site};
 pub(crate) use table::{MODELS, Model, model};
 
 use super::drawing::Drawing;
+use super::front::Read;
 use super::sink::{Reported, Sink};
 use super::source::Span;
 use super::suggest::{did_you_mean, nearest};
 
-/// Builds one element: checks its node count and its parameter names, then adds it to the drawing.
-pub(crate) fn build(instance: &Instance<'_>, drawing: &mut Drawing, sink: &mut Sink) -> Result<(), Reported> {
+/// Builds one element: checks its node count and its parameter names, then adds it to the drawing. `read` is for expressions in strings.
+pub(crate) fn build(
+    instance: &Instance<'_>,
+    drawing: &mut Drawing,
+    sink: &mut Sink,
+    read: Read,
+) -> Result<(), Reported> {
     let Some(model) = model(instance.model) else {
         return Err(unknown(sink, instance.model, instance.span, []));
     };
@@ -43,7 +50,7 @@ pub(crate) fn build(instance: &Instance<'_>, drawing: &mut Drawing, sink: &mut S
         return Err(sink.error("E054", instance.nodes_span, message, help));
     }
     stray_parameters(model, instance, sink);
-    (model.build)(&mut Site { instance, drawing, sink })
+    (model.build)(&mut Site { instance, drawing, sink, read })
 }
 
 /// Reports an unknown element, with the nearest known one or the reason why it is left out.

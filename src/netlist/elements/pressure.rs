@@ -3,7 +3,6 @@
 //! The load is a number or, as SUGAR has it, a string with x, the way from the first node: `P="-250000*x"`.
 
 use super::super::bundle::Bundle;
-use super::super::front::FrontEnd;
 use super::super::setting::Setting;
 use super::super::sink::Reported;
 use super::super::value::Value;
@@ -27,7 +26,7 @@ pub(super) fn p3d(site: &mut Site<'_, '_>) -> Result<(), Reported> {
             (format!("({number:e})"), site.span_of("P"))
         }
     };
-    let law = super::super::read(&Bundle::from_text("P", &format!("param x = 0\nparam value = {text}")));
+    let law = (site.read)(&Bundle::from_text("P", &format!("param x = 0\nparam value = {text}")));
     let mut parts = [0.0; 4];
     for k in 0..3 * PIECES {
         let (point, weight) = GAUSS[k % 3];

@@ -3,9 +3,11 @@
 use super::super::elements::{self, Argument, Arguments, Instance, MODELS};
 use super::super::sink::Reported;
 use super::super::source::Span;
+use super::super::sugar2;
 use super::super::value::{Value, short};
 use super::arguments::{Call, Fault, LuaNode, called, number, plain};
-use super::evaluate::{Scope, Shared, State, use_file};
+use super::files::use_file;
+use super::state::{Scope, Shared, State};
 use crate::budget;
 use crate::structure::{Load, NodeId};
 use mlua::{Function, Lua, MultiValue, Table, Value as LuaValue};
@@ -87,7 +89,8 @@ pub(super) fn install_short(lua: &Lua, _: &Shared) -> mlua::Result<()> {
 
 fn drawing(lua: &Lua, shared: &Shared, globals: &Table) -> mlua::Result<()> {
     let state = Rc::clone(shared);
-    globals.raw_set("use", lua.create_function(move |lua, name: String| use_file(lua, &state, &name))?)?;
+    globals
+        .raw_set("use", lua.create_function(move |lua, name: String| use_file(lua, &state, &name, install_short))?)?;
     let state = Rc::clone(shared);
     globals.raw_set("node", lua.create_function(move |lua, value: LuaValue| node(lua, &state, &value))?)?;
     let state = Rc::clone(shared);
@@ -275,7 +278,7 @@ fn build(state: &mut State, model: &str, call: &Call, span: Span) -> Result<(), 
         rotation,
         arguments: Arguments { given, layer: Arc::new(layer), layer_name: None },
     };
-    elements::build(&instance, &mut state.drawing, &mut state.sink)
+    elements::build(&instance, &mut state.drawing, &mut state.sink, sugar2::read)
 }
 
 /// SUGAR 3's own `force`: x, y [N] and rz [N·m] on a node, global axes.

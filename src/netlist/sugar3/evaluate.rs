@@ -1,28 +1,24 @@
 //! Runs a SUGAR 3 netlist.
 
-use super::super::bundle::{Bundle, MOST_INCLUDES};
+use super::super::bundle::Bundle;
 use super::super::drawing::Drawing;
 use super::super::elements;
-use super::super::front::FrontEnd;
+use super::super::finish::finish;
+use super::super::front::{FrontEnd, Loaded};
 use super::super::rotation::Rotation;
 use super::super::setting::Setting;
 use super::super::sink::Sink;
 use super::super::source::Span;
-use super::super::{Loaded, finish, suggest};
-use super::arguments::{LuaNode, number};
+use super::super::suggest;
 use super::builtins;
+use super::files::run;
 use super::sandbox::{Limit, Progress, sandbox};
-use super::translate::translate;
+use super::state::{Scope, Shared, State, file_number};
 use crate::budget;
-use crate::structure::NodeId;
-use mlua::{ChunkMode, Lua, Value};
 use std::cell::{Cell, RefCell};
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::rc::Rc;
 
-/// Libraries of SUGAR 3 that are built in.
-const BUILT_IN: [&str; 7] =
-    ["std.net", "std2.net", "stdlib.net", "std2cvt.net", "xformstack.lua", "relpos.lua", "subnetize.lua"];
 /// Names that SUGAR 3's Lua has and netlists here have not, for help.
 const ABSENT: [&str; 14] = [
     "os",
@@ -51,129 +47,6 @@ impl Sugar3 {
     pub(crate) fn new(bundle: &Bundle) -> Self {
         Self { bundle: bundle.clone() }
     }
-}
-
-/// Where names of one scope live: the netlist itself, or one subnet instance.
-#[derive(Debug)]
-pub(super) struct Scope {
-    pub(super) nodes: HashMap<String, NodeId>,
-    /// Names of the enclosing instances with a point after each.
-    pub(super) prefix: String,
-    pub(super) rotation: Rotation,
-}
-
-/// What the functions of a netlist work on.
-#[derive(Debug)]
-pub(super) struct State {
-    pub(super) drawing: Drawing,
-    pub(super) sink: Sink,
-    pub(super) scopes: Vec<Scope>,
-    /// Full names of elements so far.
-    pub(super) names: HashSet<String>,
-    pub(super) elements: usize,
-    /// Anonymous elements so far.
-    pub(super) anonymous: usize,
-    /// The first node with coordinates, and these [m].
-    pub(super) first_placed: Option<(NodeId, [f64; 2])>,
-    /// True once `std2cvt.net` is used: angles are in radians.
-    pub(super) radians: bool,
-    /// Files read so far, by name.
-    used: HashSet<String>,
-    /// Text of each file, in the order of the sink's.
-    texts: Vec<Rc<Text>>,
-    bundle: Rc<Bundle>,
-    /// Globals that were read before anything was assigned to them, with their place in the order of reading.
-    asked: HashMap<String, usize>,
-    settings: BTreeMap<String, Setting>,
-    parameters: BTreeMap<usize, (String, Setting)>,
-    pub(super) progress: Rc<Progress>,
-    /// True once a message says why the netlist stops.
-    pub(super) told: Cell<bool>,
-}
-
-/// A text with the starts of its lines.
-#[derive(Debug)]
-struct Text {
-    starts: Vec<usize>,
-    text: String,
-}
-
-pub(super) type Shared = Rc<RefCell<State>>;
-
-impl State {
-    /// The place of line `line` (from 1) of file number `file`.
-    fn line(&self, file: usize, line: usize) -> Span {
-        let Some(text) = self.texts.get(file) else { return Span::NOWHERE };
-        let Some(&start) = line.checked_sub(1).and_then(|line| text.starts.get(line)) else { return Span::NOWHERE };
-        let end = text.starts.get(line).map_or(text.text.len(), |next| next - 1);
-        let body = text.text.get(start..end).unwrap_or("");
-        let indent = body.len() - body.trim_start().len();
-        let at = |offset: usize| u32::try_from(offset).unwrap_or(u32::MAX);
-        let file = u16::try_from(file).unwrap_or(u16::MAX);
-        Span { file, start: at(start + indent), end: at(start + body.trim_end().len().max(indent)) }
-    }
-
-    /// The line of the netlist that is being run.
-    pub(super) fn here(&self, lua: &Lua) -> Span {
-        for level in 1..6 {
-            let found = lua.inspect_stack(level, |debug| {
-                let source = debug.source().source.map(|name| name.into_owned());
-                (source.as_deref().and_then(file_number), debug.current_line())
-            });
-            match found {
-                Some((Some(file), Some(line))) => return self.line(file, line),
-                Some(_) => {}
-                None => break,
-            }
-        }
-        Span::NOWHERE
-    }
-
-    pub(super) fn scope(&mut self) -> &mut Scope {
-        let last = self.scopes.len() - 1;
-        &mut self.scopes[last]
-    }
-
-    /// The node of that name in the scope at hand, a new one when the name is new.
-    pub(super) fn node(&mut self, name: &str, span: Span) -> (NodeId, bool) {
-        if let Some(&id) = self.scope().nodes.get(name) {
-            return (id, false);
-        }
-        let full = format!("{}{name}", self.scope().prefix);
-        let id = self.drawing.add_node(full, span);
-        self.scope().nodes.insert(name.to_owned(), id);
-        self.progress.drawn.set(self.progress.drawn.get() + 1);
-        (id, true)
-    }
-
-    pub(super) fn lua_node(&self, id: NodeId) -> LuaNode {
-        LuaNode { id, name: self.drawing.structure.nodes[id.0].name.clone() }
-    }
-
-    /// A global that has no value yet: what was set from outside, if it was.
-    pub(super) fn ask(&mut self, name: &str) -> Option<Setting> {
-        let order = self.asked.len();
-        let order = *self.asked.entry(name.to_owned()).or_insert(order);
-        let setting = self.settings.get(name).cloned()?;
-        self.parameters.insert(order, (name.to_owned(), setting.clone()));
-        Some(setting)
-    }
-
-    /// A global that gets its first value: the default of a parameter, if it was asked for before.
-    pub(super) fn assign(&mut self, name: &str, value: &Value) {
-        let Some(&order) = self.asked.get(name) else { return };
-        let setting = match (number(value), value) {
-            (Some(x), _) => Setting::Number(x),
-            (None, Value::String(text)) => Setting::Text(text.to_string_lossy()),
-            _ => return,
-        };
-        self.parameters.entry(order).or_insert((name.to_owned(), setting));
-    }
-}
-
-/// The number of the file that a chunk of that name was made from.
-fn file_number(name: &str) -> Option<usize> {
-    name.trim_start_matches('=').strip_prefix("file ")?.parse().ok()
 }
 
 impl FrontEnd for Sugar3 {
@@ -217,75 +90,6 @@ impl FrontEnd for Sugar3 {
         let parameters = std::mem::take(&mut state.parameters).into_values().collect();
         finish(std::mem::take(&mut state.drawing), parameters, state.sink.clone(), &self.bundle)
     }
-}
-
-/// Runs a file of the bundle.
-fn run(lua: &Lua, shared: &Shared, name: &str) -> mlua::Result<()> {
-    let (number, text) = {
-        let state = shared.borrow();
-        (state.texts.len(), state.bundle.files.get(name).cloned().unwrap_or_default())
-    };
-    let starts = std::iter::once(0).chain(text.match_indices('\n').map(|(at, _)| at + 1)).collect();
-    let translated = translate(&text);
-    {
-        let mut state = shared.borrow_mut();
-        if number > 0 {
-            state.sink.files.push(name.to_owned());
-        }
-        state.texts.push(Rc::new(Text { starts, text }));
-        if let Err(found) = &translated {
-            let at = |offset: usize| u32::try_from(offset).unwrap_or(u32::MAX);
-            let file = u16::try_from(number).unwrap_or(u16::MAX);
-            let span = Span { file, start: at(found.start), end: at(found.end) };
-            state.sink.error("E071", span, found.message.clone(), found.help);
-            state.told.set(true);
-        }
-    }
-    let Ok(code) = translated else { return Err(mlua::Error::runtime("told")) };
-    lua.load(code).set_name(format!("=file {number}")).set_mode(ChunkMode::Text).exec()
-}
-
-/// `use("FILE")`: a library of SUGAR 3's, or a file of the bundle, once.
-pub(super) fn use_file(lua: &Lua, shared: &Shared, name: &str) -> mlua::Result<()> {
-    let span = shared.borrow().here(lua);
-    let stopped = || Err(mlua::Error::runtime("told"));
-    {
-        let mut state = shared.borrow_mut();
-        if BUILT_IN.contains(&name) {
-            state.radians |= name == "std2cvt.net";
-            drop(state);
-            return if name == "stdlib.net" { builtins::install_short(lua, shared) } else { Ok(()) };
-        }
-        if state.used.contains(name) {
-            if name == state.bundle.root {
-                state.sink.error("E022", span, format!("`{name}` includes itself"), "remove this line");
-                state.told.set(true);
-                return stopped();
-            }
-            return Ok(());
-        }
-        if !state.bundle.files.contains_key(name) {
-            let help = "it is looked for in this file's folder, the working directory and the include folders";
-            state.sink.error("E021", span, format!("cannot find the file `{name}`"), help);
-            state.told.set(true);
-            return stopped();
-        }
-        if state.used.len() > MOST_INCLUDES {
-            state.sink.error("E024", span, format!("more than {MOST_INCLUDES} included files"), "");
-            state.told.set(true);
-            return stopped();
-        }
-        state.used.insert(name.to_owned());
-    }
-    let sugar2 = |line: &str| ["process ", "uses ", "param "].iter().any(|word| line.trim_start().starts_with(word));
-    if shared.borrow().bundle.files[name].lines().any(sugar2) {
-        let mut state = shared.borrow_mut();
-        let message = format!("`{name}` is a SUGAR 2 file, this is a SUGAR 3 netlist");
-        state.sink.error("E071", span, message, "use the process file of SUGAR 3: `p1 = material {h=2u, …}`");
-        state.told.set(true);
-        return stopped();
-    }
-    run(lua, shared, name)
 }
 
 /// Puts what Lua says into words of a netlist, with its place.

@@ -11,7 +11,11 @@ mod builtins;
 #[cfg(feature = "lua")]
 mod evaluate;
 #[cfg(feature = "lua")]
+mod files;
+#[cfg(feature = "lua")]
 mod sandbox;
+#[cfg(feature = "lua")]
+mod state;
 #[cfg(any(feature = "lua", test))]
 mod translate;
 mod words;

@@ -1,0 +1,33 @@
+//! The last steps of every front end of netlists.
+
+use super::bundle::Bundle;
+use super::diagnostic::Diagnostics;
+use super::drawing::Drawing;
+use super::front::Loaded;
+use super::setting::Setting;
+use super::sink::Sink;
+use super::{check, elements, place};
+
+/// What every front end of netlists does with the elements that it has built: members out of the plane, positions, loose ends.
+pub(super) fn finish(
+    mut drawing: Drawing,
+    parameters: Vec<(String, Setting)>,
+    mut sink: Sink,
+    bundle: &Bundle,
+) -> Result<Loaded, Diagnostics> {
+    elements::upright::settle(&mut drawing, &mut sink);
+    if !sink.failed() {
+        place::place(&mut drawing, &mut sink);
+    }
+    if !sink.failed() {
+        check::finite(&drawing, &mut sink);
+    }
+    if !sink.failed() {
+        check::check(&drawing, &mut sink);
+    }
+    if sink.failed() {
+        return Err(sink.finish(bundle));
+    }
+    let warnings = sink.finish(bundle);
+    Ok(Loaded { structure: drawing.structure, parameters, warnings })
+}
