@@ -140,6 +140,8 @@ def test_a_resume_that_fails_takes_nothing_away(program: str, tmp_path: Path) ->
                 break
             except bimorph.LimitExceeded:
                 continue
+        else:
+            pytest.fail("there is no room again")
         assert again.accepted == last
         assert again.step(drive(1), DT).token
     finally:
