@@ -105,6 +105,21 @@ fn the_mesh_of_a_path_holds_the_tolerance() {
         let error = both(&path).iter().zip(exact).map(|(a, b)| (a / b - 1.0).abs()).fold(0.0, f64::max);
         assert!(error <= tol && told <= tol && 3.0 * told >= error, "{tol}: off by {error}, told {told}");
     }
+    // a path that ends for want of points ends nowhere in particular: nothing is told of its error
+    let last = scene("column/column.net", &[("F", to)], &CompileOptions::default());
+    let request = ContinuationRequest {
+        growing: Growing::Parameter(&last),
+        from: 0.0,
+        to,
+        voltages: vec![],
+        signals: vec![],
+        branch: Branch::Plus,
+        points: 5,
+    };
+    let first = scene("column/column.net", &[("F", 0.0)], &CompileOptions::default());
+    let (short, _) = path_fitted(&first, &request, &mut |_| true).unwrap();
+    assert_eq!(short.order.estimated_error, None);
+    assert!(short.warnings.items.iter().any(|d| d.code == "W040"));
     let (linear, path) = found(&CompileOptions { linear: true, ..CompileOptions::default() });
     assert!(path.bifurcations.is_empty());
     assert!(linear.warnings.items.iter().any(|d| d.message.contains("would buckle")), "{:?}", linear.warnings);

@@ -18,6 +18,8 @@ use crate::solve::continuation::Branch;
 
 /// Folds that are compared, and bifurcations: the first.
 const MOST_EVENTS: usize = 8;
+/// Ends of a path that are compared.
+const ENDS: [&str; 2] = ["arrived", "turned back"];
 /// Results that differ by more than this share are of another branch.
 const OTHER_BRANCH: f64 = 0.3;
 
@@ -46,8 +48,9 @@ pub fn path_fitted(
     let of_mesh = search.known.into_iter().find(|(known, _)| *known == order.segments);
     let lost = || AnalysisError::NotConverged { detail: "no mesh has a path".into() };
     let (_, result) = of_mesh.ok_or_else(lost)?;
-    // a path that ends elsewhere on twice the segments is not compared at its end
-    let order = ModelOrder { estimated_error: order.estimated_error.filter(|e| e.is_finite()), ..order };
+    // where it ends for want of points, or elsewhere on twice the segments, its end is not compared
+    let compared = ENDS.contains(&result.end);
+    let order = ModelOrder { estimated_error: order.estimated_error.filter(|e| compared && e.is_finite()), ..order };
     let mut fitted = on(compiled, order)?;
     let share = if fitted.options.linear { left_out_at_end(&fitted, request) } else { None };
     let worst = result.in_pieces.as_ref().map(|(name, share)| (name.clone(), OF_DEFLECTION * share));
@@ -132,8 +135,8 @@ impl Search<'_, '_> {
         for list in [&found.folds, &found.bifurcations] {
             (0..MOST_EVENTS).for_each(|k| at(list.get(k).map(|c: &CriticalPoint| (c.value, c.point))));
         }
-        // where it ends for want of points is nowhere in particular
-        let ends = ["arrived", "turned back"].contains(&found.end);
+        // elsewhere it ends nowhere in particular
+        let ends = ENDS.contains(&found.end);
         at(found.values.last().map(|value| (*value, found.values.len() - 1)).filter(|_| ends));
         outputs.extend(found.last.iter().flat_map(|(_, m)| {
             let of_node = m.x.hypot(m.y).max(SMALL * moved).max(f64::MIN_POSITIVE);
