@@ -17,7 +17,6 @@ const LONG_FILES: &[&str] = &[
     "src/layout/gds.rs",
     "src/layout/lines/of_structure.rs",
     "src/layout/process.rs",
-    "src/netlist/sugar3/builtins.rs",
     "tests/netlist_library.rs",
     "tests/service/attacks.rs",
 ];

@@ -9,9 +9,15 @@ mod arguments;
 #[cfg(feature = "lua")]
 mod builtins;
 #[cfg(feature = "lua")]
+mod drawn;
+#[cfg(feature = "lua")]
 mod evaluate;
 #[cfg(feature = "lua")]
 mod files;
+#[cfg(feature = "lua")]
+mod instance;
+#[cfg(feature = "lua")]
+mod language;
 #[cfg(feature = "lua")]
 mod sandbox;
 #[cfg(feature = "lua")]
