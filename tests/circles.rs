@@ -13,10 +13,6 @@ const KNOWN: &[(&str, usize)] = &[
     ("layout/extract/model", 3),
     ("layout/gds", 2),
     ("multibody/rcr/closures", 18),
-    ("service/analyses", 10),
-    ("service/connection", 2),
-    ("service/keeper", 2),
-    ("service/serving", 2),
 ];
 
 /// A module, as the parts of its path from the crate's root.

@@ -4,7 +4,7 @@ use super::chunks::{Outlet, send_transient};
 use super::convert::{self, Violation, analysis as results};
 use super::limits::Limits;
 use super::models::Model;
-use super::rpc::{Calls, Reply};
+use super::shared::{Calls, Reply};
 use super::work::{Results, guarded};
 use super::{proto, status};
 use crate::analysis::integrator::Integrator;

@@ -1,7 +1,7 @@
 //! The bodies of requests and answers, as they pass the gate: what comes in is counted, and how an answer ends is noted.
 
 use super::framing::Framing;
-use super::intake::Call;
+use super::gate::Call;
 use http_body::{Frame, SizeHint};
 use std::future::Future;
 use std::pin::Pin;

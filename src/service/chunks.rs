@@ -2,7 +2,7 @@
 
 use super::convert::analysis::summary_to_wire;
 use super::convert::sweep::row_to_wire;
-use super::rpc::Shared;
+use super::shared::Shared;
 use super::shutdown::Shutdown;
 use super::sweeps::Sweep;
 use super::turns::Place;

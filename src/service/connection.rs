@@ -6,16 +6,17 @@
 //! The HTTP layer waits for its clients when it shuts down; one that never answers would hold the server for as long as
 //! it likes. So the socket itself listens for the order to cut: reads and writes then fail, and the layer above gives up.
 
-use super::guard::{Guard, Voice, Who};
+use super::guard::{Guard, Voice};
 use super::limits::Limits;
+use super::presence::{Presence, Who};
 use socket2::{SockRef, TcpKeepalive};
 use std::future::Future;
 use std::io;
 use std::pin::Pin;
-use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, OnceLock, PoisonError, Weak};
+use std::sync::atomic::Ordering;
+use std::sync::{Arc, Mutex, PoisonError, Weak};
 use std::task::{Context, Poll};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::net::{TcpStream, UnixStream};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
@@ -31,70 +32,6 @@ enum Socket {
     Tcp(TcpStream),
     Tls(Box<TlsStream<TcpStream>>),
     Unix(UnixStream),
-}
-
-static NUMBERS: AtomicU64 = AtomicU64::new(1);
-
-/// What is known of a connection from outside.
-#[derive(Debug)]
-pub(super) struct Presence {
-    number: u64,
-    opened: Instant,
-    /// Calls under way.
-    calls: AtomicUsize,
-    /// When the last call ended, after `opened` [ms].
-    used_ms: AtomicU64,
-    greeted: AtomicBool,
-    /// Once its client has been understood.
-    who: OnceLock<Who>,
-    cut: CancellationToken,
-}
-
-impl Presence {
-    fn new(cut: &CancellationToken) -> Arc<Self> {
-        Arc::new(Self {
-            number: NUMBERS.fetch_add(1, Ordering::Relaxed),
-            opened: Instant::now(),
-            calls: AtomicUsize::new(0),
-            used_ms: AtomicU64::new(0),
-            greeted: AtomicBool::new(false),
-            who: OnceLock::new(),
-            cut: cut.child_token(),
-        })
-    }
-
-    /// Tells connections apart; never 0.
-    pub(super) fn number(&self) -> u64 {
-        self.number
-    }
-
-    /// Who is there, as far as the connection itself says.
-    pub(super) fn who(&self) -> Who {
-        self.who.get().cloned().unwrap_or(Who::Unknown)
-    }
-
-    /// A call begins.
-    pub(super) fn begin(&self) {
-        self.calls.fetch_add(1, Ordering::Relaxed);
-    }
-
-    /// A call ends.
-    pub(super) fn end(&self) {
-        let now = u64::try_from(self.opened.elapsed().as_millis()).unwrap_or(u64::MAX);
-        self.used_ms.store(now, Ordering::Relaxed);
-        self.calls.fetch_sub(1, Ordering::Relaxed);
-    }
-
-    /// How long it has had no call; none while it has one. Before its greeting it counts as idle for ever.
-    fn idle(&self) -> Option<Duration> {
-        if self.calls.load(Ordering::Relaxed) > 0 {
-            return None;
-        }
-        if !self.greeted.load(Ordering::Relaxed) {
-            return Some(Duration::MAX);
-        }
-        Some(self.opened.elapsed().saturating_sub(Duration::from_millis(self.used_ms.load(Ordering::Relaxed))))
-    }
 }
 
 /// The connections of a server and their places.

@@ -2,10 +2,9 @@
 //!
 //! A Unix socket asks for nothing: its mode lets in its owner alone.
 
-use super::connection::Presence;
+use super::presence::{Presence, Who};
 use super::tls::{ALPN, Pair, PemError, authorities, certificates, provider, validity};
 use super::tokens::{TokenError, Tokens, is_open, sha256};
-use std::fmt;
 use std::io;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -181,32 +180,6 @@ impl Guard {
                 say_goodbye(socket).await;
                 Err(error)
             }
-        }
-    }
-}
-
-/// Who is at the other end.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum Who {
-    /// The owner of this server, over a Unix socket.
-    Local,
-    /// Anybody.
-    Unknown,
-    /// Somebody who speaks plain HTTP/2 where TLS is spoken.
-    Plain,
-    /// The owner of a certificate, by its SHA-256.
-    Certified([u8; 32]),
-    /// The owner of a token.
-    Named(Arc<str>),
-}
-
-impl fmt::Display for Who {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Local => f.write_str("local"),
-            Self::Unknown | Self::Plain => f.write_str("unknown"),
-            Self::Certified(hash) => hash[..8].iter().try_for_each(|byte| write!(f, "{byte:02x}")),
-            Self::Named(name) => f.write_str(name),
         }
     }
 }

@@ -19,6 +19,8 @@ pub mod proto;
 #[cfg(feature = "server")]
 mod analyses;
 #[cfg(feature = "server")]
+mod answerable;
+#[cfg(feature = "server")]
 mod bodies;
 #[cfg(feature = "server")]
 mod chunks;
@@ -26,6 +28,8 @@ mod chunks;
 mod connection;
 #[cfg(feature = "server")]
 mod framing;
+#[cfg(feature = "server")]
+mod gate;
 #[cfg(feature = "server")]
 pub mod guard;
 #[cfg(feature = "server")]
@@ -35,6 +39,8 @@ mod intake;
 #[cfg(feature = "server")]
 mod keeper;
 #[cfg(feature = "server")]
+mod kept;
+#[cfg(feature = "server")]
 pub mod limits;
 #[cfg(feature = "server")]
 pub mod log;
@@ -43,7 +49,11 @@ pub mod metrics;
 #[cfg(feature = "server")]
 mod models;
 #[cfg(feature = "server")]
+mod overseen;
+#[cfg(feature = "server")]
 mod overseer;
+#[cfg(feature = "server")]
+mod presence;
 #[cfg(feature = "server")]
 mod rpc;
 #[cfg(feature = "server")]
@@ -57,7 +67,11 @@ mod sessions;
 #[cfg(feature = "server")]
 pub mod settings;
 #[cfg(feature = "server")]
+mod shared;
+#[cfg(feature = "server")]
 mod shutdown;
+#[cfg(feature = "server")]
+mod small_signal;
 #[cfg(feature = "server")]
 mod snapshots;
 #[cfg(feature = "server")]

@@ -3,7 +3,7 @@
 //! Nothing secret is told, so nobody is asked for a token. A connection answers once and closes; few are served at once.
 
 use super::address::Address;
-use super::metrics::{Overseen, busy, text};
+use super::overseen::{Overseen, busy, text};
 use super::server::ServeError;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use std::convert::Infallible;

@@ -1,20 +1,13 @@
 //! The calls of `service.proto`: check, look up, compute, convert.
 
 use super::analyses::{TransientStream, count};
+use super::answerable::answerable;
 use super::chunks::{HEARTBEAT, TableStream};
-use super::connection::Connections;
 use super::convert::{self, model as text, options as options_wire, sweep as sweeps_wire};
-use super::limits::Limits;
-use super::metrics::Metrics;
-use super::models::{Models, check_size};
-use super::server::MakeDevice;
+use super::models::check_size;
 use super::session::Question;
-use super::sessions::Sessions;
-use super::shutdown::Shutdown;
-use super::store::Store;
-use super::stream::{TrialStream, answerable};
-use super::sweeps::Sweeps;
-use super::work::Work;
+use super::shared::{Calls, Reply};
+use super::stream::TrialStream;
 use super::{proto, status};
 use crate::budget::Budget;
 use crate::compile::{CompileError, CompileOptions, compile};
@@ -25,43 +18,11 @@ use proto::sweep_status::State;
 use std::pin::Pin;
 use std::sync::Arc;
 use std::time::Duration;
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Request, Response, Status, Streaming};
 
-/// What all calls of a server share.
-pub(super) struct Shared {
-    pub(super) limits: Limits,
-    /// Everything that this server was told, for Info.
-    pub(super) told: Vec<proto::ServerSetting>,
-    pub(super) make: MakeDevice,
-    pub(super) models: Models,
-    pub(super) sessions: Sessions,
-    pub(super) sweeps: Sweeps,
-    pub(super) connections: Arc<Connections>,
-    pub(super) metrics: Arc<Metrics>,
-    /// States that outlive the server.
-    pub(super) store: Option<Arc<Store>>,
-    /// Places for analyses, which may take long.
-    pub(super) work: Work,
-    /// Places for what a circuit waits for before it can start.
-    pub(super) desk: Work,
-    /// Places for trials that take longer than may pass where requests arrive.
-    pub(super) trials: Work,
-    /// Places for results that are being sent.
-    pub(super) results: Arc<Semaphore>,
-    pub(super) shutdown: Shutdown,
-}
-
-/// The service.
-#[derive(Clone)]
-pub(super) struct Calls(pub(super) Arc<Shared>);
-
 /// Time between two messages of WatchSweep.
 const WATCH_INTERVAL: Duration = Duration::from_millis(100);
-
-/// The answer of a call.
-pub(super) type Reply<T> = Result<Response<T>, Status>;
 
 impl Calls {
     /// Bundle and options of a request, within limits.
@@ -73,13 +34,6 @@ impl Calls {
         let bundle = text::bundle_from_wire(bundle).map_err(status::violation)?;
         check_size(&bundle, &self.0.limits)?;
         Ok((bundle, options_wire::options_from_wire(options).map_err(status::violation)?))
-    }
-
-    /// A place for results that are being sent.
-    pub(super) fn sending(&self) -> Result<OwnedSemaphorePermit, Status> {
-        let most = self.0.limits.result_streams;
-        let place = Arc::clone(&self.0.results).try_acquire_owned();
-        place.map_err(|_| status::limit("result_streams", most, "one more; read or end those that are open"))
     }
 }
 

@@ -2,17 +2,18 @@
 
 use super::address::Address;
 use super::connection::Connections;
+use super::gate::Gate;
 use super::guard::Guard;
-use super::intake::{Gate, Intake};
+use super::intake::Intake;
 use super::limits::Limits;
 use super::log::{self, Lines};
-use super::metrics::{Overseen, busy};
 use super::models::Models;
+use super::overseen::{Overseen, busy};
 use super::overseer;
 use super::proto::{DESCRIPTORS, ServerSetting, bimorph_server::BimorphServer};
-use super::rpc::{Calls, Shared};
 pub use super::serving::{MakeDevice, Ready, ServeError, ServeOptions};
 use super::sessions::Sessions;
+use super::shared::{Calls, Shared};
 use super::shutdown::{GRACE, Shutdown};
 use super::sockets::Listener;
 use super::store::Store;

@@ -124,3 +124,26 @@ pub enum ServeError {
     #[error("the server stopped: {0}")]
     Transport(String),
 }
+
+impl Settings {
+    /// What a server needs to run so.
+    pub fn options(self) -> ServeOptions {
+        ServeOptions {
+            listen: self.listen.clone(),
+            guard: GuardFiles {
+                certificate: self.tls_cert.clone(),
+                key: self.tls_key.clone(),
+                client_authority: self.tls_client_ca.clone(),
+                token_file: self.token_file.clone(),
+            },
+            insecure: self.insecure,
+            limits: self.limits.clone(),
+            metrics: self.metrics.clone(),
+            log_json: self.log_json,
+            state_dir: self.state_dir.clone(),
+            state_unsynced: self.state_unsynced,
+            settings: Some(self),
+            ..ServeOptions::default()
+        }
+    }
+}

@@ -1,13 +1,13 @@
 //! One open device with its states: who may ask it, and what of it is kept.
 
+use super::answerable::bounded;
 use super::convert::device as wire;
 use super::keeper::Keeper;
 use super::limits::Limits;
 use super::models::Model;
 use super::server::MakeDevice;
+use super::small_signal::small_signal;
 use super::snapshots;
-use super::spectra::small_signal;
-use super::stream::bounded;
 use super::usage::Usage;
 use super::work::caught;
 use super::{proto, status};

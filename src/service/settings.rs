@@ -3,10 +3,8 @@
 
 use super::access::read;
 use super::address::Address;
-use super::guard::GuardFiles;
 use super::limits::{LIMITS, Limits};
 use super::proto;
-use super::server::ServeOptions;
 use super::written::{File, Flag, Place, Places, Written};
 use std::collections::BTreeMap;
 use std::net::{Ipv4Addr, SocketAddr};
@@ -273,27 +271,6 @@ impl Settings {
             source: source(name).to_owned(),
         });
         told.collect()
-    }
-
-    /// What a server needs to run so.
-    pub fn options(self) -> ServeOptions {
-        ServeOptions {
-            listen: self.listen.clone(),
-            guard: GuardFiles {
-                certificate: self.tls_cert.clone(),
-                key: self.tls_key.clone(),
-                client_authority: self.tls_client_ca.clone(),
-                token_file: self.token_file.clone(),
-            },
-            insecure: self.insecure,
-            limits: self.limits.clone(),
-            metrics: self.metrics.clone(),
-            log_json: self.log_json,
-            state_dir: self.state_dir.clone(),
-            state_unsynced: self.state_unsynced,
-            settings: Some(self),
-            ..ServeOptions::default()
-        }
     }
 }
 

@@ -1,12 +1,12 @@
 //! Small-signal answers of a session, and how large they may be.
 
-use super::convert::device as wire;
 use super::limits::Limits;
 use super::session::Session;
+use super::small_signal::small_signal;
 use super::work::caught;
 use super::{proto, status};
 use crate::budget::{self, Allowance, Budget};
-use crate::device::{Device, DeviceError, SmallSignal, Token};
+use crate::device::{Device, Token};
 use std::sync::PoisonError;
 use tonic::Status;
 
@@ -55,25 +55,4 @@ impl Session {
         }
         Ok(())
     }
-}
-
-/// A small-signal answer about a state, or what noise there is.
-pub(super) fn small_signal(
-    device: &mut dyn Device,
-    token: Token,
-    omega: f64,
-    noise: bool,
-) -> Result<proto::SmallSignal, DeviceError> {
-    if !omega.is_finite() {
-        let (expected, got) = ("a finite angular frequency [rad/s]".to_owned(), omega.to_string());
-        return Err(DeviceError::BadRequest { what: "omega", expected, got });
-    }
-    if noise {
-        let mut densities = Vec::new();
-        device.noise(token, omega, &mut densities)?;
-        return Ok(wire::noise_to_wire(&densities));
-    }
-    let mut answer = SmallSignal::default();
-    device.linearize(token, omega, &mut answer)?;
-    Ok(wire::small_signal_to_wire(&answer))
 }

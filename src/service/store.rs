@@ -7,7 +7,7 @@
 //!
 //! What is here is bounded: two files a session, and `state_bytes` in all.
 
-use super::keeper::Kept;
+use super::kept::Kept;
 use super::proto;
 use super::survey::{StoreError, Survey};
 use prost::Message;

@@ -5,9 +5,9 @@
 //! is stopped there and asked again on a blocking thread, as are models above
 //! [`Limits::inline_unknowns`](super::limits::Limits::inline_unknowns), one at a time, which keeps replies in order.
 
-use super::limits::Limits;
-use super::rpc::Shared;
+use super::answerable::answerable;
 use super::session::{Question, Session, refused};
+use super::shared::Shared;
 use super::turns::{CLIENT, client};
 use super::{proto, status};
 use crate::budget::Budget;
@@ -149,32 +149,6 @@ impl TrialStream {
         }
         self.owned = false;
     }
-}
-
-/// Checks that the answers of a device with these ports (none: the model's `own`) and signals are messages that may be sent.
-///
-/// # Errors
-/// RESOURCE_EXHAUSTED.
-pub(super) fn answerable(open: &proto::OpenRequest, own: usize, limits: &Limits) -> Result<(), Status> {
-    bounded(if open.ports.is_empty() { own } else { open.ports.len() }, open.signals.len(), limits)
-}
-
-/// The same of so many ports and signals: derivatives are as many as the square of the ports.
-///
-/// # Errors
-/// RESOURCE_EXHAUSTED.
-pub(super) fn bounded(ports: usize, signals: usize, limits: &Limits) -> Result<(), Status> {
-    for (what, got) in [("ports", ports), ("signals", signals)] {
-        if got > limits.signals {
-            return Err(status::limit(what, limits.signals, got));
-        }
-    }
-    let bytes = size_of::<f64>().saturating_mul(ports).saturating_mul(2 * ports + signals);
-    if bytes > limits.message_bytes {
-        let got = format!("{bytes} for the derivatives of {ports} ports and {signals} signals");
-        return Err(status::limit("message_bytes", limits.message_bytes, got));
-    }
-    Ok(())
 }
 
 /// Answers on a thread, in the session's turn. Dropped, it stops the computation.

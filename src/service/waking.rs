@@ -6,8 +6,8 @@
 use super::convert::{model as text, options as options_wire};
 use super::keeper::Keeper;
 use super::models::{Model, check_size};
-use super::rpc::Shared;
 use super::session::Session;
+use super::shared::Shared;
 use super::status;
 use super::store::Store;
 use std::sync::Arc;

@@ -1,0 +1,97 @@
+//! What is known of a connection from outside, and who is there.
+
+use std::fmt;
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Arc, OnceLock};
+use std::time::{Duration, Instant};
+use tokio_util::sync::CancellationToken;
+
+static NUMBERS: AtomicU64 = AtomicU64::new(1);
+
+/// What is known of a connection from outside.
+#[derive(Debug)]
+pub(super) struct Presence {
+    pub(super) number: u64,
+    pub(super) opened: Instant,
+    /// Calls under way.
+    pub(super) calls: AtomicUsize,
+    /// When the last call ended, after `opened` [ms].
+    pub(super) used_ms: AtomicU64,
+    pub(super) greeted: AtomicBool,
+    /// Once its client has been understood.
+    pub(super) who: OnceLock<Who>,
+    pub(super) cut: CancellationToken,
+}
+
+impl Presence {
+    pub(super) fn new(cut: &CancellationToken) -> Arc<Self> {
+        Arc::new(Self {
+            number: NUMBERS.fetch_add(1, Ordering::Relaxed),
+            opened: Instant::now(),
+            calls: AtomicUsize::new(0),
+            used_ms: AtomicU64::new(0),
+            greeted: AtomicBool::new(false),
+            who: OnceLock::new(),
+            cut: cut.child_token(),
+        })
+    }
+
+    /// Tells connections apart; never 0.
+    pub(super) fn number(&self) -> u64 {
+        self.number
+    }
+
+    /// Who is there, as far as the connection itself says.
+    pub(super) fn who(&self) -> Who {
+        self.who.get().cloned().unwrap_or(Who::Unknown)
+    }
+
+    /// A call begins.
+    pub(super) fn begin(&self) {
+        self.calls.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// A call ends.
+    pub(super) fn end(&self) {
+        let now = u64::try_from(self.opened.elapsed().as_millis()).unwrap_or(u64::MAX);
+        self.used_ms.store(now, Ordering::Relaxed);
+        self.calls.fetch_sub(1, Ordering::Relaxed);
+    }
+
+    /// How long it has had no call; none while it has one. Before its greeting it counts as idle for ever.
+    pub(super) fn idle(&self) -> Option<Duration> {
+        if self.calls.load(Ordering::Relaxed) > 0 {
+            return None;
+        }
+        if !self.greeted.load(Ordering::Relaxed) {
+            return Some(Duration::MAX);
+        }
+        Some(self.opened.elapsed().saturating_sub(Duration::from_millis(self.used_ms.load(Ordering::Relaxed))))
+    }
+}
+
+/// Who is at the other end.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Who {
+    /// The owner of this server, over a Unix socket.
+    Local,
+    /// Anybody.
+    Unknown,
+    /// Somebody who speaks plain HTTP/2 where TLS is spoken.
+    Plain,
+    /// The owner of a certificate, by its SHA-256.
+    Certified([u8; 32]),
+    /// The owner of a token.
+    Named(Arc<str>),
+}
+
+impl fmt::Display for Who {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Local => f.write_str("local"),
+            Self::Unknown | Self::Plain => f.write_str("unknown"),
+            Self::Certified(hash) => hash[..8].iter().try_for_each(|byte| write!(f, "{byte:02x}")),
+            Self::Named(name) => f.write_str(name),
+        }
+    }
+}

@@ -1,0 +1,56 @@
+//! What all calls of a server share.
+
+use super::connection::Connections;
+use super::limits::Limits;
+use super::metrics::Metrics;
+use super::models::Models;
+use super::server::MakeDevice;
+use super::sessions::Sessions;
+use super::shutdown::Shutdown;
+use super::store::Store;
+use super::sweeps::Sweeps;
+use super::work::Work;
+use super::{proto, status};
+use std::sync::Arc;
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tonic::{Response, Status};
+
+/// What all calls of a server share.
+pub(super) struct Shared {
+    pub(super) limits: Limits,
+    /// Everything that this server was told, for Info.
+    pub(super) told: Vec<proto::ServerSetting>,
+    pub(super) make: MakeDevice,
+    pub(super) models: Models,
+    pub(super) sessions: Sessions,
+    pub(super) sweeps: Sweeps,
+    pub(super) connections: Arc<Connections>,
+    pub(super) metrics: Arc<Metrics>,
+    /// States that outlive the server.
+    pub(super) store: Option<Arc<Store>>,
+    /// Places for analyses, which may take long.
+    pub(super) work: Work,
+    /// Places for what a circuit waits for before it can start.
+    pub(super) desk: Work,
+    /// Places for trials that take longer than may pass where requests arrive.
+    pub(super) trials: Work,
+    /// Places for results that are being sent.
+    pub(super) results: Arc<Semaphore>,
+    pub(super) shutdown: Shutdown,
+}
+
+/// The service.
+#[derive(Clone)]
+pub(super) struct Calls(pub(super) Arc<Shared>);
+
+/// The answer of a call.
+pub(super) type Reply<T> = Result<Response<T>, Status>;
+
+impl Calls {
+    /// A place for results that are being sent.
+    pub(super) fn sending(&self) -> Result<OwnedSemaphorePermit, Status> {
+        let most = self.0.limits.result_streams;
+        let place = Arc::clone(&self.0.results).try_acquire_owned();
+        place.map_err(|_| status::limit("result_streams", most, "one more; read or end those that are open"))
+    }
+}
