@@ -5,6 +5,7 @@
 //! and `94 TEXT x y LAYER;` and `95 TEXT length width x y LAYER;` are labels, with `"…"` around a text that has blanks. Other user
 //! extensions are passed over with a note. Shapes outside symbols make a cell `(top)`.
 
+mod error;
 mod text;
 
 use super::cells::{Call, Cell, Library, Shape, Text, Transform};
@@ -13,7 +14,8 @@ use super::outline::{self, Style};
 use crate::budget;
 use std::collections::HashMap;
 use text::Reader;
-use thiserror::Error;
+
+pub use error::{CifError, CifFault};
 
 /// Size of the unit [m].
 const CENTIMICRON: f64 = 1e-8;
@@ -23,92 +25,6 @@ const LONGEST: usize = 1 << 20;
 const MOST_PARTS: usize = 4_000_000;
 /// The cell of what stands outside symbols.
 pub(super) const OUTSIDE: &str = "(top)";
-
-/// Why a CIF file is not read.
-#[derive(Debug, Clone, PartialEq, Error)]
-#[error("{file}: line {line}, column {column}: {fault}")]
-pub struct CifError {
-    /// Name of the file.
-    pub file: String,
-    /// Line, from 1.
-    pub line: usize,
-    /// Column in characters, from 1.
-    pub column: usize,
-    /// What is wrong there.
-    pub fault: CifFault,
-}
-
-/// What can be wrong in a CIF file.
-#[derive(Debug, Clone, PartialEq, Error)]
-#[non_exhaustive]
-pub enum CifFault {
-    /// Another character was expected.
-    #[error("expected {expected}, found {found}")]
-    Expected {
-        /// What the command needs here.
-        expected: &'static str,
-        /// What stands here.
-        found: String,
-    },
-    /// No command of CIF begins so.
-    #[error("no command begins with {found}: expected P B W R L D C E, a digit, `(` or `;`")]
-    Command {
-        /// What stands here.
-        found: String,
-    },
-    /// A number with too many digits.
-    #[error("the number {digits} is too large: at most {most}")]
-    Number {
-        /// Its digits.
-        digits: String,
-        /// The bound.
-        most: i64,
-    },
-    /// A size that must be positive is not.
-    #[error("{what} is {value}: expected more than 0")]
-    Size {
-        /// Which size.
-        what: &'static str,
-        /// Its value.
-        value: i64,
-    },
-    /// A direction of length 0.
-    #[error("the direction 0 0 points nowhere")]
-    Direction,
-    /// A polygon of fewer than three points, or a shape of more than the bound.
-    #[error("{what} has {count} points: expected {expected}")]
-    Points {
-        /// Polygon or wire.
-        what: &'static str,
-        /// Its points.
-        count: usize,
-        /// How many it may have.
-        expected: &'static str,
-    },
-    /// A shape before any `L`.
-    #[error("no layer is chosen: write `L NAME;` before the first shape of a symbol")]
-    NoLayer,
-    /// DS within a symbol, DF outside of one, and the like.
-    #[error("{0}")]
-    Order(&'static str),
-    /// The same symbol again.
-    #[error("symbol {number} was defined before; `DD` deletes definitions")]
-    Twice {
-        /// Its number.
-        number: i64,
-    },
-    /// The file ends too early.
-    #[error("the file ends {0}")]
-    End(&'static str),
-    /// Too much in one file.
-    #[error("more than {most} {what}")]
-    Many {
-        /// Of what.
-        what: &'static str,
-        /// The bound.
-        most: usize,
-    },
-}
 
 /// Reads a CIF file; `file` is its name in messages.
 ///

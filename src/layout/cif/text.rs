@@ -2,7 +2,7 @@
 //!
 //! Between the parts of a command everything separates that is no digit, no capital, none of `- ( ) ;`: also `,` and small letters.
 
-use super::{CifError, CifFault};
+use super::error::{CifError, CifFault};
 
 /// Largest magnitude of a number: a metre is 1e8 centimicrons, and scales may be fine.
 const LARGEST: i64 = 1_000_000_000_000;

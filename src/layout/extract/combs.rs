@@ -5,8 +5,8 @@
 
 use super::boxes::{self, Boxes, Extent};
 use super::joints::Kind;
-use super::layer::Part;
 use super::moments::Moments;
+use super::part::Part;
 use crate::budget;
 use crate::layout::drawing::{Point, Polygon};
 use crate::sets::Sets;

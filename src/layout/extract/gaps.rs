@@ -6,8 +6,8 @@
 use super::boxes::{self, Boxes, Extent};
 use super::combs::Comb;
 use super::joints::Kind;
-use super::layer::Part;
 use super::medial::Site;
+use super::part::Part;
 use crate::budget;
 use std::collections::BTreeMap;
 

@@ -2,17 +2,18 @@
 
 use super::anchors::{self, Rule};
 use super::combs::{self, Finger};
+use super::error::{ExtractError, MOST_POINTS};
 use super::gaps::{self, Pull};
 use super::holes;
-use super::joints::{self, Parts};
+use super::joints::{self};
 use super::limbs;
 use super::medial::Medial;
 use super::model::Model;
-use super::moments::Moments;
+use super::part::{Found, Part};
 use super::sink::Sink;
 use super::skeleton::Skeleton;
 use super::snap;
-use super::{ExtractError, Extraction, Facing, LayerResult, MOST_POINTS, Plates, Unrecognised};
+use super::{Extraction, Facing, LayerResult, Plates, Unrecognised};
 use crate::budget;
 use crate::layout::crossings::bounded;
 use crate::layout::drawing::{Drawing, Polygon};
@@ -26,27 +27,6 @@ const BYTES_PER_POINT: usize = 1200;
 
 /// By what share of a part its pieces may miss its area [1].
 const BALANCE: f64 = 1e-9;
-
-/// What was found along the axis of a shape.
-type Found = Arc<(Medial, Parts)>;
-
-/// A part that hangs together.
-#[derive(Debug, Clone)]
-pub(super) struct Part {
-    /// Its outline.
-    pub(super) polygon: Polygon,
-    /// Its axis, limbs and joints.
-    pub(super) found: Found,
-    /// Etch holes in it, in coordinates of the drawing.
-    pub(super) holes: Vec<Moments>,
-}
-
-impl Part {
-    /// Lower left corner of its box.
-    pub(super) fn origin(&self) -> [f64; 2] {
-        self.polygon.extent().unwrap_or_default()[0].map(f64::from)
-    }
-}
 
 /// What is known of shapes: a drawing repeats them.
 #[derive(Default)]

@@ -6,6 +6,9 @@
 
 use super::{Beam, Extraction, LayerResult, Node};
 
+/// Relative change of the width below which a beam has one width [1]: what rounding to the grid does.
+const UNIFORM: f64 = 5e-3;
+
 /// Pieces of a taper that carries current.
 const PIECES: usize = 8;
 
@@ -42,7 +45,7 @@ impl Extraction {
 /// Divides tapers that carry current into pieces of equal width: the language has no taper that does.
 pub(super) fn divide_tapers(result: &mut Extraction) {
     let tapers: Vec<usize> = (0..result.beams.len())
-        .filter(|k| result.carries(result.beams[*k].nodes[0]) && super::rows::tapers(result.beams[*k].width))
+        .filter(|k| result.carries(result.beams[*k].nodes[0]) && tapers(result.beams[*k].width))
         .collect();
     for k in tapers {
         let Beam { layer, nodes: [a, b], width, porosity } = result.beams[k].clone();
@@ -68,4 +71,9 @@ pub(super) fn divide_tapers(result: &mut Extraction) {
             last = node;
         }
     }
+}
+
+/// Whether a beam has two widths.
+pub(super) fn tapers(width: [f64; 2]) -> bool {
+    (width[1] - width[0]).abs() > UNIFORM * width[0].max(width[1])
 }

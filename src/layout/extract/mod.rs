@@ -12,11 +12,14 @@ mod anchors;
 mod arcs;
 mod areas;
 mod boxes;
+mod cells;
 mod combs;
 mod conductors;
+mod error;
 mod found;
 mod gaps;
 mod holes;
+mod identifier;
 mod joints;
 mod layer;
 mod limbs;
@@ -28,6 +31,7 @@ mod names;
 mod netlist;
 mod nets;
 mod pads;
+mod part;
 mod repeats;
 mod rows;
 mod sink;
@@ -36,59 +40,20 @@ mod snap;
 mod strips;
 mod taps;
 
+pub use error::{ExtractError, MOST_POINTS};
 pub use found::{Arc, Beam, Body, Comb, Extraction, Facing, LayerResult, Net, Node, Pad, Plates, Unrecognised};
 pub use netlist::{Written, netlist, written};
 
-use super::crossings::{Tangled, bounded};
+use super::crossings::bounded;
 use super::drawing::{Drawing, Polygon};
 use super::process::{self, Process};
 use super::regions;
-use thiserror::Error;
-
-/// Most points of one layer after its polygons are merged.
-pub const MOST_POINTS: usize = 4_000_000;
+use nets::Moving;
 
 /// How a drawing is read.
 #[derive(Debug, Clone, Default, PartialEq)]
 #[non_exhaustive]
 pub struct ExtractOptions {}
-
-/// Why there is no model.
-#[derive(Debug, Clone, PartialEq, Error)]
-#[non_exhaustive]
-pub enum ExtractError {
-    /// No layer of the process is drawn.
-    #[error(
-        "{source_name}: no layer that moves in process `{process}` is drawn: expected one of {expected}, found {found}; name another \
-         process, or write a process file for these layers (docs/layout.md)"
-    )]
-    NothingMoves {
-        /// Name of the drawing.
-        source_name: String,
-        /// Name of the process.
-        process: String,
-        /// Layers of the process.
-        expected: String,
-        /// Layers of the drawing.
-        found: String,
-    },
-    /// Polygons that cut one another too often to be merged.
-    #[error("layer {layer}: {tangled}")]
-    Tangled {
-        /// Name of the layer.
-        layer: String,
-        /// How often, and where.
-        tangled: Tangled,
-    },
-    /// More points than are worked on.
-    #[error("layer {layer}: {points} points after its polygons were merged, at most {MOST_POINTS} are extracted")]
-    TooLarge {
-        /// Name of the layer.
-        layer: String,
-        /// Its points.
-        points: usize,
-    },
-}
 
 /// The model of a drawing made in a process.
 ///
@@ -136,13 +101,6 @@ pub fn extract(drawing: &Drawing, process: &Process, options: &ExtractOptions) -
     names::name(&mut result, drawing, &labels);
     names::told(&mut result);
     Ok(result)
-}
-
-/// What moves of a layer.
-struct Moving<'a> {
-    layer: &'a process::Layer,
-    /// Outlines of the parts in which something moves, etch holes filled.
-    parts: Vec<Polygon>,
 }
 
 /// Tells of layers that the process does not know.

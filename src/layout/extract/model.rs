@@ -1,11 +1,10 @@
 //! From limbs and joints to nodes, beams, rigid bodies and anchors.
 
 use super::anchors::Rule;
+use super::cells::{Cells, Owner, Tap};
 use super::joints::{self, Joint, Kind, Parts};
 use super::medial::Medial;
 use super::moments::Moments;
-use super::pads::Pad;
-use super::taps::{Cells, Owner, Tap};
 
 /// A pad is at least this much wider than its limb [1].
 const PAD: f64 = 1.5;
@@ -30,6 +29,14 @@ pub(super) struct Model {
     pub(super) held: f64,
     /// Area of beams, bodies and what is held.
     pub(super) area: f64,
+}
+
+/// An area that is held.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Pad {
+    pub(super) nodes: Vec<usize>,
+    /// Outlines of what it consists of.
+    pub(super) outlines: Vec<Vec<[f64; 2]>>,
 }
 
 /// A straight beam, perhaps with a width that changes along it.

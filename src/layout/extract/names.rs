@@ -2,9 +2,9 @@
 
 use super::Extraction;
 use super::boxes::Boxes;
+use super::identifier::identifier;
 use super::nets::OnNet;
 use crate::layout::drawing::Drawing;
-use crate::layout::lines::RESERVED;
 use std::collections::HashSet;
 
 /// Labels that are told one by one.
@@ -80,17 +80,4 @@ pub(super) fn told(result: &mut Extraction) {
     if count > TOLD {
         result.notes.push(format!("{} more labels that name nothing, or what has a name already", count - TOLD));
     }
-}
-
-/// A text as a name of the netlist language: other characters than letters and digits become `_`; none where nothing is left.
-pub(super) fn identifier(text: &str) -> Option<String> {
-    let mut name: String =
-        text.trim().chars().take(64).map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
-    if !name.bytes().any(|b| b.is_ascii_alphanumeric()) {
-        return None;
-    }
-    if !name.starts_with(|c: char| c.is_ascii_alphabetic()) || RESERVED.contains(&name.as_str()) {
-        name.insert_str(0, "n_");
-    }
-    Some(name)
 }

@@ -6,8 +6,9 @@
 
 use super::areas::{self, Areas};
 use super::boxes::{self, Boxes, Extent};
-use super::names::identifier;
-use super::{ExtractError, Extraction, MOST_POINTS, Moving, Net};
+use super::error::{ExtractError, MOST_POINTS};
+use super::identifier::identifier;
+use super::{Extraction, Net};
 use crate::layout::crossings::bounded;
 use crate::layout::drawing::{Drawing, Label, Polygon};
 use crate::layout::mask;
@@ -16,6 +17,13 @@ use crate::layout::regions;
 use crate::sets::Sets;
 use std::cell::OnceCell;
 use std::collections::BTreeMap;
+
+/// What moves of a layer.
+pub(super) struct Moving<'a> {
+    pub(super) layer: &'a process::Layer,
+    /// Outlines of the parts in which something moves, etch holes filled.
+    pub(super) parts: Vec<Polygon>,
+}
 
 /// Names of electrical ground, in small letters.
 const GROUNDS: [&str; 4] = ["gnd", "ground", "vss", "0"];

@@ -1,20 +1,12 @@
 //! Areas that are held, with the nodes on them: what labels stand on.
 
-use super::model::Builder;
+use super::model::{Builder, Pad};
 use crate::sets::Sets;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
 /// A stretch of a limb as shares of its length, with nodes on it.
 pub(super) type Stretch = ([f64; 2], Vec<usize>);
-
-/// An area that is held.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Pad {
-    pub(super) nodes: Vec<usize>,
-    /// Outlines of what it consists of.
-    pub(super) outlines: Vec<Vec<[f64; 2]>>,
-}
 
 impl Builder<'_> {
     /// What a joint holds: those of the nodes made for it that are anchored, and its whole area.

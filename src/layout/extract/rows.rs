@@ -2,8 +2,6 @@
 
 use super::{Beam, Extraction, LayerResult, holes, live};
 
-/// Relative change of the width below which a beam has one width [1]: what rounding to the grid does.
-const UNIFORM: f64 = 5e-3;
 /// Two values are one up to this share of them, and to this many metres or radians: rounding of arithmetic, not of a grid.
 const SAME: [f64; 2] = [1e-9, 1e-15];
 
@@ -118,11 +116,6 @@ impl Row {
             && self.values.len() == other.values.len()
             && self.values.iter().zip(&other.values).all(|((n, a), (m, b))| n == m && a.same(b))
     }
-}
-
-/// Whether a beam has two widths.
-pub(super) fn tapers(width: [f64; 2]) -> bool {
-    (width[1] - width[0]).abs() > UNIFORM * width[0].max(width[1])
 }
 
 impl Extraction {
@@ -263,7 +256,7 @@ impl<'a> Rows<'a> {
         let layer = &self.found.layers[beam.layer];
         let live = if self.found.carries(a) { live::model(layer) } else { None };
         let mut values = vec![("l", Value::Long(long))];
-        let taper = live.is_none() && tapers(width);
+        let taper = live.is_none() && live::tapers(width);
         if taper {
             values.extend([("w1", Value::Wide(width[0])), ("w2", Value::Wide(width[1]))]);
         } else {

@@ -2,9 +2,9 @@
 
 use super::anchors::Rule;
 use super::combs;
-use super::layer::Part;
 use super::model::Model;
 use super::moments::Moments;
+use super::part::Part;
 use super::{Beam, Body, Comb, Extraction, Node, Pad};
 use crate::layout::drawing::Drawing;
 use crate::layout::process;

@@ -1,9 +1,9 @@
 //! A limb as beams between nodes: less what is held, divided where something pulls.
 
 use super::anchors::Rule;
+use super::cells::{Owner, Tap};
 use super::joints::Kind;
 use super::model::{Beam, Builder};
-use super::taps::{Owner, Tap};
 
 /// A free end beyond an anchor shorter than this many widths is part of the anchor [1].
 const STUMP: f64 = 1.5;

@@ -1,6 +1,6 @@
 //! Records of GDSII stream files: length, type, type of data, data; numbers big-endian, reals in excess-64 notation to base 16.
 
-use super::{GdsError, GdsFault};
+use super::error::{GdsError, GdsFault};
 use std::io::Read;
 
 /// Types of records that the reader knows, by number.

@@ -1,0 +1,28 @@
+//! A part of a layer that hangs together, and what is known of its shape.
+
+use super::joints::Parts;
+use super::medial::Medial;
+use super::moments::Moments;
+use crate::layout::drawing::Polygon;
+use std::sync::Arc;
+
+/// What was found along the axis of a shape.
+pub(super) type Found = Arc<(Medial, Parts)>;
+
+/// A part that hangs together.
+#[derive(Debug, Clone)]
+pub(super) struct Part {
+    /// Its outline.
+    pub(super) polygon: Polygon,
+    /// Its axis, limbs and joints.
+    pub(super) found: Found,
+    /// Etch holes in it, in coordinates of the drawing.
+    pub(super) holes: Vec<Moments>,
+}
+
+impl Part {
+    /// Lower left corner of its box.
+    pub(super) fn origin(&self) -> [f64; 2] {
+        self.polygon.extent().unwrap_or_default()[0].map(f64::from)
+    }
+}
