@@ -1,8 +1,9 @@
 //! The house has floors: a module names modules on lower floors, never one above it. On one floor, `compile`, `device`
 //! and `analysis` see each other and nobody else does. Tests inside a file may look anywhere.
 
+use crate::files;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 const FLOORS: [&[&str]; 10] = [
     &["budget", "sets"],
@@ -25,11 +26,6 @@ const RESERVED: [(&str, usize); 4] = [("tonic::", 8), ("tokio::", 8), ("prost::"
 
 fn floor(module: &str) -> Option<usize> {
     FLOORS.iter().position(|floor| floor.contains(&module))
-}
-
-fn files(folder: &Path) -> Vec<PathBuf> {
-    let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
-    entries.flat_map(|path| if path.is_dir() { files(&path) } else { vec![path] }).collect()
 }
 
 #[test]

@@ -1,9 +1,10 @@
 //! Files do not name each other in circles: what two of them need stands in a third. A file names another by `use` and by paths in its
 //! code; a re-export counts as the file that it comes from. Tests inside a file may look anywhere.
 
+use crate::files;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Circles that are still there, by their first file and the number of files in them. Open one, and take it off.
 const KNOWN: &[(&str, usize)] = &[("multibody/rcr/closures", 18)];
@@ -15,11 +16,6 @@ type Module = Vec<String>;
 struct Source {
     texts: BTreeMap<Module, String>,
     passed_on: BTreeMap<(Module, String), Module>,
-}
-
-fn files(folder: &Path) -> Vec<PathBuf> {
-    let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
-    entries.flat_map(|path| if path.is_dir() { files(&path) } else { vec![path] }).collect()
 }
 
 /// Without comments and without tests.

@@ -1,0 +1,14 @@
+//! What the source itself holds to: floors, no circles of files, sizes.
+
+mod circles;
+mod layering;
+mod sizes;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Every file below a folder.
+fn files(folder: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    entries.flat_map(|path| if path.is_dir() { files(&path) } else { vec![path] }).collect()
+}
