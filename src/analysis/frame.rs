@@ -14,7 +14,6 @@ use crate::discretize::frame::{Elements, Frame, FrameGaps, FrameOptions, assembl
 use crate::gaps::{Drive, Gap, Point};
 use crate::multibody::BlockMatrix;
 use crate::multibody::factor::ZeroPivot;
-use crate::multibody::linear_system::LinearSystem;
 use crate::multibody::planar::Pose;
 use crate::solve::SolveError;
 use crate::solve::baseline::frame_modes::lowest_consistent_modes;
@@ -25,8 +24,12 @@ pub use motion::frame_transient;
 
 /// Newton iterations of an equilibrium, at most.
 const MOST_ITERATIONS: usize = 100;
-/// A change below this share of the displacements is rounding.
+/// Iterations after which a correction that does not shrink is rounding, where gaps pull.
+const FEW: usize = 20;
+/// A change below this share of the displacements is none.
 const SETTLED: f64 = 1e-12;
+/// Rounding beyond this share of the displacements leaves no equilibrium to be told.
+const ROUNDED: f64 = 1e-6;
 
 /// The frame of a compiled netlist: one element for each beam, as SUGAR has it, or by the band when one was given.
 ///
@@ -160,32 +163,41 @@ fn balance(
     force(compiled, frame, rise, &mut load);
     let mut solver = Sparse::new(&system.pattern)?;
     let mut q = vec![Pose::zeros(); system.bodies()];
+    let (mut tangent, mut before) = (system.clone(), f64::INFINITY);
+    let amount = |x: &[Pose]| x.iter().map(Pose::amax).fold(0.0, f64::max);
     for iteration in 1..=MOST_ITERATIONS {
-        let mut stiffness = system.stiffness.clone();
+        tangent.stiffness.clone_from(&system.stiffness);
         let mut change = load.clone();
         let mut borne = vec![Pose::zeros(); system.bodies()];
-        stiffness.multiply_add(&system.pattern, &q, &mut borne);
+        system.stiffness.multiply_add(&system.pattern, &q, &mut borne);
         for (gap, volts) in acting(frame, volts) {
             gap.add_force(true, &q, -0.5 * volts * volts, true, &mut borne);
         }
         change.iter_mut().zip(&borne).for_each(|(change, borne)| *change -= borne);
-        add_gap_stiffness(frame, &q, volts, &mut stiffness);
-        let tangent = LinearSystem { stiffness, ..system.clone() };
+        add_gap_stiffness(frame, &q, volts, &mut tangent.stiffness);
         tangent.project(&mut change);
         let mut matrix = tangent.combine(1.0, 0.0, 0.0);
         // the recursion's test of pivots finds free motions; the solution itself is the sparse package's
         matrix.clone().factor(&system.pattern).map_err(|p| singular(frame, p))?;
         solver.factor(&system.pattern, &mut matrix).map_err(|p| singular(frame, p))?;
         solver.solve(&system.pattern, &matrix, &mut change);
-        let amount = |x: &[Pose]| x.iter().map(Pose::amax).fold(0.0, f64::max);
         q.iter_mut().zip(&change).for_each(|(q, change)| *q += change);
-        let settled = amount(&change) <= SETTLED * amount(&q);
-        if settled || acting(frame, volts).next().is_none() {
+        let (moved, all) = (amount(&change), amount(&q));
+        if moved <= SETTLED * all {
             return Ok((q, iteration));
         }
+        // a correction that does not shrink any more is rounding
+        if moved > 0.5 * before && (iteration > FEW || acting(frame, volts).next().is_none()) {
+            if moved <= ROUNDED * all {
+                return Ok((q, iteration));
+            }
+            break;
+        }
+        before = moved;
     }
     Err(AnalysisError::NotConverged {
-        detail: format!("the frame finds no equilibrium in {MOST_ITERATIONS} iterations: its gaps may have pulled in"),
+        detail: "the frame finds no equilibrium: its gaps have pulled in, or rounding hides where a part rests that next to nothing holds"
+            .into(),
     })
 }
 

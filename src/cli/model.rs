@@ -7,7 +7,7 @@ use bimorph::compile::{CompileOptions, Compiled, Drawn, Junctions, compile, draw
 use bimorph::front::{self, Asked, Source};
 use bimorph::layout::Format;
 use bimorph::layout::drawing::Drawing;
-use bimorph::netlist::{Bundle, Diagnostic, DroppedInclude, Setting, Severity};
+use bimorph::netlist::{Bundle, Diagnostic, DroppedInclude, Setting};
 use bimorph::options::{MODEL, Value};
 use clap::Args;
 use serde::ser::SerializeMap;
@@ -162,16 +162,10 @@ impl ModelArgs {
 
 /// What every result of the linear frame is warned of.
 fn baseline() -> Diagnostic {
-    Diagnostic {
-        code: "W043".into(),
-        severity: Severity::Warning,
-        file: String::new(),
-        line: 0,
-        column: 0,
-        width: 0,
-        message: "the linear frame is a baseline: small displacements, no stops, and nothing tells how far its elements are off".into(),
-        help: "--segments N or --band HZ for more elements; --solver recursion has an estimate".into(),
-    }
+    let message =
+        "the linear frame is a baseline: small displacements, no stops, and nothing tells how far its elements are off";
+    let help = "--segments N or --band HZ for more elements; --solver recursion has an estimate";
+    Diagnostic::warning("W043", message.into(), help)
 }
 
 /// Shows what the mesh has added to the warnings of a model on standard error.

@@ -36,6 +36,22 @@ pub struct Diagnostic {
     pub help: String,
 }
 
+impl Diagnostic {
+    /// A warning about no place in the text.
+    pub fn warning(code: &str, message: String, help: &str) -> Self {
+        Self {
+            code: code.into(),
+            severity: Severity::Warning,
+            file: String::new(),
+            line: 0,
+            column: 0,
+            width: 0,
+            message,
+            help: help.into(),
+        }
+    }
+}
+
 /// Every message of one load, with the texts they point into.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Diagnostics {

@@ -1,9 +1,10 @@
 //! A model with other numbers of segments.
 
 use super::super::AnalysisError;
-use super::warnings::{WARNING, beyond, warning};
+use super::warnings::{WARNING, beyond};
 use crate::compile::Compiled;
 use crate::discretize::DiscretizeError;
+use crate::netlist::Diagnostic;
 use crate::refine::model_order::ModelOrder;
 use std::borrow::Cow;
 
@@ -14,17 +15,28 @@ pub(super) fn chosen(compiled: &Compiled) -> bool {
 
 /// The model on another mesh, with a warning where that does not hold the tolerance.
 pub(super) fn on(compiled: &Compiled, order: ModelOrder) -> Result<Compiled, AnalysisError> {
-    let mut fitted = if order.segments == compiled.order.segments {
+    let mut fitted = laid(compiled, order)?;
+    warn_of_mesh(&mut fitted);
+    Ok(fitted)
+}
+
+/// The model on another mesh, of which nothing is said.
+pub(super) fn laid(compiled: &Compiled, order: ModelOrder) -> Result<Compiled, AnalysisError> {
+    Ok(if order.segments == compiled.order.segments {
         Compiled { order, ..compiled.clone() }
     } else {
         let detail = |error: DiscretizeError| AnalysisError::NotConverged { detail: error.to_string() };
         compiled.with_order(order).map_err(detail)?
-    };
-    let Some(message) = beyond(fitted.options.tol, fitted.order.estimated_error) else { return Ok(fitted) };
+    })
+}
+
+/// Says so where the estimate of a mesh is beyond the tolerance, or missing: once, with the last estimate.
+pub(super) fn warn_of_mesh(fitted: &mut Compiled) {
+    fitted.warnings.items.retain(|d| d.code != WARNING);
+    let Some(message) = beyond(fitted.options.tol, fitted.order.estimated_error) else { return };
     let help =
-        if chosen(&fitted) { "leave --segments away, or take more" } else { "compare with --segments of your own" };
-    fitted.warnings.items.push(warning(WARNING, message, help));
-    Ok(fitted)
+        if chosen(fitted) { "leave --segments away, or take more" } else { "compare with --segments of your own" };
+    fitted.warnings.items.push(Diagnostic::warning(WARNING, message, help));
 }
 
 /// The model with so many segments.

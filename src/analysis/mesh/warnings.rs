@@ -3,7 +3,7 @@
 use super::super::gap_pieces;
 use super::super::statics::OperatingPoint;
 use crate::compile::Compiled;
-use crate::netlist::{Diagnostic, Severity};
+use crate::netlist::Diagnostic;
 
 /// Code of the warning that a mesh does not hold the tolerance.
 pub(crate) const WARNING: &str = "W040";
@@ -44,7 +44,7 @@ pub(super) fn of_stress(compiled: &Compiled, share: Option<f64>) -> Option<Diagn
     } else {
         "the linear model leaves out what stress does to stiffness: the part would buckle".into()
     };
-    Some(warning(STRESS, message, "leave --linear away; modes have the stiffness of stress with it too"))
+    Some(Diagnostic::warning(STRESS, message, "leave --linear away; modes have the stiffness of stress with it too"))
 }
 
 /// Where a gap along beams has too few pieces at one of these equilibria, whose results are off by so many times the share of its
@@ -60,18 +60,5 @@ pub(super) fn of_pieces(compiled: &Compiled, points: &[(OperatingPoint, f64)]) -
 /// The same where the gap that leaves out most is known, and how far it may be off.
 pub(super) fn of_share_in_pieces(compiled: &Compiled, worst: Option<(String, f64)>) -> Option<Diagnostic> {
     let message = gap_pieces::told(compiled, worst)?;
-    Some(warning(PIECES, message, "divide the beams: draw several gaps in a row between further nodes"))
-}
-
-pub(super) fn warning(code: &str, message: String, help: &str) -> Diagnostic {
-    Diagnostic {
-        code: code.into(),
-        severity: Severity::Warning,
-        file: String::new(),
-        line: 0,
-        column: 0,
-        width: 0,
-        message,
-        help: help.into(),
-    }
+    Some(Diagnostic::warning(PIECES, message, "divide the beams: draw several gaps in a row between further nodes"))
 }

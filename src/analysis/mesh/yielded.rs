@@ -4,7 +4,7 @@ use super::super::backbending::{Backbent, Strains, backbend};
 use super::super::statics::StaticResult;
 use super::super::{AnalysisError, BeamMotions, PortVoltages};
 use super::equilibrium::{SMALL, static_fitted};
-use super::meshed::{chosen, meshed, on};
+use super::meshed::{chosen, laid, meshed, warn_of_mesh};
 use crate::compile::Compiled;
 use crate::options::CompileOptions;
 use crate::refine::doubling::{self, Output};
@@ -29,6 +29,7 @@ pub fn static_backbent(
     let (mut fitted, mut result, curves) = static_fitted(&bent.compiled, voltages)?;
     let both = fitted.order.estimated_error.zip(of_strains).map(|(a, b)| a + b);
     (fitted.order.estimated_error, result.estimated_error) = (both, both);
+    warn_of_mesh(&mut fitted);
     Ok((fitted, result, curves, bent.strains))
 }
 
@@ -37,8 +38,12 @@ pub fn static_backbent(
 /// # Errors
 /// See [`backbend`].
 fn backbent_fitted(compiled: &Compiled, voltages: &PortVoltages) -> Result<Backbent, AnalysisError> {
+    let mut known = Vec::new();
     let mut analyse = |segments: &[usize]| {
-        Ok::<_, AnalysisError>(outputs(&backbend(meshed(compiled, segments)?.as_ref(), voltages)?))
+        let bent = backbend(meshed(compiled, segments)?.as_ref(), voltages)?;
+        let outputs = outputs(&bent);
+        known.push((segments.to_vec(), bent));
+        Ok::<_, AnalysisError>(outputs)
     };
     let options = CompileOptions { tol: SHARE * compiled.options.tol, ..compiled.options.clone() };
     let segments = compiled.order.segments.clone();
@@ -46,7 +51,10 @@ fn backbent_fitted(compiled: &Compiled, voltages: &PortVoltages) -> Result<Backb
         true => doubling::estimate(&options, segments, &mut analyse)?,
         false => doubling::fit(&compiled.structure, &options, segments, &mut analyse)?,
     };
-    backbend(&on(compiled, order)?, voltages)
+    match known.into_iter().find(|(segments, _)| *segments == order.segments) {
+        Some((_, bent)) => Ok(Backbent { compiled: laid(&bent.compiled, order)?, ..bent }),
+        None => backbend(&laid(compiled, order)?, voltages),
+    }
 }
 
 /// What is compared: strains, to themselves, or to a share of the largest one or of what the arm bears.
