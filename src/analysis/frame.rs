@@ -28,8 +28,6 @@ const MOST_ITERATIONS: usize = 100;
 const FEW: usize = 20;
 /// A change below this share of the displacements is none.
 const SETTLED: f64 = 1e-12;
-/// Rounding beyond this share of the displacements leaves no equilibrium to be told.
-const ROUNDED: f64 = 1e-6;
 
 /// The frame of a compiled netlist: one element for each beam, as SUGAR has it, or by the band when one was given.
 ///
@@ -64,14 +62,17 @@ pub fn frame_statics(
     let (sources, rise, drive) = sources(compiled, voltages)?;
     let (q, iterations) = balance(compiled, frame, &rise, &drive.volts)?;
     let nodes = node_motions(compiled, frame, &q);
+    let electrics = &compiled.parts.system.electrics;
+    let charge = |port: usize| {
+        let gaps = frame.gaps.iter().zip(&drive.volts).enumerate();
+        gaps.map(|(g, (gap, volts))| electrics.gap_rows[(g, port)] * gap.capacitance(true, &q) * volts).sum::<f64>()
+    };
     let electrical = electrical(compiled, &sources, &rise);
     let result = StaticResult {
         nodes,
         temperatures_k: electrical.temperatures_k,
         currents_a: electrical.currents_a,
-        charges_c: (0..compiled.parts.system.electrics.ports)
-            .map(|p| (compiled.parts.system.electrics.names[p].clone(), 0.0))
-            .collect(),
+        charges_c: (0..electrics.ports).map(|p| (electrics.names[p].clone(), charge(p))).collect(),
         pulled_in: false,
         jumped: false,
         free_motions: Vec::new(),
@@ -164,7 +165,7 @@ fn balance(
     let mut solver = Sparse::new(&system.pattern)?;
     let mut q = vec![Pose::zeros(); system.bodies()];
     let (mut tangent, mut before) = (system.clone(), f64::INFINITY);
-    let amount = |x: &[Pose]| x.iter().map(Pose::amax).fold(0.0, f64::max);
+    let size = compiled.structure.extent();
     for iteration in 1..=MOST_ITERATIONS {
         tangent.stiffness.clone_from(&system.stiffness);
         let mut change = load.clone();
@@ -182,13 +183,14 @@ fn balance(
         solver.factor(&system.pattern, &mut matrix).map_err(|p| singular(frame, p))?;
         solver.solve(&system.pattern, &matrix, &mut change);
         q.iter_mut().zip(&change).for_each(|(q, change)| *q += change);
-        let (moved, all) = (amount(&change), amount(&q));
+        let (moved, all) = (amount(&change, size), amount(&q, size));
         if moved <= SETTLED * all {
             return Ok((q, iteration));
         }
         // a correction that does not shrink any more is rounding
         if moved > 0.5 * before && (iteration > FEW || acting(frame, volts).next().is_none()) {
-            if moved <= ROUNDED * all {
+            // what is printed is within the tolerance beside it
+            if moved <= compiled.options.tol * all {
                 return Ok((q, iteration));
             }
             break;
@@ -199,6 +201,11 @@ fn balance(
         detail: "the frame finds no equilibrium: its gaps have pulled in, or rounding hides where a part rests that next to nothing holds"
             .into(),
     })
+}
+
+/// Largest translation, or rotation times the drawing's size [m].
+fn amount(q: &[Pose], size: f64) -> f64 {
+    q.iter().map(|p| p.fixed_rows::<2>(0).amax().max(size * p[2].abs())).fold(0.0, f64::max)
 }
 
 /// The gaps with a voltage across them.

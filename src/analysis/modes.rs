@@ -4,7 +4,7 @@ use super::signal::{Signal, View};
 use super::statics::{NodeMotion, operating_point, told_at};
 use super::{AnalysisError, BeamMotions, NodeMotions, PortVoltages};
 use crate::compile::Compiled;
-use crate::gaps::Point;
+use crate::gaps::{Drive, Point};
 use crate::multibody::BlockMatrix;
 use crate::multibody::forces::add_inertia;
 use crate::multibody::planar::Pose;
@@ -57,6 +57,19 @@ pub fn modes(compiled: &Compiled, count: usize, voltages: &PortVoltages) -> Resu
     Ok(modes_with_curves(compiled, count, voltages)?.0)
 }
 
+/// True where modes are about an equilibrium that is not the drawing. As SUGAR has it, that is where voltages pull across gaps: its beams
+/// are as stiff as drawn, whatever they bear.
+pub(super) fn about_equilibrium(compiled: &Compiled, voltages: &PortVoltages) -> bool {
+    let system = &compiled.parts.system;
+    let driven = !voltages.is_empty() || system.electrics.fixed.iter().any(|v| *v != 0.0);
+    if compiled.options.as_sugar {
+        return driven && !system.gaps.is_empty();
+    }
+    driven
+        || system.loads.iter().any(|l| l.moment != 0.0 || l.force.norm() > 0.0)
+        || system.model.joints.iter().any(|j| j.rest != 0.0)
+}
+
 /// The same, with the displacement of points along every beam for pictures, mode by mode.
 ///
 /// # Errors
@@ -68,13 +81,8 @@ pub fn modes_with_curves(
 ) -> Result<(ModesResult, Vec<BeamMotions>), AnalysisError> {
     let system = &compiled.parts.system;
     let mut drive = system.electrics.drive();
-    // without loads the drawn geometry is the operating point, also for a structure that floats freely
-    let loaded = !compiled.options.as_sugar
-        && (!voltages.is_empty()
-            || !system.electrics.fixed.is_empty()
-            || !system.loads.is_empty()
-            || system.model.joints.iter().any(|j| j.rest != 0.0));
-    if compiled.options.as_sugar {
+    let (as_sugar, loaded) = (compiled.options.as_sugar, about_equilibrium(compiled, voltages));
+    if as_sugar {
         // neither loads nor built-in strain
         drive.load = 0.0;
     }
@@ -84,8 +92,10 @@ pub fn modes_with_curves(
         way = told_at(compiled, &point);
         let share = gap_pieces::left_out(compiled, &point.q, &point.volts);
         in_pieces = share.map(|(name, share)| (name.to_owned(), gap_pieces::OF_DEFLECTION * share));
-        let mut rise = point.rise.clone();
-        system.electrics.steady(&point.sources, &mut rise, &mut drive);
+        let (mut rise, mut driven) = (point.rise.clone(), system.electrics.drive());
+        system.electrics.steady(&point.sources, &mut rise, &mut driven);
+        // as SUGAR: heat and loads move what the field pulls at, and do nothing to the stiffness of beams
+        drive = if as_sugar { Drive { volts: driven.volts, ..drive } } else { driven };
         point.q
     } else {
         vec![Pose::zeros(); system.bodies()]
@@ -93,8 +103,10 @@ pub fn modes_with_curves(
     let mut tangent = BlockMatrix::new(&system.model.pattern);
     let mut residual = q.clone();
     system.tangent(&q, &drive, &mut tangent, &mut residual);
-    // what stress and heat do to the stiffness belongs to the vibration, in a linear model too
-    system.add_stress_stiffness(&q, &drive, &mut tangent);
+    if !as_sugar {
+        // what stress and heat do to the stiffness belongs to the vibration, in a linear model too
+        system.add_stress_stiffness(&q, &drive, &mut tangent);
+    }
     let mut found = lowest_modes(system, (&q, &drive), &tangent, count + GUARDS)?;
     if found.lambda.is_empty() {
         let detail = "no mode came out: nothing that moves has mass, or the stiffness is not finite".into();
@@ -115,7 +127,8 @@ pub fn modes_with_curves(
             detail: format!("there are more than {count} modes below the highest one found; ask for more modes"),
         });
     }
-    let forces = if loaded { axial_forces(&compiled.structure, &compiled.parts, &q, &drive) } else { Vec::new() };
+    let forces =
+        if loaded && !as_sugar { axial_forces(&compiled.structure, &compiled.parts, &q, &drive) } else { Vec::new() };
     let mut errors = estimated(compiled, &tangent, &forces, &found);
     let mut warnings = told(compiled, count, &q, &found.lambda);
     warnings.extend(gap_pieces::told(compiled, in_pieces));

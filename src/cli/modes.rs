@@ -46,9 +46,9 @@ pub(crate) struct Modes {
     #[arg(long = "port", short = 'p', value_name = "NAME=VOLTS", value_parser = value::volts)]
     ports: Vec<(String, f64)>,
 
-    /// What computes it: the product's own model, or the baseline to compare with
-    #[arg(long, value_enum, default_value_t)]
-    solver: ModelChoice,
+    /// What computes it: the product's own model, or the baseline to compare with [default: recursion; frame with --as-sugar]
+    #[arg(long, value_enum)]
+    solver: Option<ModelChoice>,
 
     #[command(flatten)]
     output: OutputArgs,
@@ -73,13 +73,15 @@ impl Modes {
     pub(crate) fn run(&self) -> Result<(), Failure> {
         self.output.check()?;
         MODES_COUNT.check(&Value::Count(self.count))?;
-        let compiled = match self.solver {
+        // SUGAR's modes are those of one cubic element for each beam
+        let usual = if self.model.options()?.as_sugar { ModelChoice::Frame } else { ModelChoice::Recursion };
+        let solver = self.solver.unwrap_or(usual);
+        let drawn = match solver {
             ModelChoice::Recursion => self.model.compile()?,
             ModelChoice::Frame => self.model.compile_frame()?,
         };
         let busy = progress::spinner("modes");
-        let drawn = compiled;
-        let result = match self.solver {
+        let result = match solver {
             ModelChoice::Recursion => modes_fitted(&drawn, self.count, &self.ports),
             ModelChoice::Frame => frame(&drawn)
                 .and_then(|frame| frame_modes(&drawn, &frame, self.count, &self.ports))
@@ -96,7 +98,7 @@ impl Modes {
             estimated_errors: &result.errors,
             unknowns: result.unknowns,
             deflection_m: result.deflection_m,
-            solver: self.solver,
+            solver,
             port_voltages_v: Named(&self.ports),
             context: self.model.context(&compiled).with(&result.warnings),
         };

@@ -92,6 +92,15 @@ impl Gap {
         }
     }
 
+    /// Capacitance [F]; 0 of a stop. `linear`: for small displacements.
+    pub fn capacitance(&self, linear: bool, q: &[Pose]) -> f64 {
+        match self {
+            Self::Single { approach, capacitor, .. } => capacitor.at(approach.value(q, linear)).value,
+            Self::Facing { ends, side, facing } => facing.at(&facing_ends::values(linear, ends, *side, q)).value,
+            Self::Stop { .. } => 0.0,
+        }
+    }
+
     /// `tangent += factor·∇²C + contact stiffness`, on a pattern that couples its bodies.
     /// `linear`: for small displacements.
     pub fn add_tangent(

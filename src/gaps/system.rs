@@ -119,13 +119,7 @@ impl System {
 
     /// Capacitance of a gap [F].
     pub fn capacitance(&self, gap: usize, q: &[Pose]) -> f64 {
-        match &self.gaps[gap] {
-            Gap::Single { approach, capacitor, .. } => capacitor.at(approach.value(q, self.model.linear)).value,
-            Gap::Facing { ends, side, facing } => {
-                facing.at(&facing_ends::values(self.model.linear, ends, *side, q)).value
-            }
-            Gap::Stop { .. } => 0.0,
-        }
+        self.gaps[gap].capacitance(self.model.linear, q)
     }
 
     /// Change of a gap's capacitance with a change `dq` of the configuration [F].

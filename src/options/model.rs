@@ -96,7 +96,8 @@ options! {
     imperfection: Option<f64> = None, "imperfection" = 12, ["1"], Range::Within(-0.1, 0.1), "none: as drawn";
 
     /// As SUGAR 2 computes, in one switch: linear, beams that meet in points (junctions=centreline), gaps between facing beams along
-    /// the straight lines between their ends, modes about the drawing whatever stress, heat and voltages are.
+    /// the straight lines between their ends, beams in modes as stiff as drawn whatever they bear. `bimorph modes` takes one cubic
+    /// element for each beam then.
     as_sugar: bool = false, "as_sugar" = 13, [""], Range::Flag, "";
 
     /// The mechanism without the circuit that is drawn around it (R, C, L, sources, amplifiers): its electrical nodes are ports by

@@ -61,6 +61,9 @@ fn static_equilibrium() {
     assert!(stout > slender * (1.0 - 1e-3) && stout < slender * (1.0 + 1e-3), "{stout:e} {slender:e}");
     assert_eq!(bench.json("modes c.net")["junctions"], "calibrated");
     assert_eq!(bench.json("modes c.net --solver frame")["junctions"], "centreline");
+    // modes as SUGAR has them are those of its elements, unless asked otherwise
+    assert_eq!(bench.json("modes c.net --as-sugar")["solver"], "frame");
+    assert_eq!(bench.json("modes c.net --as-sugar --solver recursion")["solver"], "recursion");
 
     let report = bench.run("static c.net --linear");
     assert!(report.stdout.contains("1.515 µm"), "{}", report.stdout);

@@ -183,3 +183,22 @@ fn frame_motion_agrees_with_the_linear_model() {
         assert!((a - b).abs() < 2e-3 * amplitude, "{a:e} {b:e}");
     }
 }
+
+/// What a frame prints of statics is within the tolerance beside it: a part that hangs on a thread, some 1e-11 as stiff as what bears it,
+/// is where twenty times as thick a thread has it within 1e-3; one on a thread that rounding hides is refused at 1e-6.
+#[test]
+fn what_rounding_hides_is_refused() {
+    let at = |thread: &str, tol: f64| {
+        let text = format!(
+            "process p = [Youngsmodulus=165e9 density=2300 h=2u]\nanchor p [a] []\nbeam2d p [a b] [l=100u w=20u]\n\
+             beam2d p [b c] [l=200u w={thread} h={thread}]\nbeam2d p [c d] [l=50u w=20u]\nbeam2d p [d e] [l=50u w=20u oz=pi/2]\n\
+             f2d * [b] [F=1u oz=pi/2]"
+        );
+        let compiled = model(&text, &CompileOptions { tol, ..CompileOptions::default() });
+        let found = frame_statics(&compiled, &frame(&compiled).unwrap(), &[]).map(|(result, _)| node(&result, "e").y);
+        found.map_err(|error| error.to_string())
+    };
+    let thick = at("2u", 1e-6).unwrap();
+    close(at("100n", 1e-3).unwrap(), thick, 1e-3);
+    assert!(at("25n", 1e-6).unwrap_err().contains("rounding hides"));
+}

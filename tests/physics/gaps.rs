@@ -1,10 +1,16 @@
 //! Combs, plates and facing beams.
 
 use crate::{balance, close, model, node};
-use bimorph::analysis::frame::{frame, frame_modes};
+use bimorph::analysis::frame::{frame, frame_modes, frame_statics};
 use bimorph::analysis::modes::modes;
 use bimorph::analysis::pull_in::pull_in;
+use bimorph::analysis::statics::static_equilibrium;
 use bimorph::compile::CompileOptions;
+use bimorph::gaps::Point;
+use bimorph::multibody::planar::Pose;
+use bimorph::multibody::{BlockMatrix, BodyId};
+use nalgebra::{DMatrix, DVector};
+use std::f64::consts::TAU;
 
 /// k = 1 N/m, m = 1e-10 kg, A = 1e-8 m², g = 2 µm.
 pub(crate) const PLATE: &str = "
@@ -142,4 +148,80 @@ fn modes_of_facing_beams_as_sugar() {
             close(*found, wanted, 5e-9);
         }
     }
+}
+
+/// The frame knows the charge of a port as the product's own model does, which has the same plates here: a rigid plate on a spring.
+#[test]
+fn charge_of_a_frame() {
+    let compiled = model(PLATE, &CompileOptions { as_sugar: true, ..CompileOptions::default() });
+    let port = [("drive".to_owned(), 2.0)];
+    let charge = frame_statics(&compiled, &frame(&compiled).unwrap(), &port).unwrap().0.charges_c[0].clone();
+    let wanted = static_equilibrium(&compiled, &port).unwrap().charges_c[0].clone();
+    assert_eq!(charge.0, wanted.0);
+    assert!(wanted.1 > 8.854e-12 * 1e-8 / 2e-6 * 2.0, "more than at rest");
+    close(charge.1, wanted.1, 1e-9);
+}
+
+/// Where SUGAR's modes under voltage differ from ours, its derivative does: a cantilever whose plate stands 1.5 µm from its electrode at 10 V
+/// has its lowest mode at 22801.18 Hz as forces and stiffness of one potential have it, and at SUGAR's 22793.556 Hz (its demo beamgap2e,
+/// symmetric part of its matrices) when forces are differenced over a nanometre to one side, as its `MF_gap2d` does.
+#[test]
+fn differences_of_a_nanometre() {
+    let text = "process s = [ Poisson=0.3 Youngsmodulus=165e9 density=2300 viscosity=1.78e-5 fluid=2e-6 permittivity=8.854e-12 h=2u ]
+        anchor s [A] []
+        beam2d s [A b] [l=100u w=2u]
+        gap2d s [b c D E] [l=100u w1=10u w2=5u gap=2u V=10]
+        anchor s [D] []
+        anchor s [E] []";
+    let compiled = model(text, &CompileOptions { as_sugar: true, ..CompileOptions::default() });
+    let frame = frame(&compiled).unwrap();
+    let exact = frame_modes(&compiled, &frame, 1, &[]).unwrap().0.frequencies_hz[0];
+    close(exact, 22801.18, 1e-6);
+    let fine = CompileOptions { as_sugar: true, segments: Some(16), ..CompileOptions::default() };
+    close(modes(&model(text, &fine), 1, &[]).unwrap().frequencies_hz[0], exact, 1e-4);
+
+    let (system, rest) = (&frame.system, frame_statics(&compiled, &frame, &[]).unwrap().0);
+    let mut q = vec![Pose::zeros(); 2];
+    assert_eq!(system.bodies(), q.len());
+    for (drawn, point) in compiled.structure.nodes.iter().zip(&frame.nodes) {
+        if let Some(Point { body: BodyId::Free(k), .. }) = point {
+            let moved = node(&rest, &drawn.name);
+            q[*k] = Pose::new(moved.x, moved.y, moved.rz);
+        }
+    }
+    let column = |k: usize, step: f64| {
+        let mut unit = vec![Pose::zeros(); 2];
+        unit[k / 3][k % 3] = step;
+        unit
+    };
+    let flat = |poses: &[Pose]| DVector::from_iterator(6, poses.iter().flat_map(|p| p.iter().copied()));
+    let force = |q: &[Pose]| {
+        let mut force = vec![Pose::zeros(); 2];
+        for gap in &frame.gaps {
+            gap.add_force(true, q, -0.5 * 100.0, true, &mut force);
+        }
+        flat(&force)
+    };
+    let dense = |matrix: &BlockMatrix<f64, 3>| {
+        let columns: Vec<_> = (0..6)
+            .map(|k| {
+                let mut out = vec![Pose::zeros(); 2];
+                matrix.multiply_add(&system.pattern, &column(k, 1.0), &mut out);
+                flat(&out)
+            })
+            .collect();
+        DMatrix::from_columns(&columns)
+    };
+    let step = 1e-9;
+    let differenced: Vec<_> = (0..6)
+        .map(|k| {
+            let back: Vec<Pose> = q.iter().zip(column(k, step)).map(|(q, step)| q - step).collect();
+            (force(&q) - force(&back)) / step
+        })
+        .collect();
+    let stiffness = dense(&system.stiffness) + DMatrix::from_columns(&differenced);
+    let lower = dense(&system.mass).cholesky().unwrap().l();
+    let half = lower.solve_lower_triangular(&(0.5 * (&stiffness + stiffness.transpose()))).unwrap();
+    let whole = lower.solve_lower_triangular(&half.transpose()).unwrap();
+    close(whole.symmetric_eigenvalues().min().sqrt() / TAU, 22793.5560464522, 1e-9);
 }

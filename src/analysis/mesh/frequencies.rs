@@ -1,6 +1,6 @@
 //! The mesh for modes: the highest one asked for decides, and about a loaded state that state and its frequencies too.
 
-use super::super::modes::{ModesResult, modes, modes_with_curves};
+use super::super::modes::{ModesResult, about_equilibrium, modes, modes_with_curves};
 use super::super::{AnalysisError, BeamMotions, PortVoltages};
 use super::equilibrium;
 use super::meshed::{chosen, meshed, on};
@@ -45,7 +45,7 @@ pub(super) fn for_modes(
     count: usize,
     voltages: &PortVoltages,
 ) -> Result<(ModelOrder, OfMesh), AnalysisError> {
-    let loaded = loaded(compiled, voltages);
+    let loaded = about_equilibrium(compiled, voltages);
     let given = chosen(compiled) || compiled.options.band.is_some();
     let order = if given {
         compiled.order.clone()
@@ -87,15 +87,6 @@ pub(super) fn for_modes(
 /// Largest of the errors; none where one of them is not known.
 pub(super) fn worst(mut errors: impl Iterator<Item = Option<f64>>) -> Option<f64> {
     errors.try_fold(0.0, |worst: f64, error| Some(worst.max(error?.abs())))
-}
-
-/// True where modes are about an equilibrium that is not the drawing.
-pub(super) fn loaded(compiled: &Compiled, voltages: &PortVoltages) -> bool {
-    let system = &compiled.parts.system;
-    !voltages.is_empty()
-        || system.electrics.fixed.iter().any(|v| *v != 0.0)
-        || system.loads.iter().any(|l| l.moment != 0.0 || l.force.norm() > 0.0)
-        || system.model.joints.iter().any(|j| j.rest != 0.0)
 }
 
 /// What is compared of modes.

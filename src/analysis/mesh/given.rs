@@ -5,12 +5,12 @@
 //! term of the beams' stiffness says. The result of the coarser mesh is that of the analysis, so that nothing is computed
 //! twice.
 
-use super::super::modes::{ModesResult, modes};
+use super::super::modes::{ModesResult, about_equilibrium, modes};
 use super::super::pull_in::{PullInResult, pull_in};
 use super::super::statics::{StaticResult, operating_point, result_at};
 use super::super::{AnalysisError, PortVoltages};
 use super::equilibrium::{self, told_of_static};
-use super::frequencies::{frequency_outputs, loaded, worst};
+use super::frequencies::{frequency_outputs, worst};
 use super::meshed::meshed;
 use super::pull_in::{pull_in_outputs, told_of_pull_in};
 use super::{Request, fitted};
@@ -107,7 +107,7 @@ fn swinging(compiled: &Compiled, count: usize, voltages: &PortVoltages) -> Resul
     let all = found.frequencies_hz.len() == count;
     let own = worst(found.errors.iter().copied());
     let sure = own.is_some_and(|error| error <= counted::SAFETY * compiled.options.tol);
-    let loaded = loaded(compiled, voltages);
+    let loaded = about_equilibrium(compiled, voltages);
     let (own, sure) = match own {
         Some(_) if sure || !loaded => (own, sure),
         _ => doubled(compiled, &found, count, voltages)?,

@@ -46,8 +46,8 @@ class Options(TypedDict, total=False):
 
     as_sugar: bool | None
     """As SUGAR 2 computes, in one switch: linear, beams that meet in points (junctions=centreline), gaps between
-    facing beams along the straight lines between their ends, modes about the drawing whatever stress, heat and
-    voltages are."""
+    facing beams along the straight lines between their ends, beams in modes as stiff as drawn whatever they
+    bear. `bimorph modes` takes one cubic element for each beam then."""
 
     without_circuit: bool | None
     """The mechanism without the circuit that is drawn around it (R, C, L, sources, amplifiers): its electrical
