@@ -2,9 +2,8 @@
 
 use super::kept::Kept;
 use super::proto;
-use super::store::{Store, private};
-use std::fs::File;
-use std::io::{self, Write};
+use super::store::Store;
+use std::io;
 use std::sync::Arc;
 
 /// Keeps the states of one session.
@@ -47,17 +46,9 @@ impl Keeper {
         let path = self.store.session(&self.id, &self.model, sequence % 2);
         let bytes = Kept::write(sequence, accepted, sealed);
         self.store.counted(&path, bytes.len(), || {
-            let mut file = private().open(&path)?;
-            file.write_all(&bytes)?;
-            file.set_len(bytes.len() as u64)?;
-            if self.store.sync {
-                file.sync_data()?;
-                if sequence <= 2 {
-                    // the name of a new file is kept by its folder
-                    File::open(self.store.folder.join("sessions"))?.sync_all()?;
-                }
-            }
-            Ok(())
+            self.store.disk().write(&path, &bytes)?;
+            // the name of a new file is kept by its folder
+            if sequence <= 2 { self.store.disk().keep_names(&self.store.folder.join("sessions")) } else { Ok(()) }
         })?;
         (self.sequence, self.accepted) = (sequence, accepted);
         Ok(())

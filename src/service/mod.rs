@@ -4,8 +4,8 @@
 //! [`proto`] is what travels and [`convert`] the only place that knows both it and the library's own types. [`client`]
 //! is built with the feature `remote` alone, and shows what [`access`] says; `tls` is for both ends. The rest is the feature `server`: [`server`] listens and stops
 //! (`sockets`, `connection`, `shutdown`), [`guard`] and `tokens` ask who comes, `intake` counts what comes in as `bodies`, `rpc` answers calls (`analyses` those that compute), `stream` is the Newton loop,
-//! `models`, `sessions` and `sweeps` keep what clients can name, under `ids` that nobody guesses; a `session` has its `usage` and its
-//! `spectra`, `snapshots` puts it into bytes, `store` and `keeper` hold what outlives the server, which `waking` goes on with and
+//! `models`, `sessions` and `sweeps` keep what clients can name, under `ids` that nobody guesses; a `session` answers each `question`, has its `usage` and its
+//! `spectra`, `snapshots` puts it into bytes, `store` and `keeper` hold what outlives the server, on a `disk`, which `waking` goes on with and
 //! [`survey`] looks at, `work` computes, in the `turns` of clients, `chunks` sends what is long, `status` says what went wrong, [`log`]
 //! says it without waiting, [`limits`] is what clients may ask for, and [`settings`] all
 //! that a server is told, in whichever way it is [`written`].
@@ -14,6 +14,7 @@ pub mod access;
 pub mod address;
 pub mod client;
 pub mod convert;
+mod ids;
 pub mod proto;
 
 #[cfg(feature = "server")]
@@ -27,13 +28,13 @@ mod chunks;
 #[cfg(feature = "server")]
 mod connection;
 #[cfg(feature = "server")]
+mod disk;
+#[cfg(feature = "server")]
 mod framing;
 #[cfg(feature = "server")]
 mod gate;
 #[cfg(feature = "server")]
 pub mod guard;
-#[cfg(feature = "server")]
-mod ids;
 #[cfg(feature = "server")]
 mod intake;
 #[cfg(feature = "server")]
@@ -52,8 +53,12 @@ mod models;
 mod overseen;
 #[cfg(feature = "server")]
 mod overseer;
+#[cfg(all(test, feature = "server"))]
+mod power_cuts;
 #[cfg(feature = "server")]
 mod presence;
+#[cfg(feature = "server")]
+mod question;
 #[cfg(feature = "server")]
 mod rpc;
 #[cfg(feature = "server")]

@@ -5,9 +5,10 @@ use super::answerable::answerable;
 use super::chunks::{HEARTBEAT, TableStream};
 use super::convert::{self, model as text, options as options_wire, sweep as sweeps_wire};
 use super::models::check_size;
-use super::session::Question;
+use super::question::Question;
 use super::shared::{Calls, Reply};
 use super::stream::TrialStream;
+use super::sweeps::Asked;
 use super::{proto, status};
 use crate::budget::Budget;
 use crate::compile::{CompileError, CompileOptions, compile};
@@ -200,10 +201,12 @@ impl proto::bimorph_server::Bimorph for Calls {
             return Err(status::limit("sweep_points", limits.sweep_points, points));
         }
         count("outputs", request.spec.as_ref().map_or(0, sweeps_wire::outputs), limits)?;
+        let asked = Asked::by(&request.request_id).map_err(status::violation)?;
         let shared = Arc::clone(&self.0);
         let job = move || {
+            let asked = asked.map(|asked| asked.to_run(request.spec.as_ref(), &bundle, &options));
             let spec = sweeps_wire::spec_from_wire(request.spec).map_err(status::violation)?;
-            shared.sweeps.submit(spec, bundle, options, &shared.limits)
+            shared.sweeps.submit(spec, bundle, options, asked, &shared.limits)
         };
         let (sweep, points) = self.0.desk.run(job).await?;
         Ok(Response::new(proto::SubmitSweepResponse { sweep, points }))

@@ -5,6 +5,7 @@ use super::convert::device as wire;
 use super::keeper::Keeper;
 use super::limits::Limits;
 use super::models::Model;
+use super::question::Question;
 use super::server::MakeDevice;
 use super::small_signal::small_signal;
 use super::snapshots;
@@ -51,21 +52,6 @@ pub(super) struct Later;
 const SLICE: Duration = Duration::from_millis(5);
 /// After one that took longer, so many questions go to a thread at once.
 const AFTER_SLOW: u32 = 64;
-
-/// What a stream asks of its session.
-pub(super) enum Question {
-    Open(proto::OpenRequest),
-    Trial(proto::TrialRequest),
-    Accept(proto::Accept),
-    Linearize(proto::SmallSignalRequest),
-}
-
-impl Question {
-    /// Whether it has no answer.
-    pub(super) fn is_silent(&self) -> bool {
-        matches!(self, Self::Accept(accept) if !accept.answer)
-    }
-}
 
 impl Session {
     /// A session with a device that is not open yet; with a keeper its accepted states are kept. Nobody finds it before it is
@@ -117,7 +103,7 @@ impl Session {
     pub(super) fn answer_at_once(&self, question: &Question) -> Result<Option<ReplyKind>, Later> {
         // what waits for the disk waits elsewhere
         let keeps =
-            matches!(question, Question::Open(_) | Question::Accept(_)) || self.due.load(Ordering::Relaxed) != 0;
+            matches!(question, Question::Open(_) | Question::Accept(..)) || self.due.load(Ordering::Relaxed) != 0;
         if keeps && self.keeper.is_some()
             || !self.inline
             || self.slow.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |n| n.checked_sub(1)).is_ok()
@@ -183,16 +169,7 @@ impl Session {
                     .and_then(|trial| device.trial(&trial, &mut reply))
                     .map(|()| ReplyKind::Trial(wire::reply_to_wire(&mut reply)))
             }
-            Question::Accept(proto::Accept { token, answer }) => {
-                device.accept(Token(*token));
-                let kept = self.keep(device, Some(Token(*token)));
-                if let Err(status) = &kept {
-                    tracing::warn!(session = self.id, reason = status.message(), "an accepted state is not kept");
-                }
-                self.due.store(if kept.is_err() && !answer { *token } else { 0 }, Ordering::Relaxed);
-                let accepted = |kept| ReplyKind::Accepted(proto::Accepted { token: *token, kept });
-                return answer.then(|| kept.map_or_else(|status| refused(&status), accepted));
-            }
+            Question::Accept(accept, stream) => return self.accept(device, accept, *stream),
             Question::Linearize(request) => {
                 small_signal(device, Token(request.token), request.omega, request.noise).map(ReplyKind::Linearized)
             }
@@ -200,10 +177,27 @@ impl Session {
         Some(answer.unwrap_or_else(|error| ReplyKind::Fault(wire::fault_to_wire(&error))))
     }
 
+    /// Accepts a state and keeps it. Only the stream that joined last does: what the network held back of an earlier one must
+    /// not undo what was accepted since.
+    fn accept(&self, device: &mut dyn Device, accept: &proto::Accept, stream: u64) -> Option<ReplyKind> {
+        let proto::Accept { token, answer } = *accept;
+        if !self.usage.is_last(stream) {
+            return answer.then(|| refused(&status::overtaken(&self.id)));
+        }
+        device.accept(Token(token));
+        let kept = self.keep(device, Some(Token(token)));
+        if let Err(status) = &kept {
+            tracing::warn!(session = self.id, reason = status.message(), "an accepted state is not kept");
+        }
+        self.due.store(if kept.is_err() && !answer { token } else { 0 }, Ordering::Relaxed);
+        let accepted = |kept| ReplyKind::Accepted(proto::Accepted { token, kept });
+        answer.then(|| kept.map_or_else(|status| refused(&status), accepted))
+    }
+
     /// Keeps now what an accept without an answer could not: until that is done its stream has no later reply but the refusal.
     fn make_up(&self, device: &dyn Device, question: &Question) -> Result<(), Status> {
         let due = self.due.load(Ordering::Relaxed);
-        if due == 0 || matches!(question, Question::Open(_) | Question::Accept(_)) {
+        if due == 0 || matches!(question, Question::Open(_) | Question::Accept(..)) {
             return Ok(());
         }
         let kept = self.keep(device, Some(Token(due)));

@@ -93,6 +93,14 @@ pub(super) fn stopped(why: Stopped) -> Status {
     }
 }
 
+/// ABORTED for an accept that comes after another stream has joined its session.
+pub(super) fn overtaken(id: &str) -> Status {
+    Status::aborted(format!(
+        "session \"{}\" goes on by a stream that joined it later; attach again",
+        cut(id.to_owned(), 80)
+    ))
+}
+
 /// NOT_FOUND for an id.
 pub(super) fn not_found(kind: &str, id: &str) -> Status {
     let id = cut(id.to_owned(), 80);

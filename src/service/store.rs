@@ -7,14 +7,15 @@
 //!
 //! What is here is bounded: two files a session, and `state_bytes` in all.
 
+use super::disk::{Disk, private};
 use super::kept::Kept;
 use super::proto;
 use super::survey::{StoreError, Survey};
 use prost::Message;
 use std::collections::BTreeMap;
-use std::fs::{self, DirBuilder, File, OpenOptions};
-use std::io::{self, Write};
-use std::os::unix::fs::{DirBuilderExt, OpenOptionsExt};
+use std::fs::{self, DirBuilder, File};
+use std::io;
+use std::os::unix::fs::DirBuilderExt;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -26,8 +27,7 @@ pub(super) struct Store {
     pub(super) folder: PathBuf,
     /// Held as long as the server runs.
     _lock: File,
-    /// Whether to wait for the disk.
-    pub(super) sync: bool,
+    disk: Disk,
     most: usize,
     used: AtomicUsize,
     /// Every session that is kept.
@@ -63,13 +63,10 @@ impl Store {
         for path in [folder.to_owned(), folder.join("sessions"), folder.join("models")] {
             DirBuilder::new().recursive(true).mode(0o700).create(path).map_err(wrong)?;
         }
-        if sync {
-            // the names of new folders are kept by those that they are in
-            let above = folder.parent().filter(|path| !path.as_os_str().is_empty()).unwrap_or(Path::new("."));
-            for path in [folder, above] {
-                File::open(path).and_then(|folder| folder.sync_all()).map_err(wrong)?;
-            }
-        }
+        let disk = Disk::new(sync);
+        // the names of new folders are kept by those that they are in
+        let above = folder.parent().filter(|path| !path.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        [folder, above].iter().try_for_each(|folder| disk.keep_names(folder)).map_err(wrong)?;
         let lock = private().open(folder.join("lock")).map_err(wrong)?;
         match lock.try_lock() {
             Ok(()) => {}
@@ -85,7 +82,7 @@ impl Store {
         Ok(Self {
             folder: folder.to_owned(),
             _lock: lock,
-            sync,
+            disk,
             most,
             used: AtomicUsize::new(found.bytes),
             sessions: Mutex::new(sessions),
@@ -126,6 +123,11 @@ impl Store {
         if let Some(entry) = self.entries().get_mut(id) {
             entry.asleep = Some(Instant::now());
         }
+    }
+
+    /// Where all of it is written.
+    pub(super) fn disk(&self) -> &Disk {
+        &self.disk
     }
 
     /// Sessions that are kept.
@@ -209,13 +211,9 @@ impl Store {
         }
         let unfinished = path.with_extension(format!("{}.new", std::process::id()));
         let written = self.counted(&path, bytes.len(), || {
-            let mut file = private().open(&unfinished)?;
-            file.write_all(&bytes)?;
-            if self.sync {
-                file.sync_all()?;
-            }
-            fs::rename(&unfinished, &path)?;
-            if self.sync { File::open(models)?.sync_all() } else { Ok(()) }
+            self.disk.write(&unfinished, &bytes)?;
+            self.disk.rename(&unfinished, &path)?;
+            self.disk.keep_names(&models)
         });
         if written.is_err() {
             let _ = fs::remove_file(unfinished);
@@ -247,13 +245,6 @@ impl Store {
         let change = |used: usize| Some(used.saturating_add(after).saturating_sub(before));
         let _ = self.used.fetch_update(Ordering::Relaxed, Ordering::Relaxed, change);
     }
-}
-
-/// Opens for writing what nobody else may read.
-pub(super) fn private() -> OpenOptions {
-    let mut options = OpenOptions::new();
-    options.write(true).create(true).truncate(false).mode(0o600);
-    options
 }
 
 fn size(path: &Path) -> usize {

@@ -6,7 +6,8 @@
 //! [`Limits::inline_unknowns`](super::limits::Limits::inline_unknowns), one at a time, which keeps replies in order.
 
 use super::answerable::answerable;
-use super::session::{Question, Session, refused};
+use super::question::Question;
+use super::session::{Session, refused};
 use super::shared::Shared;
 use super::turns::{CLIENT, client};
 use super::{proto, status};
@@ -34,6 +35,8 @@ pub(super) struct TrialStream {
     requests: Streaming<proto::DeviceRequest>,
     ending: Pin<Box<WaitForCancellationFutureOwned>>,
     session: Option<Arc<Session>>,
+    /// Its number among the streams of that session.
+    number: u64,
     /// Whether the session ends with this stream.
     owned: bool,
     /// A session that is being woken, to be joined.
@@ -51,6 +54,7 @@ impl TrialStream {
             requests,
             ending,
             session: None,
+            number: 0,
             owned: false,
             waking: None,
             running: None,
@@ -68,7 +72,7 @@ impl TrialStream {
             }
             Some(RequestKind::Attach(attach)) => return self.attach(attach.session),
             Some(RequestKind::Trial(trial)) => Question::Trial(trial),
-            Some(RequestKind::Accept(accept)) => Question::Accept(accept),
+            Some(RequestKind::Accept(accept)) => Question::Accept(accept, self.number),
             Some(RequestKind::Linearize(request)) => {
                 let limits = &self.shared.limits;
                 let bound = |session: &Arc<Session>| session.bound_small_signals(1, request.noise, limits);
@@ -109,7 +113,7 @@ impl TrialStream {
         answerable(open, model.compiled.parts.system.electrics.ports, limits)?;
         let session = Session::new(shared.sessions.id(limits)?, None, &model, shared.make, limits)?;
         let session = shared.sessions.admit(session, limits)?;
-        session.usage.hold();
+        self.number = session.usage.hold();
         self.session = Some(session);
         self.owned = true;
         Ok(())
@@ -131,8 +135,9 @@ impl TrialStream {
         match session {
             Ok(session) => {
                 self.leave();
+                // first: what an earlier stream accepts from here on is refused, and not told
+                self.number = session.usage.hold();
                 let opened = session.opened();
-                session.usage.hold();
                 self.session = Some(session);
                 ReplyKind::Opened(opened)
             }

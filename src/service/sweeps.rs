@@ -1,24 +1,57 @@
 //! Sweeps that run while clients come and go.
 
+use super::convert::Violation;
 use super::ids::Ids;
 use super::limits::Limits;
 use super::work::{allowance, caught};
 use super::{proto, status};
 use crate::budget::Budget;
 use crate::compile::CompileOptions;
+use crate::content::Fnv;
 use crate::jobs::sweep::{self, SweepError, SweepProgress, SweepSpec, SweepTable};
 use crate::netlist::Bundle;
+use prost::Message;
 use proto::sweep_status::State;
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 use tokio::runtime::Handle;
 use tokio::sync::{Semaphore, watch};
 use tonic::Status;
 
+/// Longest name that a client gives to its request [byte].
+const LONGEST_REQUEST: usize = 64;
+
+/// What a client calls its request, and what it asked for.
+#[derive(Debug, Default, PartialEq, Eq)]
+pub(super) struct Asked {
+    request: String,
+    content: Fnv,
+}
+
+impl Asked {
+    /// Named by the client; none: it gave no name.
+    pub(super) fn by(request: &str) -> Result<Option<Self>, Violation> {
+        if request.len() > LONGEST_REQUEST || !request.bytes().all(|byte| byte.is_ascii_graphic()) {
+            let text =
+                format!("expected at most {LONGEST_REQUEST} visible ASCII characters, got {} bytes", request.len());
+            return Err(Violation::new("request_id", text));
+        }
+        Ok((!request.is_empty()).then(|| Self { request: request.to_owned(), content: Fnv::default() }))
+    }
+
+    /// To run this.
+    pub(super) fn to_run(mut self, spec: Option<&proto::SweepSpec>, bundle: &Bundle, options: &CompileOptions) -> Self {
+        self.content.model(bundle, options);
+        self.content.bytes(&spec.map(Message::encode_to_vec).unwrap_or_default());
+        self
+    }
+}
+
 /// One sweep, running or finished.
 pub(super) struct Sweep {
+    asked: Option<Asked>,
     status: watch::Sender<proto::SweepStatus>,
     table: OnceLock<SweepTable>,
     budget: Budget,
@@ -93,19 +126,32 @@ impl Sweeps {
         Self { kept: Mutex::default(), turn, ids: Ids::default(), runtime: Handle::current() }
     }
 
-    /// Sweeps kept, running or finished.
-    pub(super) fn len(&self) -> usize {
-        self.kept.lock().unwrap_or_else(PoisonError::into_inner).len()
+    fn kept(&self) -> MutexGuard<'_, BTreeMap<String, Arc<Sweep>>> {
+        self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Starts a sweep; its id and its points.
+    /// The sweep that was asked for before, and its points.
+    fn asked(&self, asked: Option<&Asked>) -> Result<Option<(String, u64)>, Status> {
+        already(&self.kept(), asked)
+    }
+
+    /// Sweeps kept, running or finished.
+    pub(super) fn len(&self) -> usize {
+        self.kept().len()
+    }
+
+    /// Starts a sweep; its id and its points. What was asked before, by the same name, is not started again.
     pub(super) fn submit(
         &self,
         spec: SweepSpec,
         bundle: Bundle,
         options: CompileOptions,
+        asked: Option<Asked>,
         limits: &Limits,
     ) -> Result<(String, u64), Status> {
+        if let Some(before) = self.asked(asked.as_ref())? {
+            return Ok(before);
+        }
         let violation = |error: SweepError| status::bad_request(&error.to_string(), [spec_violation(&error)]);
         let points = spec.grid_points().map_err(violation)?;
         if points > limits.sweep_points {
@@ -115,6 +161,7 @@ impl Sweeps {
         sweep::check_names(&spec, &bundle, &options).map_err(violation)?;
         let first = proto::SweepStatus { state: State::Running.into(), points, ..Default::default() };
         let sweep = Arc::new(Sweep {
+            asked,
             status: watch::Sender::new(first),
             table: OnceLock::new(),
             budget: Budget::new(allowance(limits)),
@@ -123,7 +170,10 @@ impl Sweeps {
         });
         let id = self.ids.make()?;
         {
-            let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut kept = self.kept();
+            if let Some(before) = already(&kept, sweep.asked.as_ref())? {
+                return Ok(before);
+            }
             if kept.len() >= limits.sweeps {
                 return Err(status::limit("sweeps", limits.sweeps, "one more; cancel one that is no longer needed"));
             }
@@ -148,7 +198,7 @@ impl Sweeps {
 
     /// The sweep of that id.
     pub(super) fn get(&self, id: &str) -> Result<Arc<Sweep>, Status> {
-        let kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        let kept = self.kept();
         let sweep = kept.get(id).cloned().ok_or_else(|| status::not_found("sweep", id))?;
         *sweep.used.lock().unwrap_or_else(PoisonError::into_inner) = Instant::now();
         Ok(sweep)
@@ -156,19 +206,19 @@ impl Sweeps {
 
     /// Stops and forgets a sweep.
     pub(super) fn cancel(&self, id: &str) -> Result<(), Status> {
-        let removed = self.kept.lock().unwrap_or_else(PoisonError::into_inner).remove(id);
+        let removed = self.kept().remove(id);
         removed.map(|sweep| sweep.cancel()).ok_or_else(|| status::not_found("sweep", id))
     }
 
     /// Stops all.
     pub(super) fn cancel_all(&self) {
-        let kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        let kept = self.kept();
         kept.values().for_each(|sweep| sweep.cancel());
     }
 
     /// Forgets finished sweeps that nobody asked for during `idle`; how many.
     pub(super) fn expire(&self, idle: Duration) -> usize {
-        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut kept = self.kept();
         let before = kept.len();
         kept.retain(|_, sweep| {
             sweep.running() || sweep.used.lock().unwrap_or_else(PoisonError::into_inner).elapsed() < idle
@@ -177,10 +227,24 @@ impl Sweeps {
     }
 }
 
-fn spec_violation(error: &SweepError) -> super::convert::Violation {
+/// Among those that are kept, the one that was asked for by the same name.
+fn already(kept: &BTreeMap<String, Arc<Sweep>>, asked: Option<&Asked>) -> Result<Option<(String, u64)>, Status> {
+    let Some(asked) = asked else { return Ok(None) };
+    let same =
+        |sweep: &Sweep| sweep.asked.as_ref().filter(|before| before.request == asked.request).map(|b| b == asked);
+    match kept.iter().find_map(|(id, sweep)| same(sweep).map(|same| (id, sweep, same))) {
+        Some((_, _, false)) => {
+            let text = "expected a name of its own, got that of another sweep; choose them at random";
+            Err(status::violation(Violation::new("request_id", text)))
+        }
+        found => Ok(found.map(|(id, sweep, _)| (id.clone(), sweep.status().points))),
+    }
+}
+
+fn spec_violation(error: &SweepError) -> Violation {
     let field = match error {
         SweepError::BadSpec { what, .. } => format!("spec.{what}"),
         _ => "spec".to_owned(),
     };
-    super::convert::Violation::new(field, error.to_string())
+    Violation::new(field, error.to_string())
 }

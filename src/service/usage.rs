@@ -1,4 +1,4 @@
-//! When a session was used last, and for how long it is kept without use.
+//! When a session was used last, for how long it is kept without use, and by which stream it goes on.
 
 use super::limits::Limits;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
@@ -12,6 +12,8 @@ pub(super) struct Usage {
     lease_ms: AtomicU64,
     /// Streams that hold it.
     streams: AtomicUsize,
+    /// Streams that ever took hold of it.
+    joined: AtomicU64,
 }
 
 impl Default for Usage {
@@ -21,6 +23,7 @@ impl Default for Usage {
             used_ms: AtomicU64::new(0),
             lease_ms: AtomicU64::new(0),
             streams: AtomicUsize::new(0),
+            joined: AtomicU64::new(0),
         }
     }
 }
@@ -31,9 +34,15 @@ impl Usage {
         self.used_ms.store(self.age_ms(), Ordering::Relaxed);
     }
 
-    /// A stream takes hold of it.
-    pub(super) fn hold(&self) {
+    /// A stream takes hold of it; its number, from 1.
+    pub(super) fn hold(&self) -> u64 {
         self.streams.fetch_add(1, Ordering::Relaxed);
+        self.joined.fetch_add(1, Ordering::SeqCst) + 1
+    }
+
+    /// Whether no other stream took hold of it after that one.
+    pub(super) fn is_last(&self, stream: u64) -> bool {
+        self.joined.load(Ordering::SeqCst) == stream
     }
 
     /// A stream lets go of it.

@@ -46,7 +46,8 @@ fn axes() {
             values: Some(proto::sweep_parameter::Values::Linear(linear)),
         };
         let spec = proto::SweepSpec { parameters: (0..600).map(axis).collect(), ..Default::default() };
-        let request = proto::SubmitSweepRequest { bundle: netlist("x"), options: None, spec: Some(spec) };
+        let request =
+            proto::SubmitSweepRequest { bundle: netlist("x"), options: None, spec: Some(spec), ..Default::default() };
         let status = wire.submit_sweep(request).await.expect_err("too many");
         assert!(status.message().starts_with("sweep_points"), "{}", status.message());
         assert_eq!(status.code(), Code::ResourceExhausted);
@@ -150,7 +151,7 @@ fn many_names() {
         parameters[399_999].name = "V7".into();
         let analysis = Some(proto::sweep_spec::Analysis::Modes(proto::SweepModes::default()));
         let spec = Some(proto::SweepSpec { parameters, samples: None, analysis, ..Default::default() });
-        let request = proto::SubmitSweepRequest { bundle: netlist("x"), options: None, spec };
+        let request = proto::SubmitSweepRequest { bundle: netlist("x"), options: None, spec, ..Default::default() };
         assert_eq!(wire.submit_sweep(request).await.expect_err("V7 twice").code(), Code::InvalidArgument);
         let mut text = String::new();
         for k in 0..400_000 {

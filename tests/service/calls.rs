@@ -150,7 +150,8 @@ fn sweeps_are_submitted_watched_and_fetched() {
             shards: 0,
             samples: None,
         };
-        let request = proto::SubmitSweepRequest { bundle: wire_bundle(), options: None, spec: Some(spec) };
+        let request =
+            proto::SubmitSweepRequest { bundle: wire_bundle(), options: None, spec: Some(spec), ..Default::default() };
         let submitted = client.submit_sweep(request).await.expect("starts").into_inner();
         assert_eq!(submitted.points, 5);
         let sweep = submitted.sweep;

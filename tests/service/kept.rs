@@ -10,6 +10,7 @@ use bimorph::service::limits::Limits;
 use bimorph::service::proto;
 use bimorph::service::server::MakeDevice;
 use proto::bimorph_client::BimorphClient;
+use proto::device_reply::Kind as ReplyKind;
 use proto::device_request::Kind as Ask;
 use std::path::Path;
 use std::sync::Arc;
@@ -217,7 +218,7 @@ fn a_slow_wake_holds_nobody_up() {
     });
 }
 
-/// Two streams that ask for one sleeping session get the same one.
+/// Two streams that ask for one sleeping session get the same one, and one of them accepts.
 #[test]
 fn two_who_wake_one_session() {
     static GATE: Gate = Gate::open();
@@ -237,8 +238,36 @@ fn two_who_wake_one_session() {
         }
         let [first, second] = &mut both;
         let next = first.trial(token, DT, 2.0).await;
-        first.accept(next.token).await;
-        second.trial(next.token, DT, 3.0).await;
+        assert_eq!(second.trial(token, DT, 2.0).await, next);
+        let accept = || Ask::Accept(proto::Accept { token: next.token, answer: true });
+        let answers = [first.ask(accept()).await, second.ask(accept()).await];
+        let accepted = answers.iter().filter(|answer| matches!(answer, ReplyKind::Accepted(_))).count();
+        let refused = answers.iter().filter(|answer| matches!(answer, ReplyKind::Fault(_))).map(refusal);
+        assert_eq!((accepted, refused.collect::<Vec<_>>()), (1, vec![Code::Aborted]));
+    });
+}
+
+/// A session whose time without use ends while it wakes is gone: who wakes it is told so, and nothing of it is left.
+#[test]
+fn what_wakes_too_late() {
+    static GATE: Gate = Gate::open();
+    let folder = tempfile::tempdir().expect("a folder");
+    let (session, _) = asleep(folder.path(), gated!(GATE));
+    let server = start_kept(folder.path(), Limits { stream_idle: Duration::from_secs(2), ..limits() }, gated!(GATE));
+    block_on(async {
+        let mut client = server.client().await;
+        GATE.shut.store(true, Ordering::SeqCst);
+        let mut waking = Attached::ask_to_join(&mut client, &session).await;
+        GATE.has(1).await;
+        while std::fs::read_dir(folder.path().join("sessions")).expect("a folder").count() > 0 {
+            tokio::time::sleep(Duration::from_millis(1)).await;
+        }
+        GATE.shut.store(false, Ordering::SeqCst);
+        assert_eq!(refusal(&waking.answer().await), Code::NotFound);
+        assert_eq!(Attached::join(&mut client, &session).await.err(), Some(Code::NotFound));
+        for left in ["sessions", "models"] {
+            assert_eq!(std::fs::read_dir(folder.path().join(left)).expect("a folder").count(), 0, "{left}");
+        }
     });
 }
 

@@ -49,7 +49,7 @@ fn limits_are_named() {
                 analysis: Some(proto::sweep_spec::Analysis::Static(proto::SweepStatic::default())),
                 ..Default::default()
             };
-            proto::SubmitSweepRequest { bundle: wire_bundle(), options: None, spec: Some(spec) }
+            proto::SubmitSweepRequest { bundle: wire_bundle(), options: None, spec: Some(spec), ..Default::default() }
         };
         exhausted(&client.submit_sweep(sweep(u32::MAX)).await.expect_err("too many"), "sweep_points");
         let mut wide = sweep(2);

@@ -4,6 +4,8 @@
 mod attached;
 mod attacks;
 mod calls;
+mod cut;
+mod cuts;
 mod echo;
 mod endings;
 mod kept;

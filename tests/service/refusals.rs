@@ -59,7 +59,12 @@ fn bad_fields_are_named() {
         assert_eq!(field(client.transient(stop).await.expect_err("is refused")), "stop_s");
         let port = proto::OpenRequest { model, ports: vec!["nosuch".into()], signals: vec![], noise: None };
         assert_eq!(field(client.open(port).await.expect_err("is refused")), "ports");
-        let spec = client.submit_sweep(proto::SubmitSweepRequest { bundle: netlist(""), options: None, spec: None });
+        let spec = client.submit_sweep(proto::SubmitSweepRequest {
+            bundle: netlist(""),
+            options: None,
+            spec: None,
+            ..Default::default()
+        });
         assert_eq!(field(spec.await.expect_err("is refused")), "spec");
     });
 }

@@ -40,7 +40,7 @@ async fn swept(client: &mut BimorphClient<Channel>) -> String {
         ..Default::default()
     };
     let options = Some(proto::CompileOptions { segments: Some(1), ..Default::default() });
-    let request = proto::SubmitSweepRequest { bundle: Some(chain()), options, spec: Some(spec) };
+    let request = proto::SubmitSweepRequest { bundle: Some(chain()), options, spec: Some(spec), ..Default::default() };
     let sweep = client.submit_sweep(request).await.expect("a sweep").into_inner().sweep;
     let request = proto::WatchSweepRequest { sweep: sweep.clone() };
     let mut watched = client.watch_sweep(request).await.expect("a stream").into_inner();

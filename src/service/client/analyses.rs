@@ -1,6 +1,6 @@
-//! Analyses and sweeps on a server.
+//! Analyses on a server.
 
-use super::link::{Link, reason};
+use super::link::{Link, is_broken, reason};
 use crate::analysis::harmonic::{HarmonicOptions, HarmonicResult};
 use crate::analysis::integrator::Integrator;
 use crate::analysis::modes::ModesResult;
@@ -9,25 +9,22 @@ use crate::analysis::statics::StaticResult;
 use crate::analysis::transient::TransientResult;
 use crate::analysis::{PortVoltages, Watch};
 use crate::compile::CompileOptions;
-use crate::jobs::sweep::{SweepProgress, SweepSpec, SweepTable};
 use crate::netlist::Bundle;
 use crate::service::access::Access;
-use crate::service::convert::model::bundle_to_wire;
-use crate::service::convert::options::options_to_wire;
-use crate::service::convert::{analysis as results, harmonic as harmonics, named, sweep as sweeps};
+use crate::service::convert::{analysis as results, harmonic as harmonics, named};
 use crate::service::proto;
-use proto::sweep_status::State;
 use proto::transient_event::Kind as EventKind;
 use std::future::Future;
 use std::time::Duration;
 use thiserror::Error;
-use tonic::{Response, Status, Streaming};
+use tonic::{Code, Response, Status, Streaming};
 
 /// A blocking client of one server, for whole analyses.
 #[derive(Debug)]
 pub struct Client {
-    address: String,
-    link: Link,
+    pub(super) address: String,
+    access: Access,
+    pub(super) link: Link,
 }
 
 /// What went wrong on the way, or on the server.
@@ -83,7 +80,14 @@ impl Client {
     /// [`ClientError`].
     pub fn connect_with(uri: &str, access: &Access, deadline: Duration) -> Result<Self, ClientError> {
         let link = Link::connect(uri, access, deadline).map_err(|status| error(uri, &status))?;
-        Ok(Self { address: uri.to_owned(), link })
+        Ok(Self { address: uri.to_owned(), access: access.clone(), link })
+    }
+
+    /// Connects anew: what a network has made silent stays so.
+    pub(super) fn reconnect(&mut self) -> Result<(), ClientError> {
+        self.link =
+            Link::connect(&self.address, &self.access, self.link.deadline).map_err(|status| self.error(&status))?;
+        Ok(())
     }
 
     /// Version of the server.
@@ -198,85 +202,21 @@ impl Client {
         Err(self.error(&Status::unavailable("the stream ended before the run did")))
     }
 
-    /// A sweep; `progress` is told how far it has come and may stop it.
-    ///
-    /// # Errors
-    /// [`ClientError`]; code "Cancelled" when `progress` said stop.
-    pub fn sweep(
-        &mut self,
-        spec: &SweepSpec,
-        bundle: &Bundle,
-        options: &CompileOptions,
-        progress: &mut dyn FnMut(SweepProgress) -> bool,
-    ) -> Result<SweepTable, ClientError> {
-        let request = proto::SubmitSweepRequest {
-            bundle: Some(bundle_to_wire(bundle)),
-            options: Some(options_to_wire(options)),
-            spec: Some(sweeps::spec_to_wire(spec)),
-        };
-        let mut rpc = self.link.rpc.clone();
-        let submitted = self.call(rpc.submit_sweep(request))?;
-        let id = submitted.sweep;
-        let whole = |right: bool| match right {
-            true => Ok(()),
-            false => Err(self.error(&Status::unimplemented("it is of an earlier version, which knows no samples"))),
-        };
-        // a server passes over fields that it does not know
-        let outcome = whole(spec.point_numbers().is_ok_and(|points| points.len() as u64 == submitted.points))
-            .and_then(|()| self.follow(&id, progress))
-            .and_then(|()| self.fetch(&id))
-            .and_then(|table| whole(spec.names().eq(table.parameters.iter().map(String::as_str))).map(|()| table));
-        // Done with it, whatever came: the server need not keep it. That it is gone already is no error.
-        let _ = self.call(rpc.cancel_sweep(proto::CancelSweepRequest { sweep: id }));
-        outcome
-    }
-
-    fn follow(&self, id: &str, progress: &mut dyn FnMut(SweepProgress) -> bool) -> Result<(), ClientError> {
-        let mut rpc = self.link.rpc.clone();
-        let mut states = self.call(rpc.watch_sweep(proto::WatchSweepRequest { sweep: id.to_owned() }))?;
-        while let Some(status) = self.next(&mut states)? {
-            let proto::SweepStatus { done, points, failed, ref message, .. } = status;
-            match status.state() {
-                State::Done => {
-                    progress(SweepProgress { done, points, failed });
-                    return Ok(());
-                }
-                State::Cancelled => return Err(self.error(&Status::cancelled(message))),
-                State::Failed => return Err(self.error(&Status::failed_precondition(message))),
-                State::Running | State::Unspecified => {
-                    if !progress(SweepProgress { done, points, failed }) {
-                        return Err(self.error(&Status::cancelled(format!("after {done} of {points} points"))));
-                    }
-                }
-            }
-        }
-        Err(self.error(&Status::unavailable("the stream ended before the sweep did")))
-    }
-
-    fn fetch(&self, id: &str) -> Result<SweepTable, ClientError> {
-        let mut rpc = self.link.rpc.clone();
-        let mut chunks = self.call(rpc.fetch_sweep(proto::FetchSweepRequest { sweep: id.to_owned() }))?;
-        let mut table = SweepTable::default();
-        while let Some(chunk) = self.next(&mut chunks)? {
-            sweeps::chunk_from_wire(chunk, &mut table)
-                .map_err(|v| self.error(&Status::internal(format!("{}: {}", v.field, v.description))))?;
-        }
-        Ok(table)
-    }
-
-    fn call<T>(&self, call: impl Future<Output = Result<Response<T>, Status>>) -> Result<T, ClientError> {
+    pub(super) fn call<T>(&self, call: impl Future<Output = Result<Response<T>, Status>>) -> Result<T, ClientError> {
         self.link.call(call).map(Response::into_inner).map_err(|status| self.error(&status))
     }
 
-    fn next<T>(&self, stream: &mut Streaming<T>) -> Result<Option<T>, ClientError> {
+    pub(super) fn next<T>(&self, stream: &mut Streaming<T>) -> Result<Option<T>, ClientError> {
         self.link.call(stream.message()).map_err(|status| self.error(&status))
     }
 
-    fn error(&self, status: &Status) -> ClientError {
+    pub(super) fn error(&self, status: &Status) -> ClientError {
         error(&self.address, status)
     }
 }
 
 fn error(address: &str, status: &Status) -> ClientError {
-    ClientError { address: address.to_owned(), code: format!("{:?}", status.code()), message: reason(status) }
+    // what a broken connection is called depends on the moment at which it broke
+    let code = if is_broken(status) { Code::Unavailable } else { status.code() };
+    ClientError { address: address.to_owned(), code: format!("{code:?}"), message: reason(status) }
 }

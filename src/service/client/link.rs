@@ -152,14 +152,18 @@ fn within<T>(
     })
 }
 
+/// Whether the connection broke: a status that a server sent has no source, one that was made of a broken connection has.
+pub(super) fn is_broken(status: &Status) -> bool {
+    std::error::Error::source(status).is_some()
+}
+
 /// What happened, in words: a netlist's diagnostics as they are, anything else with its kind.
 pub(super) fn reason(status: &Status) -> String {
     match status.code() {
         Code::InvalidArgument | Code::FailedPrecondition | Code::DeadlineExceeded | Code::ResourceExhausted => {
             status.message().trim_end().to_owned()
         }
-        // A status that a server sent has no source; one that was made of a broken connection has.
-        _ if std::error::Error::source(status).is_some() => {
+        _ if is_broken(status) => {
             #[cfg(feature = "tls")]
             if let Some(text) = super::secure::refused(status) {
                 return text;

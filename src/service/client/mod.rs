@@ -8,6 +8,7 @@ mod device;
 mod link;
 #[cfg(feature = "tls")]
 mod secure;
+mod sweeps;
 
 pub use analyses::{Client, ClientError, RemoteTransient};
 pub use device::RemoteDevice;

@@ -11,6 +11,7 @@ import contextlib
 import importlib.metadata
 import os
 import threading
+import time
 import warnings
 import weakref
 from collections.abc import Callable, Iterator
@@ -19,14 +20,28 @@ from typing import Any, TypeVar
 import grpc
 
 from .access import Access, is_secure, target
-from .errors import BimorphError, from_rpc
+from .errors import BimorphError, Unavailable, from_rpc
 from .v1 import model_pb2, service_pb2_grpc
 
 T = TypeVar("T")
 
+_ATTEMPTS = 6
+"""Attempts in a row without a word, after which a server is given up."""
+
+_PAUSE = 0.1
+"""Pause before the second attempt [s]; each further one is twice as long."""
+
 _OPTIONS = [
     ("grpc.max_receive_message_length", 64 << 20),
     ("grpc.max_send_message_length", 64 << 20),
+    # A network that fails without a word is noticed by a ping that is not answered, within 4.5 s, whatever is being waited for.
+    ("grpc.keepalive_time_ms", 2000),
+    ("grpc.http2.ping_timeout_ms", 2500),
+    ("grpc.http2.max_pings_without_data", 0),
+    # One that works again is used soon.
+    ("grpc.initial_reconnect_backoff_ms", 100),
+    ("grpc.min_reconnect_backoff_ms", 1000),
+    ("grpc.max_reconnect_backoff_ms", 2000),
     # Channels to one address share a connection otherwise, and a forked child would get its parent's.
     ("grpc.use_local_subchannel_pool", 1),
 ]
@@ -149,6 +164,26 @@ class Channel:
                 raise failure
         finally:
             call.cancel()
+
+    def persist(self, ask: Callable[[Callable[[], None]], T]) -> T:
+        """Asks again where the network fails. ``ask`` is given what to call when it hears that things go on.
+
+        For questions alone that may be asked twice.
+        """
+        failures = 0
+
+        def heard() -> None:
+            nonlocal failures
+            failures = 0
+
+        while True:
+            try:
+                return ask(heard)
+            except Unavailable:
+                failures += 1
+                if failures >= _ATTEMPTS:
+                    raise
+            time.sleep(_PAUSE * 2 ** (failures - 1))
 
     def guard(self, call: Callable[[], T]) -> T:
         """Turns a status into an error of this package.

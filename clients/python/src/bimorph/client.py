@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import uuid
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
@@ -179,9 +180,12 @@ class Client:
             bundle=self._bundle(netlist, include),
             options=_options(set or {}, options),
             spec=sweeps.to_wire(parameters, analysis, shard, samples),
+            # an answer that is lost starts no second sweep
+            request_id=uuid.uuid4().hex,
         )
         vary = tuple(samples.vary) if samples else ()
-        return Sweep(self._channel, self._channel.call("SubmitSweep", request).sweep, vary)
+        submitted = self._channel.persist(lambda heard: self._channel.call("SubmitSweep", request))
+        return Sweep(self._channel, submitted.sweep, vary)
 
     def attach(self, sweep: str) -> Sweep:
         """A sweep of this server by its ``id``.

@@ -8,7 +8,7 @@ from types import TracebackType
 from typing import Any
 
 from .channel import Channel
-from .errors import BimorphError
+from .errors import BimorphError, Unavailable
 from .sweep import Row, Table
 from .v1 import sweep_pb2
 
@@ -58,20 +58,29 @@ class Sweep:
         raise BimorphError(f"server {self._channel.address}: no word of sweep {self.id}")
 
     def wait(self, progress: Callable[[int, int], object] | None = None) -> Table:
-        """Its table, once it is done; ``progress`` is told (points done, points).
+        """Its table, once it is done; ``progress`` is told (points done, points). A network that fails meanwhile costs it nothing: it is
+        asked for again.
 
         Raises :class:`BimorphError` when it ends without one.
         """
-        for status in self._watch():
-            if progress is not None:
-                progress(status.done, status.points)
-            if status.state in ("failed", "cancelled"):
-                raise BimorphError(f"the sweep ended after {status.done} points: {status.message}")
+
+        def follow(heard: Callable[[], None]) -> None:
+            status = None
+            for status in self._watch():
+                heard()
+                if progress is not None:
+                    progress(status.done, status.points)
+                if status.state in ("failed", "cancelled"):
+                    raise BimorphError(f"the sweep ended after {status.done} points: {status.message}")
+            if status is None or status.state != "done":
+                raise Unavailable(f"server {self._channel.address}: the stream ended before the sweep did")
+
+        self._channel.persist(follow)
         return self.table()
 
     def table(self) -> Table:
         """What it found; only of a sweep that is done."""
-        table = _fetch(self._channel, self.id)
+        table = self._channel.persist(lambda heard: self._fetch())
         if any(name not in table.parameters for name in self._vary):
             raise BimorphError("the server is of an earlier version, which knows no samples")
         return table
@@ -96,19 +105,21 @@ class Sweep:
             state = _STATES.get(status.state, "running")
             yield SweepStatus(state, status.done, status.points, status.failed, status.message)
 
-
-def _fetch(channel: Channel, sweep: str) -> Table:
-    parameters: list[str] = []
-    results: list[str] = []
-    units: dict[str, str] = {}
-    rows: list[Row] = []
-    for chunk in channel.stream("FetchSweep", sweep_pb2.FetchSweepRequest(sweep=sweep)):
-        if chunk.parameters or chunk.results:
-            parameters, results = list(chunk.parameters), list(chunk.results)
-            units = dict(zip(results, chunk.units))
-        for row in chunk.rows:
-            values = [v.number if v.WhichOneof("value") == "number" else v.text for v in row.parameters]
-            present = {name: x for name, x in zip(results, row.results) if x == x}
-            estimate = row.estimated_error if row.HasField("estimated_error") else None
-            rows.append(Row(row.point, dict(zip(parameters, values)), present, row.error, estimate, row.warning))
-    return Table(parameters, results, units, rows)
+    def _fetch(self) -> Table:
+        points = self.status().points
+        parameters: list[str] = []
+        results: list[str] = []
+        units: dict[str, str] = {}
+        rows: list[Row] = []
+        for chunk in self._channel.stream("FetchSweep", sweep_pb2.FetchSweepRequest(sweep=self.id)):
+            if chunk.parameters or chunk.results:
+                parameters, results = list(chunk.parameters), list(chunk.results)
+                units = dict(zip(results, chunk.units))
+            for row in chunk.rows:
+                values = [v.number if v.WhichOneof("value") == "number" else v.text for v in row.parameters]
+                present = {name: x for name, x in zip(results, row.results) if x == x}
+                estimate = row.estimated_error if row.HasField("estimated_error") else None
+                rows.append(Row(row.point, dict(zip(parameters, values)), present, row.error, estimate, row.warning))
+        if len(rows) != points:
+            raise Unavailable(f"server {self._channel.address}: the table ended after {len(rows)} of {points} points")
+        return Table(parameters, results, units, rows)

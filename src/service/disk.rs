@@ -1,0 +1,91 @@
+//! What is done to files so that they outlive the machine: bytes are written and waited for before anything names them or is said of
+//! them. All of it goes through here, in whose tests the order can be looked at.
+
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, Write};
+use std::os::unix::fs::OpenOptionsExt;
+use std::path::Path;
+
+/// The disk of a folder of states.
+#[derive(Debug)]
+pub(super) struct Disk {
+    /// Whether to wait for it.
+    sync: bool,
+    #[cfg(test)]
+    pub(super) done: std::sync::Mutex<Vec<Done>>,
+}
+
+/// What was done.
+#[cfg(test)]
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Done {
+    Written(std::path::PathBuf, Vec<u8>),
+    Synced(std::path::PathBuf),
+    Renamed(std::path::PathBuf, std::path::PathBuf),
+    FolderSynced(std::path::PathBuf),
+}
+
+impl Disk {
+    /// Waited for, or not.
+    pub(super) fn new(sync: bool) -> Self {
+        Self {
+            sync,
+            #[cfg(test)]
+            done: std::sync::Mutex::default(),
+        }
+    }
+
+    /// Writes a file, over what it held before. When this returns its bytes outlive the machine; a new name does not yet.
+    ///
+    /// # Errors
+    /// What the system said.
+    pub(super) fn write(&self, path: &Path, bytes: &[u8]) -> io::Result<()> {
+        let mut file = private().open(path)?;
+        file.write_all(bytes)?;
+        file.set_len(bytes.len() as u64)?;
+        #[cfg(test)]
+        self.note(Done::Written(path.to_owned(), bytes.to_vec()));
+        if self.sync {
+            file.sync_data()?;
+            #[cfg(test)]
+            self.note(Done::Synced(path.to_owned()));
+        }
+        Ok(())
+    }
+
+    /// Gives a file another name, in the place of what has it.
+    ///
+    /// # Errors
+    /// What the system said.
+    pub(super) fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
+        fs::rename(from, to)?;
+        #[cfg(test)]
+        self.note(Done::Renamed(from.to_owned(), to.to_owned()));
+        Ok(())
+    }
+
+    /// When this returns the names of a folder outlive the machine.
+    ///
+    /// # Errors
+    /// What the system said.
+    pub(super) fn keep_names(&self, folder: &Path) -> io::Result<()> {
+        if self.sync {
+            File::open(folder)?.sync_all()?;
+            #[cfg(test)]
+            self.note(Done::FolderSynced(folder.to_owned()));
+        }
+        Ok(())
+    }
+
+    #[cfg(test)]
+    fn note(&self, done: Done) {
+        self.done.lock().expect("nobody panicked").push(done);
+    }
+}
+
+/// Opens for writing what nobody else may read.
+pub(super) fn private() -> OpenOptions {
+    let mut options = OpenOptions::new();
+    options.write(true).create(true).truncate(false).mode(0o600);
+    options
+}

@@ -1,0 +1,132 @@
+//! A machine may lose its power at any moment: whatever of the files was not waited for may then be there, be gone, or be torn. In
+//! each such case a state whose keeping was answered is found again, with its model.
+
+use super::disk::Done;
+use super::keeper::Keeper;
+use super::proto;
+use super::store::Store;
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+const ID: &str = "0123456789abcdef0123456789abcdef";
+const MODEL: &str = "00000000000000000000000000000001";
+
+/// What becomes of bytes that were not waited for.
+#[derive(Debug, Clone, Copy)]
+enum Bytes {
+    Gone,
+    Torn,
+    Whole,
+}
+
+/// A file: what is on the disk for sure, and what was written since.
+#[derive(Debug, Clone, Default)]
+struct Inode {
+    sure: Vec<u8>,
+    written: Option<Vec<u8>>,
+}
+
+impl Inode {
+    fn after(&self, bytes: Bytes) -> Vec<u8> {
+        let Some(written) = &self.written else { return self.sure.clone() };
+        match bytes {
+            Bytes::Gone => self.sure.clone(),
+            Bytes::Torn => {
+                let half = written.len() / 2;
+                let rest = self.sure.get(half..).unwrap_or_default();
+                [&written[..half], rest].concat()
+            }
+            Bytes::Whole => written.clone(),
+        }
+    }
+}
+
+/// The disk as a machine knows it: files, and their names for sure and since.
+#[derive(Debug, Default)]
+struct Machine {
+    files: Vec<Inode>,
+    sure: BTreeMap<PathBuf, usize>,
+    names: BTreeMap<PathBuf, usize>,
+}
+
+impl Machine {
+    fn run(&mut self, done: &Done) {
+        match done {
+            Done::Written(path, bytes) => {
+                let next = self.files.len();
+                let file = *self.names.entry(path.clone()).or_insert(next);
+                if file == next {
+                    self.files.push(Inode::default());
+                }
+                self.files[file].written = Some(bytes.clone());
+            }
+            Done::Synced(path) => {
+                let file = &mut self.files[self.names[path]];
+                file.sure = file.written.take().expect("written before");
+            }
+            Done::Renamed(from, to) => {
+                let file = self.names.remove(from).expect("there");
+                self.names.insert(to.clone(), file);
+            }
+            Done::FolderSynced(folder) => {
+                let inside = |path: &PathBuf| path.parent() == Some(folder);
+                self.sure.retain(|path, _| !inside(path));
+                self.sure.extend(self.names.iter().filter(|(path, _)| inside(path)).map(|(p, f)| (p.clone(), *f)));
+            }
+        }
+    }
+
+    /// What is found when the power is back, in a folder of its own.
+    fn found(&self, from: &Path, bytes: Bytes, new_names: bool) -> tempfile::TempDir {
+        let folder = tempfile::tempdir().expect("a folder");
+        for (path, file) in if new_names { &self.names } else { &self.sure } {
+            let path = folder.path().join(path.strip_prefix(from).expect("inside"));
+            fs::create_dir_all(path.parent().expect("a folder")).expect("made");
+            fs::write(path, self.files[*file].after(bytes)).expect("written");
+        }
+        folder
+    }
+}
+
+/// Whenever the power goes, and whatever becomes of what was not waited for, the last state whose keeping was answered is there, or
+/// the one that was being kept.
+#[test]
+fn no_answered_state_is_lost_with_the_power() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let store = Arc::new(Store::open(folder.path(), true, 1 << 20).expect("opens"));
+    let source = proto::CompileRequest {
+        bundle: Some(proto::Bundle {
+            root: "a.net".into(),
+            files: [("a.net".into(), "anchor * [a] []\n".into())].into(),
+        }),
+        options: None,
+    };
+    let mut keeper = Keeper::new(&store, ID, MODEL, &source).expect("there is room");
+    let done = || store.disk().done.lock().expect("nobody panicked").clone();
+    let mut answered = vec![(0, done().len())];
+    for state in 1..=5_u64 {
+        // longer and shorter ones in turn
+        keeper.keep(state, &vec![u8::try_from(state).expect("small"); 100 * (1 + state as usize % 3)]).expect("kept");
+        answered.push((state, done().len()));
+    }
+    let done = done();
+    for power in 0..=done.len() {
+        let mut machine = Machine::default();
+        done[..power].iter().for_each(|one| machine.run(one));
+        let kept = answered.iter().filter(|(_, when)| *when <= power).map(|(state, _)| *state).max().unwrap_or(0);
+        for bytes in [Bytes::Gone, Bytes::Torn, Bytes::Whole] {
+            for new_names in [false, true] {
+                let found = machine.found(folder.path(), bytes, new_names);
+                let store = Store::open(found.path(), false, 1 << 20).expect("opens");
+                let state = store.load(ID, MODEL).map_or(0, |kept| kept.accepted);
+                let case = format!("{bytes:?}, {new_names}, after {power} of {done:?}");
+                assert!(state == kept || state == kept + 1, "{state} where {kept} was answered: {case}");
+                assert!(kept == 0 || store.model(MODEL).as_ref() == Some(&source), "{case}");
+            }
+        }
+    }
+    // 2 files of states, each new once; and every state is waited for
+    assert!(done.iter().filter(|one| matches!(one, Done::Synced(_))).count() >= 5);
+}

@@ -1,0 +1,19 @@
+//! What a stream asks of its session.
+
+use super::proto;
+
+/// What a stream asks of its session.
+pub(super) enum Question {
+    Open(proto::OpenRequest),
+    Trial(proto::TrialRequest),
+    /// By the stream of that number.
+    Accept(proto::Accept, u64),
+    Linearize(proto::SmallSignalRequest),
+}
+
+impl Question {
+    /// Whether it has no answer.
+    pub(super) fn is_silent(&self) -> bool {
+        matches!(self, Self::Accept(accept, _) if !accept.answer)
+    }
+}
