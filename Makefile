@@ -4,7 +4,7 @@
 help:
 	@echo "make demo    build, run the bank in ngspice here and through a server, compare, draw (out/demo)"
 	@echo "make test    everything that must hold: format, lints, tests, documentation, Python, ngspice decks"
-	@echo "make soak    a thousand sessions for a minute, ten thousand in turn, a hundred kills, a hundred killed clients, six hundred failures of the network: what a server bears (some minutes)"
+	@echo "make soak    a thousand sessions for a minute, ten thousand in turn, a hundred kills, a hundred killed clients, hundreds of failures of the network: what a server bears (some minutes)"
 	@echo "make fuzz    any text as netlist, any bytes as layout, ten minutes each (FUZZ_MINUTES)"
 	@echo "make bench   measure (criterion)"
 	@echo "make pictures draw the scenes and the figures of docs/paper.md (docs/pictures)"

@@ -238,7 +238,7 @@ fn sweeps(rounds: u64, failures: u64) {
     let (mut tables, mut given_up, mut failed) = (0, 0, 0);
     for round in 0..rounds {
         let server = start_with("127.0.0.1:0", Limits { sweeps: 1, ..Limits::default() }, LOCAL);
-        let cut = Cut::to(socket(&server), round, WITHIN / 3);
+        let cut = Cut::to(socket(&server), round, WITHIN / 6);
         let (send, ended) = mpsc::channel();
         let (uri, spec, bundle, options) = (cut.uri(), spec.clone(), bundle.clone(), options.clone());
         std::thread::spawn(move || {
