@@ -22,7 +22,7 @@ test:
 
 soak:
 	@scripts/setup build
-	cargo test --release --test service -- --ignored --nocapture --test-threads=1 soak:: cuts::soak
+	cargo test --release --test service -- --ignored --nocapture --test-threads=1 soak:: cuts::soak cut_sweeps::soak
 	cargo test --release --test cli -- --ignored --nocapture --test-threads=1 kept::soak killed_clients::soak
 
 fuzz:

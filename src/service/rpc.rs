@@ -204,7 +204,7 @@ impl proto::bimorph_server::Bimorph for Calls {
         let asked = Asked::by(&request.request_id).map_err(status::violation)?;
         let shared = Arc::clone(&self.0);
         let job = move || {
-            let asked = asked.map(|asked| asked.to_run(request.spec.as_ref(), &bundle, &options));
+            let asked = asked.map(|asked| asked.with(request.spec.as_ref(), &bundle, &options));
             let spec = sweeps_wire::spec_from_wire(request.spec).map_err(status::violation)?;
             shared.sweeps.submit(spec, bundle, options, asked, &shared.limits)
         };

@@ -41,8 +41,8 @@ impl Asked {
         Ok((!request.is_empty()).then(|| Self { request: request.to_owned(), content: Fnv::default() }))
     }
 
-    /// To run this.
-    pub(super) fn to_run(mut self, spec: Option<&proto::SweepSpec>, bundle: &Bundle, options: &CompileOptions) -> Self {
+    /// For this.
+    pub(super) fn with(mut self, spec: Option<&proto::SweepSpec>, bundle: &Bundle, options: &CompileOptions) -> Self {
         self.content.model(bundle, options);
         self.content.bytes(&spec.map(Message::encode_to_vec).unwrap_or_default());
         self

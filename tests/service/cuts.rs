@@ -1,5 +1,5 @@
-//! Through a network that fails at any moment no accepted state and no finished point is lost, none is there twice, nothing counts
-//! as complete that is not, and no call waits longer than it was told to.
+//! Through a network that fails at any moment no accepted state is lost, none is there twice, and no call waits longer than it was
+//! told to.
 
 use super::attached::{refusal, trial};
 use super::cut::Cut;
@@ -7,8 +7,7 @@ use super::running::{Running, block_on, bundle, compiled, start_kept, start_with
 use bimorph::compile::{CompileOptions, compile};
 use bimorph::device::local::LocalDevice;
 use bimorph::device::{Device, DeviceError, Mode, OpenRequest, Status, Token, Trial, TrialReply};
-use bimorph::jobs::sweep::{self, Shard, SweepAnalysis, SweepSpec};
-use bimorph::service::client::{Client, RemoteDevice};
+use bimorph::service::client::RemoteDevice;
 use bimorph::service::limits::Limits;
 use bimorph::service::proto;
 use bimorph::service::server::MakeDevice;
@@ -24,7 +23,7 @@ use tonic::transport::{Channel, Endpoint};
 use tonic::{Code, Streaming};
 
 /// Longest wait for one answer.
-const PATIENCE: Duration = Duration::from_millis(400);
+pub(crate) const PATIENCE: Duration = Duration::from_millis(400);
 /// No call may take longer.
 const HANG: Duration = Duration::from_secs(5);
 /// Length of a step [s].
@@ -34,13 +33,15 @@ const STEPS: usize = 30;
 /// Bytes within which a connection fails: some ten steps.
 const WITHIN: u64 = 6000;
 
-const LOCAL: MakeDevice = |compiled| Box::new(LocalDevice::new(compiled));
+/// The device in the process of the server.
+pub(crate) const LOCAL: MakeDevice = |compiled| Box::new(LocalDevice::new(compiled));
 
 fn volts(step: usize) -> f64 {
     1.0 + (step % 7) as f64
 }
 
-fn socket(server: &Running) -> SocketAddr {
+/// Where a server listens.
+pub(crate) fn socket(server: &Running) -> SocketAddr {
     server.address.uri().trim_start_matches("http://").parse().expect("an address")
 }
 
@@ -224,53 +225,6 @@ fn co_simulation(failures: u64, seed: u64) {
     println!("co-simulation: {calls} calls, {}", cut.told());
 }
 
-/// Sweeps through so many failures each: a table is the whole one with each point once, or there is none; and a submission whose answer was
-/// lost starts no second sweep, for which there is no room.
-fn sweeps(rounds: u64, failures: u64) {
-    let parameters = vec!["gap=1.5u:2.5u:60".parse().expect("an axis")];
-    let analysis = SweepAnalysis::PullIn { port: Some("drive".into()), max: 30.0 };
-    let spec = SweepSpec { parameters, samples: None, analysis, shard: Shard::default(), threads: None };
-    let options = CompileOptions::default();
-    let text = bundle().files["plate.net"].replace("gap=2u", "gap=gap").replace("param V=0", "param gap=2u");
-    let bundle = bimorph::netlist::Bundle::from_text("plate.net", &text);
-    let expected = sweep::run(&spec, &bundle, &options, &|_| true).expect("runs");
-    assert!(expected.rows.iter().all(|row| row.values.is_ok()));
-    let (mut tables, mut given_up, mut failed) = (0, 0, 0);
-    for round in 0..rounds {
-        let server = start_with("127.0.0.1:0", Limits { sweeps: 1, ..Limits::default() }, LOCAL);
-        let cut = Cut::to(socket(&server), round, WITHIN / 6);
-        let (send, ended) = mpsc::channel();
-        let (uri, spec, bundle, options) = (cut.uri(), spec.clone(), bundle.clone(), options.clone());
-        std::thread::spawn(move || {
-            let swept =
-                Client::connect(&uri, PATIENCE).and_then(|mut c| c.sweep(&spec, &bundle, &options, &mut |_| true));
-            send.send(swept)
-        });
-        let swept = loop {
-            match ended.recv_timeout(Duration::from_millis(10)) {
-                Ok(swept) => break swept,
-                Err(mpsc::RecvTimeoutError::Timeout) if cut.failed() >= failures => cut.calm(),
-                Err(mpsc::RecvTimeoutError::Timeout) => {}
-                Err(gone) => panic!("{gone}"),
-            }
-        };
-        match swept {
-            Ok(table) => {
-                assert_eq!(table, expected);
-                tables += 1;
-            }
-            Err(error) => {
-                assert!(["Unavailable", "DeadlineExceeded"].contains(&&*error.code), "{error:?}");
-                given_up += 1;
-            }
-        }
-        failed += cut.failed();
-        println!("sweep {round}: {}", cut.told());
-    }
-    assert!(tables > given_up && failed >= rounds, "{tables} tables, {given_up} given up, {failed} failures");
-    println!("{tables} tables, {given_up} given up");
-}
-
 #[test]
 fn a_kept_session_through_a_network_that_fails() {
     kept(8, 1);
@@ -281,12 +235,7 @@ fn a_circuit_through_a_network_that_fails() {
     co_simulation(8, 2);
 }
 
-#[test]
-fn sweeps_through_a_network_that_fails() {
-    sweeps(2, 2);
-}
-
-/// Two hundred failures of each kind of call: `make soak`.
+/// Two hundred failures of each: `make soak`.
 #[test]
 #[ignore = "minutes; make soak"]
 fn soak_a_network_that_fails() {
@@ -294,7 +243,6 @@ fn soak_a_network_that_fails() {
         kept(10, 100 + seed);
         co_simulation(10, 200 + seed);
     }
-    sweeps(40, 5);
 }
 
 /// A stream that the network held back accepts nothing after another one has joined: what was accepted since stays, here and on
@@ -337,35 +285,5 @@ fn what_was_held_back_undoes_nothing() {
         let (mut line, opened) = Line::start(&server.address.uri(), attach).await.expect("it is kept");
         assert_eq!(opened.accepted, last);
         line.step(3, last).await.expect("goes on");
-    });
-}
-
-/// A request that is sent again under its name is the same sweep; the name with another content is refused.
-#[test]
-fn a_submission_that_is_sent_again() {
-    let server = start_with("127.0.0.1:0", Limits { sweeps: 1, ..Limits::default() }, LOCAL);
-    block_on(async {
-        let mut client = server.client().await;
-        let pull_in = proto::SweepPullIn { port: "drive".into(), max_v: 30.0 };
-        let spec = |max_v| proto::SweepSpec {
-            analysis: Some(proto::sweep_spec::Analysis::PullIn(proto::SweepPullIn { max_v, ..pull_in.clone() })),
-            ..Default::default()
-        };
-        let request = |max_v, request_id: &str| proto::SubmitSweepRequest {
-            bundle: super::running::wire_bundle(),
-            options: None,
-            spec: Some(spec(max_v)),
-            request_id: request_id.into(),
-        };
-        let first = client.submit_sweep(request(30.0, "a")).await.expect("starts").into_inner();
-        let again = client.submit_sweep(request(30.0, "a")).await.expect("is known").into_inner();
-        assert_eq!(first, again);
-        let other = client.submit_sweep(request(31.0, "a")).await.expect_err("another content");
-        assert_eq!(other.code(), Code::InvalidArgument);
-        assert!(other.message().starts_with("request_id"), "{other}");
-        let full = client.submit_sweep(request(30.0, "b")).await.expect_err("there is room for one");
-        assert_eq!(full.code(), Code::ResourceExhausted);
-        let long = client.submit_sweep(request(30.0, &"x".repeat(65))).await.expect_err("too long");
-        assert_eq!(long.code(), Code::InvalidArgument);
     });
 }

@@ -5,6 +5,7 @@ mod attached;
 mod attacks;
 mod calls;
 mod cut;
+mod cut_sweeps;
 mod cuts;
 mod echo;
 mod endings;
