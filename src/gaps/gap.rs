@@ -44,6 +44,11 @@ pub enum Gap {
 }
 
 impl Gap {
+    /// True for electrodes that voltage draws upon each other.
+    pub(crate) fn closes(&self) -> bool {
+        matches!(self, Gap::Single { capacitor: Capacitor::Plates { .. }, .. } | Gap::Facing { .. })
+    }
+
     /// `r += factor·∇C`, and the contact force when `touch`. `linear`: for small displacements.
     pub fn add_force(&self, linear: bool, q: &[Pose], factor: f64, touch: bool, r: &mut [Pose]) {
         match self {

@@ -2,7 +2,7 @@
 //!
 //! Each step predicts along the tangent, then corrects by Newton. It is accepted only when the corrector converges, ends on
 //! a stable equilibrium (no negative pivot), and corrects at most half of what it predicted: a Newton iteration that
-//! wandered to another branch corrects more. Otherwise the step is halved. Where steps vanish the path has a fold: pull-in, release or
+//! wandered to another branch corrects more. Nor may it change the distance of electrodes under voltage by more than half. Otherwise the step is halved. Where steps vanish the path has a fold: pull-in, release or
 //! snap-through. From there the system falls, as an overdamped motion each step of which leads down in its potential, to the
 //! next stable equilibrium, and the path goes on from that; the fold's place is reported.
 //!
@@ -24,6 +24,9 @@ use path::LoadPath;
 const UNHELD: f64 = 1e8;
 /// Corrections below this share of the displacement that no longer shrink are rounding.
 const STALLED: f64 = 1e-5;
+
+/// Share of the distance of electrodes that one step may change. A plate on a spring folds at a third.
+const LEAP: f64 = 0.5;
 
 /// How an equilibrium is searched. `Default` is the only place where the numbers stand.
 #[derive(Debug, Clone, PartialEq)]
@@ -130,7 +133,7 @@ impl Equilibrium {
             // held where the step begins; what a wild trial holds says nothing
             let free = self.held.first().copied();
             let from_the_first = *free_at_first.get_or_insert(free.is_some());
-            match self.correct(system, path, to, &mut done) {
+            match self.correct(system, path, to, q, &mut done) {
                 Corrected::Stable => {
                     q.copy_from_slice(&self.trial);
                     s = to;
@@ -185,7 +188,7 @@ impl Equilibrium {
     }
 
     /// Newton at `s` from the prediction in `trial`.
-    fn correct(&mut self, system: &System, path: &dyn LoadPath, s: f64, done: &mut Path) -> Corrected {
+    fn correct(&mut self, system: &System, path: &dyn LoadPath, s: f64, from: &[Pose], done: &mut Path) -> Corrected {
         let predicted = size(system, &self.step);
         path.at(s, &mut self.drive);
         let mut last = f64::INFINITY;
@@ -215,11 +218,24 @@ impl Equilibrium {
                     return Corrected::No;
                 }
                 let corrected = distance(system, &self.trial, &self.prediction);
-                let tame = corrected <= 0.5 * predicted + 1e-3 * system.length_scale;
+                let tame = corrected <= 0.5 * predicted + 1e-3 * system.length_scale && !self.leaps(system, from);
                 return if tame { Corrected::Stable } else { Corrected::No };
             }
         }
         Corrected::No
+    }
+
+    /// True where the distance of electrodes changes by more than half of it in one step: a tangent that goes through the fold may come
+    /// upon the closed branch by chance.
+    fn leaps(&self, system: &System, from: &[Pose]) -> bool {
+        let far = |(gap, volts): (usize, &f64)| {
+            if *volts == 0.0 || !system.gaps[gap].closes() {
+                return false;
+            }
+            let (before, after) = (system.distance(gap, from), system.distance(gap, &self.trial));
+            (after - before).abs() > LEAP * before.max(after)
+        };
+        self.drive.volts.iter().enumerate().any(far)
     }
 
     /// A load that is far more than the part bears.

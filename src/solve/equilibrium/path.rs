@@ -11,59 +11,81 @@ pub trait LoadPath {
     fn slope(&self, s: f64, slope: &mut Drive);
 }
 
-/// Source voltages and dead loads that go linearly from one value to another, heaters at their steady temperature.
+/// The smallest share of a way from rest at which sources are taken [1]: nothing at all would have no slope.
+const LEAST: f64 = 1e-30;
+
+/// Source voltages and dead loads that go from one value to another, heaters at their steady temperature.
+///
+/// Loads go linearly. Voltages from rest go with the root of the share, so that heat and attraction, which follow their square, grow evenly
+/// with the loads and a tangent tells from the start where they lead; from other voltages they go linearly.
 #[derive(Debug, Clone)]
 pub struct SourcePath<'a> {
     electrics: &'a Electrics,
     from: &'a [f64],
     to: &'a [f64],
     load: [f64; 2],
+    from_rest: bool,
+    /// Of each gap, its voltage at both ends [V].
+    volts: Vec<[f64; 2]>,
+    /// Of each heater, the coefficients of its rise in the share, and its rise at the end [K].
+    rise: Vec<([f64; 3], f64)>,
 }
 
 impl<'a> SourcePath<'a> {
     /// From source voltages `from` to `to` [V], and the share `load` of dead loads and built-in strains at both ends.
     pub fn new(electrics: &'a Electrics, from: &'a [f64], to: &'a [f64], load: [f64; 2]) -> Self {
-        Self { electrics, from, to, load }
+        let from_rest = from.iter().all(|v| *v == 0.0);
+        let heating = &electrics.heating;
+        let gap = |g: usize, u: &[f64]| u.iter().enumerate().map(|(i, v)| electrics.gap_rows[(g, i)] * v).sum();
+        let rise = |k: usize| {
+            let end = heating.steady(k, to);
+            (if from_rest { [0.0, end, 0.0] } else { heating.between(k, from, to) }, end)
+        };
+        let volts = (0..electrics.gap_rows.nrows()).map(|g| [gap(g, from), gap(g, to)]).collect();
+        let rise = (0..heating.heaters.len()).map(rise).collect();
+        Self { electrics, from, to, load, from_rest, volts, rise }
     }
 
-    /// Source voltage `i` at `s`.
-    fn source(&self, i: usize, s: f64) -> f64 {
-        if s >= 1.0 { self.to[i] } else { self.from[i] + s * (self.to[i] - self.from[i]) }
+    /// The share of the voltages at `s`, and its slope.
+    fn share(&self, s: f64) -> [f64; 2] {
+        if self.from_rest {
+            let root = s.max(LEAST).sqrt();
+            [root, 0.5 / root]
+        } else {
+            [s, 1.0]
+        }
     }
 }
 
 impl LoadPath for SourcePath<'_> {
     fn at(&self, s: f64, drive: &mut Drive) {
         let e = self.electrics;
-        for (g, v) in drive.volts.iter_mut().enumerate() {
-            *v = (0..self.to.len()).map(|i| e.gap_rows[(g, i)] * self.source(i, s)).sum();
+        let [share, _] = self.share(s);
+        for (v, [from, to]) in drive.volts.iter_mut().zip(&self.volts) {
+            *v = if s >= 1.0 { *to } else { from + share * (to - from) };
         }
-        for k in 0..drive.expansion.len() {
-            let h = &e.heating;
-            let rise = if s >= 1.0 {
-                h.steady(k, self.to)
-            } else {
-                let [a, b, c] = h.between(k, self.from, self.to);
-                a + s * (b + s * c)
-            };
-            drive.expansion[k] = h.heaters[k].expansion * rise;
+        for ((expansion, heater), ([a, b, c], end)) in
+            drive.expansion.iter_mut().zip(&e.heating.heaters).zip(&self.rise)
+        {
+            *expansion = heater.expansion * if s >= 1.0 { *end } else { a + s * (b + s * c) };
         }
         drive.load = self.load[0] + s * (self.load[1] - self.load[0]);
         for (k, value) in drive.inputs.iter_mut().enumerate() {
-            *value = self.source(e.voltages() + k, s);
+            let (from, to) = (self.from[e.voltages() + k], self.to[e.voltages() + k]);
+            *value = if s >= 1.0 { to } else { from + s * (to - from) };
         }
         drive.turning = 0.0;
     }
 
     fn slope(&self, s: f64, slope: &mut Drive) {
         let e = self.electrics;
-        for (g, v) in slope.volts.iter_mut().enumerate() {
-            *v = (0..self.to.len()).map(|i| e.gap_rows[(g, i)] * (self.to[i] - self.from[i])).sum();
+        let [_, rate] = self.share(s);
+        for (v, [from, to]) in slope.volts.iter_mut().zip(&self.volts) {
+            *v = rate * (to - from);
         }
-        for k in 0..slope.expansion.len() {
-            let h = &e.heating;
-            let [_, b, c] = h.between(k, self.from, self.to);
-            slope.expansion[k] = h.heaters[k].expansion * (b + 2.0 * s * c);
+        for ((expansion, heater), ([_, b, c], _)) in slope.expansion.iter_mut().zip(&e.heating.heaters).zip(&self.rise)
+        {
+            *expansion = heater.expansion * (b + 2.0 * s * c);
         }
         slope.load = self.load[1] - self.load[0];
         for (k, value) in slope.inputs.iter_mut().enumerate() {
