@@ -1,6 +1,6 @@
 //! From netlist text to a ready model: netlist → structure → discretize.
 
-use crate::discretize::{DiscretizeError, Discretized, discretize_with, order, yielded};
+use crate::discretize::{DiscretizeError, Discretized, discretize_like, order, yielded};
 use crate::equations::Joints;
 use crate::multibody::relative::Unfit;
 use crate::netlist::{Bundle, Diagnostics, Setting, Source};
@@ -46,7 +46,9 @@ impl Compiled {
     /// # Errors
     /// See [`DiscretizeError`].
     pub fn with_order(&self, order: ModelOrder) -> Result<Self, DiscretizeError> {
-        let parts = laid_out(&self.structure, &self.options, &order.segments)?;
+        let rigid = |segments: &[usize]| segments.iter().map(|n| *n == 0).collect::<Vec<_>>();
+        let like = (rigid(&self.order.segments) == rigid(&order.segments)).then_some(&self.parts);
+        let parts = laid_out(&self.structure, &self.options, &order.segments, like)?;
         Ok(Self {
             structure: self.structure.clone(),
             parameters: self.parameters.clone(),
@@ -132,7 +134,7 @@ impl Drawn {
     /// # Errors
     /// See [`DiscretizeError`].
     pub fn on(self, order: ModelOrder) -> Result<Compiled, DiscretizeError> {
-        let parts = laid_out(&self.structure, &self.options, &order.segments)?;
+        let parts = laid_out(&self.structure, &self.options, &order.segments, None)?;
         Ok(Compiled {
             joints: in_joints_of(&parts, &self.options),
             structure: self.structure,
@@ -150,8 +152,9 @@ fn laid_out(
     structure: &Structure,
     options: &CompileOptions,
     segments: &[usize],
+    other: Option<&Discretized>,
 ) -> Result<Discretized, DiscretizeError> {
-    let mut parts = discretize_with(structure, options, segments)?;
+    let mut parts = discretize_like(structure, options, segments, other)?;
     for (arm, strain) in yielded::arms(&parts, &structure.yields).iter().zip(structure.yields.iter().map(|y| y.strain))
     {
         yielded::strain(&mut parts, arm, strain);

@@ -93,13 +93,18 @@ fn rod_compliance(beam: &Beam, length: f64) -> Matrix3<f64> {
 /// The compliance in numbers of one size: strains (u, g, p·w) under (N, V, M/w), times E·t.
 fn scaled(spring: &Matrix3<f64>, beam: &Beam) -> Matrix3<f64> {
     let (w, unit) = (beam.width, beam.material.youngs_modulus * beam.thickness);
-    let scale = Matrix3::from_diagonal(&[1.0, 1.0, w].into());
-    scale * spring * scale * unit
+    let scale = [1.0, 1.0, w];
+    Matrix3::from_fn(|i, j| scale[i] * spring[(i, j)] * scale[j] * unit)
 }
 
-/// True where no load gains work from the spring, rounding aside.
+/// True where no load gains work from the spring, rounding aside: the pivots of its elimination are positive.
 fn gives(spring: &Matrix3<f64>, beam: &Beam) -> bool {
-    (scaled(spring, beam) + Matrix3::from_diagonal_element(1e-9)).cholesky().is_some()
+    let a = scaled(spring, beam);
+    let [first, second, third] = [0, 1, 2].map(|i| a[(i, i)] + 1e-9);
+    let (l10, l20) = (a[(1, 0)] / first, a[(2, 0)] / first);
+    let (second, beside) = (second - l10 * a[(1, 0)], a[(2, 1)] - l20 * a[(1, 0)]);
+    let third = third - l20 * a[(2, 0)] - beside / second * beside;
+    first > 0.0 && second > 0.0 && third > 0.0
 }
 
 /// The spring without what would gain work.

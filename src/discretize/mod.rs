@@ -47,6 +47,7 @@ use crate::multibody::{BodyId, Coupling, Damper, Joint, Model};
 use crate::options::CompileOptions;
 use crate::structure::Structure;
 use nalgebra::{Matrix2, Matrix3, Vector2};
+use std::sync::Arc;
 
 /// Of a segment's joint and points, about [byte].
 const SEGMENT_BYTES: usize = 600;
@@ -64,6 +65,8 @@ pub struct Discretized {
     pub beams: Vec<Vec<Point>>,
     /// For each beam, what the junctions at its start and its end take of its length [m].
     pub offsets: Vec<[f64; 2]>,
+    /// What junctions do to the drawing.
+    ends: Arc<junction::Ends>,
     /// For each heater of the electrics, its beam in the structure.
     pub heaters: Vec<usize>,
     /// Name of each gap of the system.
@@ -87,6 +90,19 @@ pub fn discretize_with(
     options: &CompileOptions,
     segments: &[usize],
 ) -> Result<Discretized, DiscretizeError> {
+    discretize_like(structure, options, segments, None)
+}
+
+/// The same where `other` is the same drawing with other segments: what no mesh changes is taken from there.
+///
+/// # Errors
+/// See [`DiscretizeError`].
+pub fn discretize_like(
+    structure: &Structure,
+    options: &CompileOptions,
+    segments: &[usize],
+    other: Option<&Discretized>,
+) -> Result<Discretized, DiscretizeError> {
     let total = segments.iter().fold(0, |sum: usize, n| sum.saturating_add(*n));
     if total > MOST_SEGMENTS {
         return Err(DiscretizeError::TooFine { segments: total });
@@ -103,7 +119,10 @@ pub fn discretize_with(
     let mut dampers: Vec<Damper> = Vec::new();
     let mut beams = Vec::with_capacity(structure.beams.len());
     let mut heaters = Vec::new();
-    let ends = junction::find(structure, &rigid, options.junctions);
+    let ends = match other {
+        Some(other) => Arc::clone(&other.ends),
+        None => Arc::new(junction::find(structure, &rigid, options.junctions)),
+    };
     for (index, drawn) in structure.beams.iter().enumerate() {
         budget::check();
         let heater = drawn.heater.is_some().then(|| {
@@ -132,7 +151,10 @@ pub fn discretize_with(
             (l.node.0, Load { point: rigid.point(l.node.0), force, moment: l.moment })
         })
         .collect();
-    let electrics = ports::lay(structure, &heaters, &rigid)?;
+    let electrics = match other {
+        Some(other) => other.system.electrics.clone(),
+        None => ports::lay(structure, &heaters, &rigid)?,
+    };
     let narrowest = structure.beams.iter().map(|b| b.width).fold(f64::INFINITY, f64::min);
     let gap_scale = structure.plate_gaps.iter().map(|g| g.gap).chain(structure.combs.iter().map(|c| c.gap));
     let scale = gap_scale.fold(narrowest, f64::min);
@@ -166,7 +188,7 @@ pub fn discretize_with(
         (0..structure.nodes.len()).map(|n| structure.nodes[n].mechanical.then(|| moved(rigid.point(n)))).collect();
     let beams = beams.into_iter().map(|points| points.into_iter().map(moved).collect()).collect();
     let offsets = ends.beams.iter().map(|[a, b]| [a.offset, b.offset]).collect();
-    Ok(Discretized { system, nodes, beams, offsets, heaters, gap_names })
+    Ok(Discretized { system, nodes, beams, offsets, ends, heaters, gap_names })
 }
 
 /// A lumped spring and damper: a joint half way between its two nodes.

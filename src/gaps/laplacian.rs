@@ -9,14 +9,15 @@
 //! analysis and steady state distributions for Markov chains", Operations Research 33 (1985), for what it does to rounding.
 
 use crate::multibody::Pattern;
-use crate::multibody::order::elimination_order;
+use crate::multibody::layout::Layout;
+use std::sync::Arc;
 
 /// Nodes between two looks at the budget.
 const NODES_PER_CHECK: usize = 1024;
 
 /// A network, taken apart.
 pub(super) struct Laplacian {
-    pattern: Pattern,
+    pattern: Arc<Pattern>,
     /// Node by node, when it is taken out.
     turn: Vec<usize>,
     /// Conductances between nodes as they are when the first of the two is taken out, column by column of the pattern.
@@ -45,16 +46,11 @@ impl Laplacian {
             }
         }
         let grounded: Vec<usize> = (0..size).filter(|k| to_ground[*k] > 0.0).collect();
-        let order = elimination_order(size, &edges, &grounded);
-        let mut turn = vec![0; size];
-        order.iter().enumerate().for_each(|(k, node)| turn[*node] = k);
-        for edge in &mut edges {
-            *edge = (turn[edge.0], turn[edge.1]);
-        }
-        let pattern = Pattern::without_targets(size, &edges);
+        let layout = Layout::of_elimination(size, edges.clone(), grounded);
+        let Layout { order, place: turn, pattern, .. } = &*layout;
         let mut between = vec![0.0; pattern.off_blocks()];
-        for ((a, b), g) in edges.iter().zip(conductances) {
-            between[pattern.block(*a.max(b), *a.min(b))?] += g;
+        for ((a, b), g) in edges.into_iter().map(|(a, b)| (turn[a], turn[b])).zip(conductances) {
+            between[pattern.block(a.max(b), a.min(b))?] += g;
         }
         let mut ground: Vec<f64> = order.iter().map(|node| to_ground[*node]).collect();
         let mut sum = vec![0.0; size];
@@ -80,7 +76,7 @@ impl Laplacian {
                 }
             }
         }
-        Some(Self { pattern, turn, between, sum })
+        Some(Self { pattern: Arc::clone(pattern), turn: turn.clone(), between, sum })
     }
 
     /// Potentials for the flows into the nodes, in place, column after column.

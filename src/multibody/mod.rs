@@ -7,6 +7,7 @@
 //! | file | what it holds |
 //! |---|---|
 //! | [`order`] | the leaf → root elimination order of the body graph |
+//! | [`layout`] | order and pattern of a graph, looked up where it was laid out just before |
 //! | [`pattern`] | where each block of the factor lies, fill of the loops included, and the update schedule |
 //! | [`factor`] | symmetric block factorization and solve, generic over scalar and block size |
 //! | [`planar`] | everything that knows a plane from space: poses, points on bodies, joint strains and their derivatives |
@@ -29,6 +30,7 @@ pub mod factor;
 pub mod forces;
 pub mod joint;
 pub mod lanes;
+pub mod layout;
 pub mod linear_system;
 pub mod model;
 pub mod order;

@@ -2,13 +2,14 @@
 
 use super::body::Body;
 use super::joint::{BodyId, Coupling, Damper, Joint};
-use super::order::elimination_order;
+use super::layout::Layout;
 use super::pattern::Pattern;
 use super::planar::{Block, Pose};
 use super::section::{LaidJoint, NONE, Place, Section, Sections};
 use crate::sets::Sets;
 use nalgebra::{Matrix3, Matrix6};
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 /// Bodies, joints and their elimination order. Never changed after [`Model::new`]; share it in an `Arc`.
 #[derive(Debug, Clone)]
@@ -24,7 +25,7 @@ pub struct Model {
     /// Dampers.
     pub dampers: Vec<Damper>,
     /// Pattern of the tangent.
-    pub pattern: Pattern,
+    pub pattern: Arc<Pattern>,
     /// Small displacements about the drawn geometry.
     pub linear: bool,
     /// Bodies with a projector.
@@ -73,11 +74,8 @@ impl Model {
                 _ => None,
             })
             .collect();
-        let order = elimination_order(bodies.len(), &edges, &grounded);
-        let mut place = vec![0; bodies.len()];
-        for (k, &body) in order.iter().enumerate() {
-            place[body] = k;
-        }
+        let layout = Layout::of(bodies.len(), edges, grounded);
+        let Layout { order, place, pattern, .. } = &*layout;
         let moved = |id: BodyId| match id {
             BodyId::Ground => BodyId::Ground,
             BodyId::Free(k) => BodyId::Free(place[k]),
@@ -85,18 +83,15 @@ impl Model {
         for d in &mut dampers {
             (d.a, d.b) = (moved(d.a), moved(d.b));
         }
-        let edges: Vec<(usize, usize)> = edges.into_iter().map(|(a, b)| (place[a], place[b])).collect();
-        let pattern = Pattern::new(bodies.len(), &edges);
-        drop(edges);
-        let mut sections = Sections::new();
+        let mut sections = Sections::new(joints.len());
         let mut laid: Vec<LaidJoint> =
-            joints.iter().map(|j| sections.lay(j, locate(&pattern, moved(j.a), moved(j.b)))).collect();
+            joints.iter().map(|j| sections.lay(j, locate(pattern, moved(j.a), moved(j.b)))).collect();
         drop(joints);
         laid.sort_by_key(|j| j.place.order());
         let mut slots: Vec<Option<Body>> = bodies.into_iter().map(Some).collect();
         let mut bodies = Vec::with_capacity(order.len());
         bodies.extend(order.iter().filter_map(|&k| slots[k].take()));
-        let damper_place = dampers.iter().map(|d| locate(&pattern, d.a, d.b)).collect();
+        let damper_place = dampers.iter().map(|d| locate(pattern, d.a, d.b)).collect();
         let damper_matrix = dampers.iter().map(Damper::matrix).collect();
         let sections = sections.all;
         let held = (0..).zip(&bodies).filter(|(_, b)| b.free.is_some()).map(|(k, _)| k).collect();
@@ -107,13 +102,13 @@ impl Model {
             sections,
             couplings,
             dampers,
-            pattern,
+            pattern: Arc::clone(pattern),
             linear,
             held,
             damper_place,
             damper_matrix,
         };
-        (model, place)
+        (model, place.clone())
     }
 
     /// Couples joints, bodies numbered in elimination order. Their [`Coupling::pairs`] must have been among the couplings

@@ -98,6 +98,11 @@ impl Pattern {
         (self.target, self.target_start) = (target, target_start);
     }
 
+    /// What it stands for in a budget [byte]: see [`Pattern::new`].
+    pub(crate) fn bytes(&self) -> usize {
+        self.row.len() * FILL_BYTES + self.target.len() * size_of::<u32>()
+    }
+
     /// Number of bodies.
     pub fn bodies(&self) -> usize {
         self.start.len() - 1

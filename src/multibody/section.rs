@@ -105,6 +105,9 @@ impl Place {
     }
 }
 
+/// Sections that room is made for at first.
+const ROOM: usize = 128;
+
 /// Lays joints down with one section for all that are alike in everything but place and rest offset.
 pub(crate) struct Sections {
     pub(crate) all: Vec<Section>,
@@ -112,8 +115,9 @@ pub(crate) struct Sections {
 }
 
 impl Sections {
-    pub(crate) fn new() -> Self {
-        Self { all: Vec::new(), known: HashMap::new() }
+    /// For so many joints at most.
+    pub(crate) fn new(joints: usize) -> Self {
+        Self { all: Vec::with_capacity(joints.min(ROOM)), known: HashMap::with_capacity(joints.min(ROOM)) }
     }
 
     /// The joint as it is stored, between the bodies of `place`.
@@ -172,7 +176,7 @@ mod tests {
             locked: [false, true, false],
         };
         let given = [joint(1.0, 0.5), joint(2.0, 0.5), joint(3.0, 0.7), joint(4.0, 0.5)];
-        let mut sections = Sections::new();
+        let mut sections = Sections::new(4);
         let place = Place { a: NONE, b: 3, block: NONE };
         let laid: Vec<LaidJoint> = given.iter().map(|joint| sections.lay(joint, place)).collect();
         assert_eq!(laid.iter().map(LaidJoint::section).collect::<Vec<_>>(), [0, 0, 1, 0]);

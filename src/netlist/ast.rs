@@ -1,5 +1,6 @@
 //! The syntax tree of a netlist with all its includes in place.
 
+use super::elements::Model;
 use super::source::Span;
 use std::sync::Arc;
 
@@ -94,6 +95,8 @@ pub(crate) struct Element {
     pub(crate) model: Ident,
     /// The subnet of that name, once resolved; none: a built-in element.
     pub(crate) subnet: Option<usize>,
+    /// The built-in element of that name, and whether it takes every parameter that is given.
+    pub(crate) built_in: Option<(&'static Model, bool)>,
     /// The layer's name; `*` for none.
     pub(crate) layer_name: Ident,
     pub(crate) layer: LayerRef,

@@ -2,6 +2,7 @@
 
 use super::bundle::Bundle;
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
+use std::sync::Arc;
 
 /// Of longer lines only the part around the mark is shown [bytes].
 const LONGEST_LINE: usize = 1000;
@@ -58,13 +59,13 @@ pub struct Diagnostics {
     /// Messages in order of place.
     pub items: Vec<Diagnostic>,
     /// The text they point into.
-    pub bundle: Bundle,
+    pub bundle: Arc<Bundle>,
 }
 
 impl Diagnostics {
     /// No message about `bundle`.
     pub fn none(bundle: &Bundle) -> Self {
-        Self { items: Vec::new(), bundle: bundle.clone() }
+        Self { items: Vec::new(), bundle: Arc::new(bundle.clone()) }
     }
 
     /// The messages as text with source line and caret.

@@ -7,13 +7,14 @@ use super::front::Loaded;
 use super::setting::Setting;
 use super::sink::Sink;
 use super::{check, elements, place};
+use std::sync::Arc;
 
 /// What every front end of netlists does with the elements that it has built: members out of the plane, positions, loose ends.
 pub(super) fn finish(
     mut drawing: Drawing,
     parameters: Vec<(String, Setting)>,
     mut sink: Sink,
-    bundle: &Bundle,
+    bundle: &Arc<Bundle>,
 ) -> Result<Loaded, Diagnostics> {
     elements::upright::settle(&mut drawing, &mut sink);
     if !sink.failed() {

@@ -38,7 +38,7 @@ impl<'p> Elaborator<'p> {
                 let local = self.name(name)?;
                 let full = format!("{}{local}", self.here().prefix);
                 budget::lay_out(ELEMENT_BYTES + NAME_COPIES * full.len());
-                if self.names.contains(&full) {
+                if let Some(full) = self.names.replace(full) {
                     let message = format!("there is an element `{full}` already");
                     self.sink.warning(
                         "W007",
@@ -47,7 +47,6 @@ impl<'p> Elaborator<'p> {
                         "give each its own name, so that results can be told apart",
                     );
                 }
-                self.names.insert(full);
                 local
             }
             None => {
@@ -129,7 +128,11 @@ impl<'p> Elaborator<'p> {
                         layer_name: layer.map(|l| &*self.program.layers[l].name.name),
                     },
                 };
-                elements::build(&instance, &mut self.drawing, self.sink, super::sugar2::read)
+                let (drawing, sink, read) = (&mut self.drawing, &mut *self.sink, super::sugar2::read);
+                match element.built_in {
+                    Some(known) => elements::build_as(known, &instance, drawing, sink, read),
+                    None => elements::build(&instance, drawing, sink, read),
+                }
             }
         }
     }

@@ -8,6 +8,7 @@ use super::read::load;
 use super::setting::Setting;
 use super::sink::Sink;
 use super::source::Span;
+use std::sync::Arc;
 
 impl Setting {
     /// Reads a value as the netlist language writes it: `2.1u`, `-3`, `pi/4`, `deg(30)`, `'text'`. A bare word that is
@@ -30,7 +31,7 @@ impl Setting {
             sink.error("E049", Span::NOWHERE, format!("`{line}` is more than one value"), "give one value");
         }
         if sink.failed() {
-            return Err(sink.finish(&bundle));
+            return Err(sink.finish(&Arc::new(bundle)));
         }
         let loaded = load(&bundle, &[])?;
         let value = loaded.parameters.into_iter().next().map(|(_, value)| value);

@@ -4,6 +4,7 @@ use super::bundle::Bundle;
 use super::diagnostic::{Diagnostic, Diagnostics, Severity};
 use super::source::Span;
 use std::collections::HashSet;
+use std::sync::Arc;
 
 /// Marks that an error was already put into the [`Sink`]: nothing more needs to be said about it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -93,7 +94,7 @@ impl Sink {
     }
 
     /// All messages in order of place.
-    pub(crate) fn finish(mut self, bundle: &Bundle) -> Diagnostics {
+    pub(crate) fn finish(mut self, bundle: &Arc<Bundle>) -> Diagnostics {
         self.items.sort_by_key(|(span, severity, ..)| {
             (span.file.wrapping_add(1), span.start, *severity == Severity::Warning)
         });
@@ -106,7 +107,7 @@ impl Sink {
                 Diagnostic { code: code.to_owned(), severity, file, line, column, width, message, help }
             })
             .collect();
-        Diagnostics { items, bundle: bundle.clone() }
+        Diagnostics { items, bundle: Arc::clone(bundle) }
     }
 }
 

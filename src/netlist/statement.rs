@@ -1,6 +1,7 @@
 //! The grammar of statements: definitions, blocks, loops, conditions, layers, subnets, elements and their lists.
 
 use super::ast::{Def, Element, Expr, ExprKind, Formal, Ident, Layer, LayerRef, Name, Slot, Statement, Subnet};
+use super::elements;
 use super::parser::{Parsed, Parser};
 use super::sink::Reported;
 use super::source::Span;
@@ -180,8 +181,11 @@ impl Parser<'_> {
         }
         let (nodes, nodes_span) = self.name_list()?;
         let (parameters, _) = self.def_list()?;
-        let layer = LayerRef::None;
-        Ok(Element { name, number, model, subnet: None, layer_name, layer, nodes, nodes_span, parameters })
+        let (layer, subnet) = (LayerRef::None, None);
+        let turns = |name: &str| matches!(name, "ox" | "oy" | "oz");
+        let given = || parameters.iter().map(|def| &*def.name.name).filter(|name| !turns(name));
+        let built_in = elements::model(&model.name).map(|model| (model, given().all(|name| model.takes(name))));
+        Ok(Element { name, number, model, subnet, built_in, layer_name, layer, nodes, nodes_span, parameters })
     }
 
     // ---- lists ----

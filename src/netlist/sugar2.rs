@@ -12,11 +12,12 @@ use super::source::Span;
 use super::suggest::MOST_LISTED;
 use super::{parser, resolve, suggest};
 use std::collections::HashSet;
+use std::sync::Arc;
 
 /// A SUGAR 2 netlist that has been parsed.
 #[derive(Debug)]
 pub(crate) struct Sugar2 {
-    bundle: Bundle,
+    bundle: Arc<Bundle>,
     program: Program,
     /// What reading had to say.
     sink: Sink,
@@ -42,7 +43,7 @@ impl Sugar2 {
             parsed.error("E007", span, message, help);
             sink = parsed;
         }
-        Self { bundle: bundle.clone(), program, sink }
+        Self { bundle: Arc::new(bundle.clone()), program, sink }
     }
 }
 

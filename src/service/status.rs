@@ -154,6 +154,7 @@ mod tests {
     //! A bad netlist comes back by place, and however long it is, the status fits into trailers.
     use super::*;
     use crate::netlist::{Bundle, Diagnostic};
+    use std::sync::Arc;
 
     fn diagnostics(count: usize) -> Diagnostics {
         let item = |line| Diagnostic {
@@ -166,7 +167,7 @@ mod tests {
             message: "unknown layer \"p9\"".into(),
             help: "layers are p1, p2".into(),
         };
-        Diagnostics { items: (1..=count).map(item).collect(), bundle: Bundle::from_text("bank.net", "") }
+        Diagnostics { items: (1..=count).map(item).collect(), bundle: Arc::new(Bundle::from_text("bank.net", "")) }
     }
 
     #[test]

@@ -6,6 +6,7 @@ use crate::multibody::planar::Block;
 use crate::multibody::section::{LaidJoint, Place, Section};
 use crate::multibody::{Body, BodyId, Model, Pattern};
 use nalgebra::Matrix3;
+use std::sync::Arc;
 
 /// A body in each variant.
 #[derive(Debug, Clone, Copy)]
@@ -61,7 +62,7 @@ pub(crate) type Held = Option<(LaneBlock, LaneBlock)>;
 #[derive(Debug, Clone)]
 pub struct LaneModel {
     /// Pattern of the tangent.
-    pub pattern: Pattern,
+    pub pattern: Arc<Pattern>,
     /// Bodies in elimination order.
     pub bodies: Vec<LaneBody>,
     pub(crate) joints: Vec<LaneJoint>,

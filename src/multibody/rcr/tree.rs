@@ -204,7 +204,7 @@ impl Linkage {
         Self {
             links,
             closures,
-            pattern: model.pattern.clone(),
+            pattern: Pattern::clone(&model.pattern),
             names: model.bodies.iter().map(|b| b.name.to_string()).collect(),
             coordinates,
             constraints,

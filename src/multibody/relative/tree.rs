@@ -164,7 +164,7 @@ impl Tree {
         let left = model.joints.iter().zip(&in_tree).filter(|(_, in_tree)| !**in_tree);
         let closures = left.map(|(joint, _)| *joint).collect();
         let coordinates = links.iter().map(Link::freedom).sum();
-        Self { links, closures, pattern: model.pattern.clone(), coordinates }
+        Self { links, closures, pattern: Pattern::clone(&model.pattern), coordinates }
     }
 }
 

@@ -38,6 +38,17 @@ pub(crate) fn build(
     let Some(model) = model(instance.model) else {
         return Err(unknown(sink, instance.model, instance.span, []));
     };
+    build_as((model, false), instance, drawing, sink, read)
+}
+
+/// The same with the element looked up; `sound`: it takes all of its parameters.
+pub(crate) fn build_as(
+    (model, sound): (&Model, bool),
+    instance: &Instance<'_>,
+    drawing: &mut Drawing,
+    sink: &mut Sink,
+    read: Read,
+) -> Result<(), Reported> {
     let got = instance.nodes.len();
     if !model.nodes.contains(&got) {
         let wanted = match model.nodes {
@@ -49,7 +60,9 @@ pub(crate) fn build(
         let help = format!("write `{} LAYER {}`", model.name, model.node_names);
         return Err(sink.error("E054", instance.nodes_span, message, help));
     }
-    stray_parameters(model, instance, sink);
+    if !sound {
+        stray_parameters(model, instance, sink);
+    }
     (model.build)(&mut Site { instance, drawing, sink, read })
 }
 
@@ -79,8 +92,7 @@ fn differ_in_numbers(a: &str, b: &str) -> bool {
 /// Warns of parameters that the element does not take.
 fn stray_parameters(model: &Model, instance: &Instance<'_>, sink: &mut Sink) {
     for argument in &instance.arguments.given {
-        let takes = |names: &[&str]| names.contains(&argument.name);
-        if takes(model.parameters) || takes(table::LAYER_ENTRIES) || (model.sugar && takes(table::STRAY)) {
+        if model.takes(argument.name) {
             continue;
         }
         let otherwise = format!("it takes {}", model.parameters.join(" "));

@@ -5,6 +5,7 @@ use super::arguments::Site;
 use super::{arm, beam, circuit, comb, curve, gap, load, lumped, pinned, pressure, section, stop, support};
 
 /// An element of the language.
+#[derive(Debug)]
 pub(crate) struct Model {
     pub(crate) name: &'static str,
     /// Numbers of nodes it can have.
@@ -16,6 +17,13 @@ pub(crate) struct Model {
     /// True for SUGAR's own elements, whose old netlists carry parameters that were always ignored.
     pub(crate) sugar: bool,
     pub(crate) build: fn(&mut Site<'_, '_>) -> Result<(), Reported>,
+}
+
+impl Model {
+    /// True for a parameter that means something to it, or that old netlists carry along.
+    pub(crate) fn takes(&self, name: &str) -> bool {
+        self.parameters.contains(&name) || LAYER_ENTRIES.contains(&name) || (self.sugar && STRAY.contains(&name))
+    }
 }
 
 /// The element of that name.

@@ -18,6 +18,7 @@ use crate::budget;
 use std::cell::{Cell, RefCell};
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::rc::Rc;
+use std::sync::Arc;
 
 /// Names that SUGAR 3's Lua has and netlists here have not, for help.
 const ABSENT: [&str; 14] = [
@@ -40,12 +41,12 @@ const ABSENT: [&str; 14] = [
 /// A SUGAR 3 netlist. It is run anew for each set of parameters.
 #[derive(Debug)]
 pub(crate) struct Sugar3 {
-    bundle: Bundle,
+    bundle: Arc<Bundle>,
 }
 
 impl Sugar3 {
     pub(crate) fn new(bundle: &Bundle) -> Self {
-        Self { bundle: bundle.clone() }
+        Self { bundle: Arc::new(bundle.clone()) }
     }
 }
 
@@ -64,7 +65,7 @@ impl FrontEnd for Sugar3 {
             radians: false,
             used: HashSet::from([self.bundle.root.clone()]),
             texts: Vec::new(),
-            bundle: Rc::new(self.bundle.clone()),
+            bundle: Arc::clone(&self.bundle),
             asked: HashMap::new(),
             settings: set.iter().cloned().collect(),
             parameters: BTreeMap::new(),

@@ -13,6 +13,7 @@ use mlua::{Lua, Value};
 use std::cell::{Cell, RefCell};
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::rc::Rc;
+use std::sync::Arc;
 
 /// Where names of one scope live: the netlist itself, or one subnet instance.
 #[derive(Debug)]
@@ -42,7 +43,7 @@ pub(super) struct State {
     pub(super) used: HashSet<String>,
     /// Text of each file, in the order of the sink's.
     pub(super) texts: Vec<Rc<Text>>,
-    pub(super) bundle: Rc<Bundle>,
+    pub(super) bundle: Arc<Bundle>,
     /// Globals that were read before anything was assigned to them, with their place in the order of reading.
     pub(super) asked: HashMap<String, usize>,
     pub(super) settings: BTreeMap<String, Setting>,
