@@ -3,8 +3,8 @@
 Nothing generated is kept in the repository. A source distribution carries the generated files instead of the .proto
 files, and then there is nothing left to do.
 
-With BIMORPH_PROGRAMS, the folder of a release build, a wheel brings the command and the ngspice plug-in of this machine's platform:
-``make wheel``.
+With BIMORPH_PROGRAMS, the folder of a release build, a wheel brings the command, the ngspice plug-in and the module for models in process
+of this machine's platform: ``make wheel``.
 """
 
 from __future__ import annotations
@@ -55,15 +55,17 @@ else:
             generate()
             folder = os.environ.get("BIMORPH_PROGRAMS")
             if folder and self.target_name == "wheel" and version != "editable":
-                command, plugin = (Path(folder).resolve() / name for name in ("bimorph", "libbimorph_ngspice.so"))
-                for program in (command, plugin):
+                names = ("bimorph", "libbimorph_ngspice.so", "libbimorph_python.so")
+                command, plugin, module = (Path(folder).resolve() / name for name in names)
+                for program in (command, plugin, module):
                     if not program.is_file():
-                        raise RuntimeError(f"{program} is missing: cargo build --release --workspace")
+                        raise RuntimeError(f"{program} is missing: scripts/wheel builds it")
                 build_data["shared_scripts"][str(command)] = command.name
                 # Where the command looks for it.
                 build_data["shared_data"][str(plugin)] = f"lib/bimorph/{plugin.name}"
+                build_data["force_include"][str(module)] = "bimorph/_native.abi3.so"
                 platform = sysconfig.get_platform().replace("-", "_").replace(".", "_")
-                build_data.update(pure_python=False, tag=f"py3-none-{platform}")
+                build_data.update(pure_python=False, tag=f"cp311-abi3-{platform}")
 
 
 if __name__ == "__main__":

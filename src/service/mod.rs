@@ -3,7 +3,8 @@
 //! # Layout
 //! [`proto`] is what travels and [`convert`] the only place that knows both it and the library's own types. [`client`]
 //! is built with the feature `remote` alone, and shows what [`access`] says; `tls` is for both ends. The rest is the feature `server`: [`server`] listens and stops
-//! (`sockets`, `connection`, `shutdown`), [`guard`] and `tokens` ask who comes, `intake` counts what comes in as `bodies`, `rpc` answers calls (`analyses` those that compute), `stream` is the Newton loop,
+//! (`sockets`, `connection`, `shutdown`), [`guard`] and `tokens` ask who comes, `intake` counts what comes in as `bodies`, `rpc` answers calls (`analyses` those that compute), `stream` is the Newton loop, about
+//! a session that it has `joined`, [`inside`] is all of it without a network,
 //! `models`, `sessions` and `sweeps` keep what clients can name, under `ids` that nobody guesses; a `session` answers each `question`, has its `usage` and its
 //! `spectra`, `snapshots` puts it into bytes, `store` and `keeper` hold what outlives the server, on a `disk`, which `waking` goes on with and
 //! [`survey`] looks at, `work` computes, in the `turns` of clients, `chunks` sends what is long, `status` says what went wrong, [`log`]
@@ -36,7 +37,11 @@ mod gate;
 #[cfg(feature = "server")]
 pub mod guard;
 #[cfg(feature = "server")]
+pub mod inside;
+#[cfg(feature = "server")]
 mod intake;
+#[cfg(feature = "server")]
+mod joined;
 #[cfg(feature = "server")]
 mod keeper;
 #[cfg(feature = "server")]

@@ -174,8 +174,8 @@ async fn open_all(
     Ok((listeners, Some(overseer), bound))
 }
 
-/// What all calls share.
-fn share(
+/// What all calls share. Within a runtime.
+pub(super) fn share(
     limits: Limits,
     told: Vec<ServerSetting>,
     (make, store, connections): (MakeDevice, Option<Arc<Store>>, Arc<Connections>),

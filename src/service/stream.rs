@@ -5,7 +5,7 @@
 //! is stopped there and asked again on a blocking thread, as are models above
 //! [`Limits::inline_unknowns`](super::limits::Limits::inline_unknowns), one at a time, which keeps replies in order.
 
-use super::answerable::answerable;
+use super::joined::{Joined, Next};
 use super::question::Question;
 use super::session::{Session, refused};
 use super::shared::Shared;
@@ -13,11 +13,9 @@ use super::turns::{CLIENT, client};
 use super::{proto, status};
 use crate::budget::Budget;
 use proto::device_reply::Kind as ReplyKind;
-use proto::device_request::Kind as RequestKind;
 use std::future::Future;
 use std::pin::Pin;
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 use std::task::{Context, Poll, ready};
 use tokio_stream::Stream;
 use tokio_util::sync::WaitForCancellationFutureOwned;
@@ -34,11 +32,7 @@ pub(super) struct TrialStream {
     shared: Arc<Shared>,
     requests: Streaming<proto::DeviceRequest>,
     ending: Pin<Box<WaitForCancellationFutureOwned>>,
-    session: Option<Arc<Session>>,
-    /// Its number among the streams of that session.
-    number: u64,
-    /// Whether the session ends with this stream.
-    owned: bool,
+    joined: Joined,
     /// A session that is being woken, to be joined.
     waking: Option<Running<Result<Arc<Session>, Status>>>,
     running: Option<Running<Option<ReplyKind>>>,
@@ -50,12 +44,10 @@ impl TrialStream {
     pub(super) fn new(shared: Arc<Shared>, requests: Streaming<proto::DeviceRequest>) -> Self {
         let ending = Box::pin(shared.shutdown.ending.clone().cancelled_owned());
         Self {
+            joined: Joined::none(&shared),
             shared,
             requests,
             ending,
-            session: None,
-            number: 0,
-            owned: false,
             waking: None,
             running: None,
             finished: false,
@@ -65,31 +57,17 @@ impl TrialStream {
 
     /// Starts on a request: a reply at once, none (an accept), or a thread in `running`.
     fn take(&mut self, request: proto::DeviceRequest) -> Option<ReplyKind> {
-        self.shared.metrics.trials.fetch_add(1, Ordering::Relaxed);
-        let question = match request.kind {
-            Some(RequestKind::Open(open)) => {
-                return self.enter(&open).map_or_else(|s| Some(refused(&s)), |()| self.ask(Question::Open(open)));
-            }
-            Some(RequestKind::Attach(attach)) => return self.attach(attach.session),
-            Some(RequestKind::Trial(trial)) => Question::Trial(trial),
-            Some(RequestKind::Accept(accept)) => Question::Accept(accept, self.number),
-            Some(RequestKind::Linearize(request)) => {
-                let limits = &self.shared.limits;
-                let bound = |session: &Arc<Session>| session.bound_small_signals(1, request.noise, limits);
-                if let Some(Err(status)) = self.session.as_ref().map(bound) {
-                    return Some(refused(&status));
-                }
-                Question::Linearize(request)
-            }
-            None => return Some(refused(&Status::invalid_argument("a request without a kind"))),
-        };
-        self.ask(question)
+        match self.joined.question(request) {
+            Ok(Next::Ask(question)) => self.ask(question),
+            Ok(Next::Attach(id)) => self.attach(id),
+            Err(refusal) => Some(refusal),
+        }
     }
 
     fn ask(&mut self, question: Question) -> Option<ReplyKind> {
-        let Some(session) = &self.session else {
-            let fault = super::convert::device::fault_to_wire(&crate::device::DeviceError::NotOpen);
-            return (!question.is_silent()).then_some(ReplyKind::Fault(fault));
+        let session = match self.joined.session(&question) {
+            Ok(session) => session,
+            Err(refusal) => return refusal,
         };
         if let Ok(reply) = session.answer_at_once(&question) {
             return reply;
@@ -99,60 +77,16 @@ impl TrialStream {
         None
     }
 
-    /// Makes sure there is a session for this model: a second open of the same model is only a new epoch.
-    fn enter(&mut self, open: &proto::OpenRequest) -> Result<(), Status> {
-        let shared = Arc::clone(&self.shared);
-        let limits = &shared.limits;
-        answerable(open, 0, limits)?;
-        let alive = |session: &Arc<Session>| session.model().id() == open.model && !session.is_closed();
-        if self.session.as_ref().is_some_and(alive) {
-            return Ok(());
-        }
-        self.leave();
-        let model = shared.models.get(&open.model)?;
-        answerable(open, model.compiled.parts.system.electrics.ports, limits)?;
-        let session = Session::new(shared.sessions.id(limits)?, None, &model, shared.make, limits)?;
-        let session = shared.sessions.admit(session, limits)?;
-        self.number = session.usage.hold();
-        self.session = Some(session);
-        self.owned = true;
-        Ok(())
-    }
-
     /// Joins a session: at once where it is here, else when it has been woken.
     fn attach(&mut self, id: String) -> Option<ReplyKind> {
         let here = self.shared.sessions.get(&id);
         if here.is_ok() || self.shared.store.is_none() {
-            return Some(self.join(here));
+            return Some(self.joined.join(here));
         }
         let shared = Arc::clone(&self.shared);
         let woken = async move { shared.session(&id).await };
         self.waking = Some(Box::pin(CLIENT.scope(self.client, woken)));
         None
-    }
-
-    fn join(&mut self, session: Result<Arc<Session>, Status>) -> ReplyKind {
-        match session {
-            Ok(session) => {
-                self.leave();
-                // first: what an earlier stream accepts from here on is refused, and not told
-                self.number = session.usage.hold();
-                let opened = session.opened();
-                self.session = Some(session);
-                ReplyKind::Opened(opened)
-            }
-            Err(status) => refused(&status),
-        }
-    }
-
-    fn leave(&mut self) {
-        if let Some(session) = self.session.take() {
-            session.usage.release();
-            if self.owned {
-                self.shared.sessions.close(session.id());
-            }
-        }
-        self.owned = false;
     }
 }
 
@@ -168,12 +102,6 @@ async fn later(shared: Arc<Shared>, session: Arc<Session>, question: Question) -
         Ok(session.answer(&question, budget))
     };
     shared.trials.run_with(job).await.unwrap_or_else(|status| (!silent).then(|| refused(&status)))
-}
-
-impl Drop for TrialStream {
-    fn drop(&mut self) {
-        self.leave();
-    }
 }
 
 impl Stream for TrialStream {
@@ -192,7 +120,7 @@ impl Stream for TrialStream {
             let reply = if let Some(waking) = &mut this.waking {
                 let woken = ready!(waking.as_mut().poll(cx));
                 this.waking = None;
-                Some(this.join(woken))
+                Some(this.joined.join(woken))
             } else if let Some(running) = &mut this.running {
                 let reply = ready!(running.as_mut().poll(cx));
                 this.running = None;

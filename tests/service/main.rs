@@ -9,6 +9,7 @@ mod cut_sweeps;
 mod cuts;
 mod echo;
 mod endings;
+mod inside;
 mod kept;
 mod limits;
 mod listening;

@@ -159,12 +159,11 @@ def test_a_call_that_takes_too_long_takes_nothing_away(program: str, tmp_path: P
             expected = [whole.step(drive(k), DT) for k in range(3)]
         session = model.session(["m.x"], kept=True)
         assert session.step(drive(0), DT) == expected[0]
-        session._timeout = 0.3
+        session._line.timeout = 0.3
         process.send_signal(signal.SIGSTOP)
         with pytest.raises(bimorph.Unavailable, match="no answer within"):
             session.step(drive(1), DT)
         process.send_signal(signal.SIGCONT)
-        session._timeout = 20.0
         session = session.resume()
         assert [session.step(drive(k), DT) for k in (1, 2)] == expected[1:]
     finally:

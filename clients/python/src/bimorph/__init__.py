@@ -1,13 +1,14 @@
 """Client of the Bimorph device-model server.
 
 ``Client`` talks to a server, ``Model`` is a compiled netlist on it, ``Session`` one device with states that a circuit
-or a test bench steps. ``serve()`` starts a server for the time of a ``with`` block. All quantities are SI: m, rad, s,
+or a test bench steps. ``serve()`` starts a server for the time of a ``with`` block, ``local()`` has models in this process. All quantities are SI: m, rad, s,
 V, A, C, K, Hz.
 """
 
 import importlib.metadata
 
-from .client import Client, Model
+from . import aio
+from .client import Client, local
 from .conversion import Conversion, LayoutWarning, Piece
 from .errors import (
     BimorphError,
@@ -23,6 +24,7 @@ from .errors import (
     Violation,
 )
 from .executors import sweep_on
+from .model import Model
 from .netlist import Netlist
 from .options import Options
 from .results import (
@@ -83,6 +85,8 @@ __all__ = [
     "Unavailable",
     "Uniform",
     "Violation",
+    "aio",
+    "local",
     "serve",
     "sweep_on",
 ]

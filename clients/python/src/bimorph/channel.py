@@ -21,6 +21,8 @@ import grpc
 
 from .access import Access, is_secure, target
 from .errors import BimorphError, Unavailable, from_rpc
+from .line import Line
+from .stopping import current
 from .v1 import model_pb2, service_pb2_grpc
 
 T = TypeVar("T")
@@ -129,8 +131,16 @@ class Channel:
 
     def call(self, method: str, request: Any) -> Any:
         """A unary call within the timeout."""
-        stub = self.stub
-        answer = self.guard(lambda: getattr(stub, method)(request, timeout=self.timeout, metadata=self.metadata))
+        ask, stopping = getattr(self.stub, method), current.get()
+
+        def wait() -> Any:
+            if stopping is None:
+                return ask(request, timeout=self.timeout, metadata=self.metadata)
+            future = ask.future(request, timeout=self.timeout, metadata=self.metadata)
+            stopping.begun(future.cancel)
+            return future.result()
+
+        answer = self.guard(wait)
         connection = self._connection
         if connection is not None and not connection.compared:
             connection.compared = True
@@ -152,6 +162,9 @@ class Channel:
         """A call with many answers; left early, it is cancelled."""
         stub = self.stub
         call = self.guard(lambda: getattr(stub, method)(request, metadata=self.metadata))
+        stopping = current.get()
+        if stopping is not None:
+            stopping.begun(call.cancel)
         try:
             while True:
                 try:
@@ -164,6 +177,10 @@ class Channel:
                 raise failure
         finally:
             call.cancel()
+
+    def line(self, timeout: float) -> Line:
+        """Questions to one device, each with a reply within ``timeout`` [s]."""
+        return Line(self, timeout)
 
     def persist(self, ask: Callable[[Callable[[], None]], T]) -> T:
         """Asks again where the network fails. ``ask`` is given what to call when it hears that things go on.
@@ -192,6 +209,8 @@ class Channel:
         """
         try:
             return call()
+        except grpc.FutureCancelledError:
+            failure = BimorphError("cancelled: stopped here")
         except grpc.RpcError as error:
             failure = from_rpc(error, self.address)
         raise failure

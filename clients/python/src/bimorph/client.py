@@ -2,44 +2,37 @@
 
 from __future__ import annotations
 
-import math
 import os
 import uuid
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Literal
-
-import numpy as np
+from typing import TYPE_CHECKING, Any
 
 from . import sweep as sweeps
 from .access import Access
 from .channel import Channel
 from .conversion import LAYOUTS, Conversion, LayoutWarning, Piece
-from .errors import Diagnostic, InvalidRequest, NetlistError, NotFound, Unavailable
+from .errors import InvalidRequest, NetlistError
+from .local import ADDRESS, LocalChannel
+from .messages import diagnostic, options_to_wire
+from .model import Model
 from .netlist import Netlist
-from .options import WIRE, Options
-from .results import FrequencyResponse, ModesResult, NodeMotion, PullInResult, Root, StaticResult, TransientResult
-from .session import Session, Snapshot, Ticket, _opened, _resumed
+from .options import Options
+from .session import Session, Ticket, resumed
 from .sweep_handle import Sweep
-from .v1 import analysis_pb2, device_pb2, model_pb2, sweep_pb2
-from .waveforms import Waveform, drive, told
+from .v1 import model_pb2, sweep_pb2
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
-
-Voltages = Mapping[str, float]
-"""Port voltages by name [V]; ports not named are at 0 V."""
-
-_MANY = 8
-"""Segments of every beam in a run that another one is compared with: four times what a slender beam has without being told."""
 
 
 class Client:
     """A server.
 
-    ``address`` is ``unix:///path``, ``host:port`` or, with TLS, ``https://host:port``. ``timeout`` [s] bounds each unary call. The
+    ``address`` is ``unix:///path``, ``host:port`` or, with TLS, ``https://host:port``; ``local:`` is this process (:func:`local`).
+    ``timeout`` [s] bounds each unary call. The
     connection is made when it is first needed, again in each process: a client may be used after a fork, and sent to worker
     processes.
 
@@ -59,6 +52,9 @@ class Client:
         client_cert: str | os.PathLike[str] | None = None,
         client_key: str | os.PathLike[str] | None = None,
     ) -> None:
+        if address == ADDRESS:
+            self._channel: Channel = LocalChannel()
+            return
         files = [None if file is None else os.fspath(file) for file in (ca, token_file, client_cert, client_key)]
         self._channel = Channel(address, timeout, Access(files[0], files[1], files[2], files[3], token))
 
@@ -127,7 +123,7 @@ class Client:
         Raises :class:`NetlistError` with all diagnostics.
         """
         bundle = self._bundle(netlist, include)
-        wire = _options(set or {}, options)
+        wire = options_to_wire(set or {}, options)
         request = model_pb2.CompileRequest(bundle=bundle, options=wire)
         try:
             answer = self._channel.call("Compile", request)
@@ -136,7 +132,7 @@ class Client:
             checked = self._channel.call("Check", model_pb2.CheckRequest(bundle=bundle, options=wire))
             if checked.ok:
                 raise
-            diagnostics = [_diagnostic(d) for d in checked.diagnostics]
+            diagnostics = [diagnostic(d) for d in checked.diagnostics]
             raise NetlistError(checked.rendered, error.violations, diagnostics) from None
         return Model(self._channel, answer.model, request)
 
@@ -178,7 +174,7 @@ class Client:
         """Starts a :meth:`sweep` and comes back at once: ``wait()`` has its table, and its ``id`` finds it again (:meth:`attach`)."""
         request = sweep_pb2.SubmitSweepRequest(
             bundle=self._bundle(netlist, include),
-            options=_options(set or {}, options),
+            options=options_to_wire(set or {}, options),
             spec=sweeps.to_wire(parameters, analysis, shard, samples),
             # an answer that is lost starts no second sweep
             request_id=uuid.uuid4().hex,
@@ -211,7 +207,7 @@ class Client:
         Raises :class:`NotFound` when the session is not kept (any more), :class:`NoResult` when its states are of another version
         of the server. Whatever this raises, what is kept stays.
         """
-        return _resumed(self._channel, ticket, timeout)
+        return resumed(self._channel, ticket, timeout)
 
     def close(self) -> None:
         """Closes the connection. The client may be used again."""
@@ -226,308 +222,12 @@ class Client:
         self.close()
 
 
-class Model:
-    """A compiled netlist on a server. Make one with :meth:`Client.compile`.
+def local() -> Client:
+    """Models in this process: no server and no network, the same calls, bits and errors as with one. A step of a small model costs
+    some ten microseconds, and analyses let other threads run.
 
-    It may be sent to worker processes. A server that has forgotten it, or was started anew, is given the netlist again.
+    A fault in the process is one of the program's; what must go on regardless belongs on a server.
+
+    Raises :class:`BimorphError` where the package was installed without it (``make wheel``).
     """
-
-    def __init__(self, channel: Channel, description: Any, source: Any) -> None:
-        self._channel = channel
-        self._description = description
-        self._source = source
-        self.id: str = description.id
-        """Hash of text and options."""
-        self.ports: tuple[str, ...] = tuple(description.ports)
-        """Ports, in netlist order."""
-        self.nodes: tuple[str, ...] = tuple(description.nodes)
-        """Mechanical nodes. Signals are ``NODE.x`` [m], ``NODE.y`` [m], ``NODE.rz`` [rad], and their rates."""
-        self.unknowns: int = description.unknowns
-        """Mechanical unknowns."""
-        self.parameters: dict[str, float | str] = {p.name: _setting_value(p) for p in description.parameters}
-        """Netlist parameters with the values they took [SI]."""
-        self.warnings: tuple[Diagnostic, ...] = tuple(_diagnostic(d) for d in description.warnings)
-        """Warnings of the netlist."""
-
-    def __getstate__(self) -> dict[str, Any]:
-        description, source = self._description.SerializeToString(), self._source.SerializeToString()
-        return {"channel": self._channel, "description": description, "source": source}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        description = model_pb2.ModelDescription.FromString(state["description"])
-        source = model_pb2.CompileRequest.FromString(state["source"])
-        self.__init__(state["channel"], description, source)  # type: ignore[misc]
-
-    def _call(self, method: str, request: Any) -> Any:
-        """A call about this model, which the server may have forgotten: the same netlist gives the same model."""
-        try:
-            return self._channel.call(method, request)
-        except NotFound:
-            self._channel.call("Compile", self._source)
-            return self._channel.call(method, request)
-
-    def _tol(self) -> float:
-        """Its tolerance [1]."""
-        options = self._source.options
-        return float(options.tol) if options.HasField("tol") else 1e-3
-
-    def _finer(self) -> Model:
-        """The same netlist with a tenth of the tolerance, on a mesh that this refines, or on twice the segments, or on many."""
-        source = model_pb2.CompileRequest()
-        source.CopyFrom(self._source)
-        source.options.tol = 0.1 * self._tol()
-        if not source.options.HasField("band_hz") or source.options.HasField("segments"):
-            source.options.segments = 2 * source.options.segments or _MANY
-        return Model(self._channel, self._channel.call("Compile", source).model, source)
-
-    def __repr__(self) -> str:
-        return f"Model({self.id[:8]}…, ports={list(self.ports)}, {self.unknowns} unknowns)"
-
-    def static(self, voltages: Voltages | None = None) -> StaticResult:
-        """Static equilibrium reached from rest at these port voltages [V]."""
-        request = analysis_pb2.StaticRequest(model=self.id, voltages=_named(voltages))
-        answer = self._call("Static", request)
-        return StaticResult(
-            nodes={n.name: NodeMotion(n.x, n.y, n.rz) for n in answer.nodes},
-            temperatures_k=_dict(answer.temperatures_k),
-            currents_a=_dict(answer.currents_a),
-            charges_c=_dict(answer.charges_c),
-            pulled_in=answer.pulled_in,
-            unknowns=answer.unknowns,
-            iterations=answer.iterations,
-            estimated_error=_estimate(answer),
-            jumped=answer.jumped,
-            warnings=tuple(answer.warnings),
-            free_motions=tuple(answer.free_motions),
-        )
-
-    def modes(self, count: int = 6, voltages: Voltages | None = None) -> ModesResult:
-        """The ``count`` lowest modes about the equilibrium at these port voltages [V]."""
-        request = analysis_pb2.ModesRequest(model=self.id, count=count, voltages=_named(voltages))
-        answer = self._call("Modes", request)
-        shapes = [
-            {name: NodeMotion(x, y, rz) for name, x, y, rz in zip(answer.nodes, s.x, s.y, s.rz)}
-            for s in answer.shapes
-        ]
-        return ModesResult(
-            list(answer.frequencies_hz),
-            list(answer.residuals),
-            shapes,
-            answer.unknowns,
-            [None if math.isnan(e) else e for e in answer.errors],
-            answer.deflection_m,
-            tuple(answer.warnings),
-            _estimate(answer),
-        )
-
-    def ac(
-        self,
-        drive: str,
-        signals: Sequence[str] = (),
-        *,
-        start: float,
-        stop: float,
-        points: int = 201,
-        spacing: Literal["log", "decade", "linear"] = "log",
-        even: bool = False,
-        by_modes: bool = False,
-        modes: int = 0,
-        voltages: Voltages | None = None,
-    ) -> FrequencyResponse:
-        """What a small sinusoid at one place does from ``start`` to ``stop`` [Hz], about the equilibrium at these port voltages [V].
-
-        ``drive`` is ``NODE.fx``, ``NODE.fy`` [N], ``NODE.m`` [N·m], a port [V], ``BEAM.T`` (heat) [W], ``frame.ax``, ``frame.ay`` [m/s²]
-        or ``frame.wz`` [rad/s]. ``signals`` are those of ``transient``, and ``PORT.i``, the current into a port [A]; none: what the driven
-        place itself answers. ``points`` frequencies have equal quotients (``"log"``), equal differences (``"linear"``), or are so many in a
-        ``"decade"``; more are added about resonances and zeros unless ``even``. ``by_modes`` sums over modes with static correction, the
-        ``modes`` lowest or, with 0, those to twice ``stop``; else each frequency is exact.
-        """
-        kinds: dict[str, Any] = {"log": 0, "decade": 1, "linear": 2}
-        if spacing not in kinds:
-            raise InvalidRequest(f'spacing: expected "log", "decade" or "linear", got {spacing!r}')
-        request = analysis_pb2.FrequencyResponseRequest(
-            model=self.id,
-            drive=drive,
-            signals=signals,
-            from_hz=start,
-            to_hz=stop,
-            points=points,
-            spacing=kinds[spacing],
-            even=even,
-            by_modes=by_modes,
-            modes=modes,
-            voltages=_named(voltages),
-        )
-        answer = self._call("FrequencyResponse", request)
-
-        def roots(wire: Iterable[Any]) -> list[Root]:
-            return [Root(complex(root.re, root.im)) for root in wire]
-
-        return FrequencyResponse(
-            drive=drive,
-            drive_unit=answer.drive_unit,
-            frequencies_hz=np.array(answer.frequencies_hz, dtype=np.float64),
-            signals={s.name: np.array(s.re, dtype=np.float64) + 1j * np.array(s.im, dtype=np.float64) for s in answer.signals},
-            units={s.name: s.unit for s in answer.signals},
-            at_rest={s.name: s.at_rest if s.HasField("at_rest") else None for s in answer.signals},
-            poles=roots(answer.poles) if answer.poles_known else None,
-            zeros={s.name: roots(s.zeros) if s.zeros_known else None for s in answer.signals},
-            points_added=answer.points_added,
-            modes=answer.modes or None,
-            modal_error=answer.modal_error if answer.HasField("modal_error") else None,
-            unknowns=answer.unknowns,
-            estimated_error=_estimate(answer),
-            warnings=tuple(answer.warnings),
-        )
-
-    def pull_in(self, max_v: float, port: str = "") -> PullInResult:
-        """Pull-in and release voltage [V] of ``port`` (default: the first), looking up to ``max_v`` [V]."""
-        request = analysis_pb2.PullInRequest(model=self.id, port=port, max_v=max_v)
-        answer = self._call("PullIn", request)
-        release = answer.release_v if answer.HasField("release_v") else None
-        warnings = tuple(answer.warnings)
-        return PullInResult(answer.port, answer.pull_in_v, release, _estimate(answer), not answer.unheld, warnings)
-
-    def transient(
-        self,
-        stop: float,
-        signals: Sequence[str],
-        *,
-        points: int = 1001,
-        tol: float = 0.0,
-        voltages: Voltages | None = None,
-        inputs: Mapping[str, Waveform] | None = None,
-        estimate: bool = True,
-        release: Model | None = None,
-        progress: Callable[[float], object] | None = None,
-    ) -> TransientResult:
-        """Motion from 0 to ``stop`` [s] with port voltages held [V], at ``points`` equally spaced times.
-
-        ``release`` is a variant of the same netlist whose static equilibrium is the initial state; without it the part
-        starts at rest as drawn. ``tol`` is the relative error of a step [1], 0: the model's; the mesh holds the
-        smaller of the two. ``progress`` is told the
-        fraction done.
-
-        ``inputs`` are waveforms of ports, ``{"heat": (times, volts)}``: straight lines between corners, constant before and after. The
-        run then begins in the static equilibrium at 0, and its steps end at every corner. How far mesh and steps may be off is seen from
-        a run on a finer mesh with a tenth of ``tol``, which costs several times as much: ``estimate=False`` leaves it out.
-        """
-        if inputs is not None:
-            if release is not None or tol:
-                raise ValueError("a run along inputs begins in their equilibrium, with the model's own tolerance: no release, no tol")
-            held: dict[str, Waveform] = {port: ([0.0], [volts]) for port, volts in (voltages or {}).items()}
-            waves = {**held, **inputs}
-            with self.session(signals=signals) as session:
-                found = drive(session, waves, stop, points, progress)
-            if not estimate:
-                return told(found, None, self._tol())
-            with self._finer().session(signals=signals) as session:
-                return told(found, drive(session, waves, stop, points), self._tol())
-        request = analysis_pb2.TransientRequest(
-            model=self.id,
-            stop_s=stop,
-            signals=signals,
-            points=points,
-            tol=tol,
-            voltages=_named(voltages),
-            release_model=release.id if release else "",
-        )
-        for model in (self, release):
-            if model is not None:
-                model._describe()
-        t: list[float] = []
-        columns: list[list[float]] = [[] for _ in signals]
-        for event in self._channel.stream("Transient", request):
-            if progress is not None:
-                progress(event.progress)
-            if event.HasField("samples"):
-                t.extend(event.samples.t)
-                for column, more in zip(columns, event.samples.signals):
-                    column.extend(more.values)
-            if event.HasField("finished"):
-                end = event.finished
-                named = {name: np.array(column) for name, column in zip(signals, columns)}
-                units = dict(zip(signals, end.units))
-                work = (end.steps, end.rejected, end.unknowns)
-                step_error = end.step_error if end.HasField("step_error") else None
-                return TransientResult(np.array(t), named, units, *work, _estimate(end), tuple(end.warnings), step_error)
-        raise Unavailable(f"server {self._channel.address}: the stream ended before the run did")
-
-    def session(
-        self,
-        signals: Sequence[str] = (),
-        ports: Sequence[str] = (),
-        timeout: float = 60.0,
-        *,
-        seed: int | None = None,
-        noise_band: float | None = None,
-        kept: bool = False,
-    ) -> Session:
-        """Opens a device to be stepped; use it in a ``with`` block.
-
-        ``signals`` are read with every reply. ``ports`` chooses ports and their order: those of the netlist, ``NODE.x``, ``.y``
-        and ``.rz`` (a force or moment is given, the displacement answered), ``NODE.vx``, ``.vy`` and ``.vrz`` (answered with the
-        velocity), ``BEAM.T`` (heat), ``frame.ax``, ``.ay`` and ``.wz`` (acceleration and rate of the
-        frame). Those left out are held at 0 V, or
-        free.
-        ``timeout`` [s] bounds each call. With a ``seed``, warm gas and dampers shake the mechanism in every step, the same way for the
-        same seed; ``noise_band`` [Hz] is the band of their force, by default twenty times the lowest natural frequency. Steps
-        are then taken in pieces of at most two cells of 1/(2·band).
-        A ``kept`` session outlives its connection for a time (:meth:`Session.resume`), and the server, where that keeps states
-        (``bimorph serve --state-dir``).
-        """
-        self._describe()
-        if seed is None and noise_band is not None:
-            raise ValueError("noise_band says nothing without a seed")
-        noise = None if seed is None else device_pb2.Agitation(seed=seed, band_hz=noise_band)
-        if kept:
-            opened = self._call("Open", device_pb2.OpenRequest(model=self.id, ports=ports, signals=signals, noise=noise))
-            return _opened(self._channel, self.id, timeout, opened.session)
-        return Session(self._channel, self.id, tuple(ports), tuple(signals), timeout, noise=noise)
-
-    def restore(self, snapshot: Snapshot, timeout: float = 60.0) -> Session:
-        """Opens a device that goes on from a :meth:`Session.snapshot` of this model, with the same bits.
-
-        Raises :class:`NoResult` for a snapshot of another model or another version of the server.
-        """
-        request = device_pb2.RestoreRequest(model=self.id, snapshot=snapshot.states)
-        opened = self._call("Restore", request)
-        session = _opened(self._channel, self.id, timeout, opened.session)
-        session.accepted, session.t, session._voltages = snapshot.accepted, snapshot.t, dict(snapshot.voltages)
-        return session
-
-    def _describe(self) -> None:
-        """Makes sure that the server has this model."""
-        self._call("Describe", model_pb2.DescribeRequest(model=self.id))
-
-
-def _estimate(answer: Any) -> float | None:
-    return answer.estimated_error if answer.HasField("estimated_error") else None
-
-
-def _options(settings: Mapping[str, float | str], options: Mapping[str, Any]) -> Any:
-    unknown = [name for name in options if name not in WIRE]
-    if unknown:
-        raise TypeError(f"no option {unknown[0]!r}; there are {', '.join(WIRE)}")
-    given = {WIRE[name]: value for name, value in options.items() if value is not None}
-    return model_pb2.CompileOptions(
-        set=[sweeps.setting(name, value) for name, value in settings.items()], **given
-    )
-
-
-def _setting_value(setting: Any) -> float | str:
-    value: float | str = setting.number if setting.WhichOneof("value") == "number" else setting.text
-    return value
-
-
-def _diagnostic(d: Any) -> Diagnostic:
-    severity = "error" if d.severity == model_pb2.Diagnostic.SEVERITY_ERROR else "warning"
-    return Diagnostic(d.code, severity, d.file, d.line, d.column, d.message, d.help)
-
-
-def _named(voltages: Voltages | None) -> list[Any]:
-    return [analysis_pb2.Named(name=name, value=value) for name, value in (voltages or {}).items()]
-
-
-def _dict(named: Iterable[Any]) -> dict[str, float]:
-    return {n.name: n.value for n in named}
+    return Client(ADDRESS)

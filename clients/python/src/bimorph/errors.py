@@ -101,21 +101,24 @@ _BY_CODE: dict[grpc.StatusCode, type[BimorphError]] = {
 
 def from_rpc(error: grpc.RpcError, address: str) -> BimorphError:
     """The error that a failed call stands for."""
-    code, text = error.code(), error.details() or ""
-    if code == grpc.StatusCode.INVALID_ARGUMENT:
-        return InvalidRequest(text, violations(error))
-    return _of_code(code, text, address)
+    details = next((value for key, value in error.trailing_metadata() or () if key == "grpc-status-details-bin"), b"")
+    return _of_code(error.code(), error.details() or "", details, address)
 
 
 def from_fault(number: int, text: str, address: str) -> BimorphError:
     """The error that a request stands for which a stream refused with this number of a gRPC code."""
+    return from_status(number, text, b"", address)
+
+
+def from_status(number: int, text: str, details: bytes, address: str) -> BimorphError:
+    """The error that the number of a gRPC code stands for, with a message and ``google.rpc.Status`` as bytes."""
     code = next((code for code in grpc.StatusCode if code.value[0] == number), grpc.StatusCode.UNKNOWN)
+    return _of_code(code, text, details, address)
+
+
+def _of_code(code: grpc.StatusCode, text: str, details: bytes, address: str) -> BimorphError:
     if code == grpc.StatusCode.INVALID_ARGUMENT:
-        return InvalidRequest(text)
-    return _of_code(code, text, address)
-
-
-def _of_code(code: grpc.StatusCode, text: str, address: str) -> BimorphError:
+        return InvalidRequest(text, violations(details))
     kind = _BY_CODE.get(code, BimorphError)
     if kind is Unavailable:
         text = f"server {address}: {text}"
@@ -124,13 +127,11 @@ def _of_code(code: grpc.StatusCode, text: str, address: str) -> BimorphError:
     return kind(text)
 
 
-def violations(error: grpc.RpcError) -> list[Violation]:
-    """The field violations that came with a status."""
+def violations(details: bytes) -> list[Violation]:
+    """The field violations in a ``google.rpc.Status``."""
     found = []
-    for key, value in error.trailing_metadata() or ():
-        if key == "grpc-status-details-bin":
-            for detail in status_pb2.Status.FromString(value).details:
-                bad = error_details_pb2.BadRequest()
-                if detail.Unpack(bad):
-                    found += [Violation(v.field, v.description) for v in bad.field_violations]
+    for detail in status_pb2.Status.FromString(details).details:
+        bad = error_details_pb2.BadRequest()
+        if detail.Unpack(bad):
+            found += [Violation(v.field, v.description) for v in bad.field_violations]
     return found

@@ -2,30 +2,22 @@
 
 from __future__ import annotations
 
-import collections
 import contextlib
 import itertools
 import os
-import queue
 import threading
-import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import TracebackType
-from typing import Any, NamedTuple
-
-import grpc
+from typing import Any
 
 from .channel import Channel
-from .errors import BimorphError, InvalidRequest, NotFound, StepFailed, Unavailable, from_fault, from_rpc
+from .errors import BimorphError, InvalidRequest, NotFound, StepFailed, from_fault
 from .results import NodeMotion, TrialReply
 from .v1 import device_pb2
 
 _SHORTEST = 1e-9
 """A step that would have to be shorter than this fraction of what was asked for has failed."""
-
-_LOOK = 0.2
-"""While a call waits, it looks this often whether the stream is over [s]."""
 
 
 @dataclass(frozen=True)
@@ -87,15 +79,9 @@ class Session:
         self._joined = bool(session)
         self._timeout = timeout
         self._pid = os.getpid()
-        # A step is taken as a whole. Each question has a place for its own reply: that of an interrupted call stays there,
-        # and is not taken for the next.
+        # A step is taken as a whole.
         self._lock = threading.RLock()
-        self._requests: queue.SimpleQueue[_Question | None] = queue.SimpleQueue()
-        self._sent: collections.deque[_Question] = collections.deque()
-        self._over: BimorphError | None = None
-        stub = channel.stub
-        self._call = stub.Trial(self._outgoing(), metadata=channel.metadata)
-        threading.Thread(target=self._receive, args=(self._call,), daemon=True).start()
+        self._line = channel.line(timeout)
         self.t = 0.0
         """Time of the accepted state [s]."""
         self.accepted: TrialReply | None = None
@@ -140,19 +126,16 @@ class Session:
         step.
         """
         with self._lock:
-            return self._trial(voltages, dt, parent or self.accepted)
+            return self._try(self._vector(voltages), dt, parent or self.accepted)
 
-    def _trial(self, voltages: Mapping[str, float], dt: float | None, parent: TrialReply | None) -> TrialReply:
-        transient = dt is not None
-        t = (parent.t if parent else 0.0) + dt if dt is not None else self.t
-        request = device_pb2.TrialRequest(
-            mode=device_pb2.MODE_TRANSIENT if transient else device_pb2.MODE_STATIC,
-            parent=parent.token if parent else 0,
-            t=t,
-            dt=dt or 0.0,
-            voltages=self._vector(voltages),
-        )
-        return self._named(self._ask(device_pb2.DeviceRequest(trial=request)).trial, t)
+    def _try(self, vector: list[float], dt: float | None, parent: TrialReply | None) -> TrialReply:
+        if dt is None:
+            mode, t = device_pb2.MODE_STATIC, self.t
+        else:
+            mode, t = device_pb2.MODE_TRANSIENT, (parent.t if parent else 0.0) + dt
+        token = parent.token if parent else 0
+        trial = device_pb2.TrialRequest(mode=mode, parent=token, t=t, dt=dt or 0.0, voltages=vector)
+        return self._named(self._ask(device_pb2.DeviceRequest(trial=trial)).trial, t)
 
     def accept(self, reply: TrialReply, voltages: Mapping[str, float] | None = None) -> None:
         """Makes a trial's state the one that later trials start from. In a kept session it has outlived the server when this
@@ -160,15 +143,18 @@ class Session:
         if reply.need_dt is not None:
             raise ValueError("a reply that asks for a shorter step has no state to accept")
         with self._lock:
-            kept = self._voltages if voltages is None else dict(zip(self.ports, self._vector(voltages)))
-            if self.kept:
-                # There first, with an answer: the server keeps the state before as well.
-                self._ask(device_pb2.DeviceRequest(accept=device_pb2.Accept(token=reply.token, answer=True)))
-                self.accepted, self.t, self._voltages = reply, reply.t, kept
-                return
-            # Here first: the server only frees memory, and an interrupted call must not leave half of this done.
-            self.accepted, self.t, self._voltages = reply, reply.t, kept
-            self._put(_Question(device_pb2.DeviceRequest(accept=device_pb2.Accept(token=reply.token)), None))
+            self._accept(reply, self._voltages if voltages is None else dict(zip(self.ports, self._vector(voltages))))
+
+    def _accept(self, reply: TrialReply, voltages: dict[str, float]) -> None:
+        if self.kept:
+            # There first, with an answer: the server keeps the state before as well.
+            self._ask(device_pb2.DeviceRequest(accept=device_pb2.Accept(token=reply.token, answer=True)))
+            self.accepted, self.t, self._voltages = reply, reply.t, voltages
+            return
+        # Here first: the server only frees memory, and an interrupted call must not leave half of this done.
+        self.accepted, self.t, self._voltages = reply, reply.t, voltages
+        self._own()
+        self._line.tell(device_pb2.DeviceRequest(accept=device_pb2.Accept(token=reply.token)))
 
     def operating_point(self, voltages: Mapping[str, float]) -> TrialReply:
         """Static equilibrium at these port voltages [V], accepted, at t = 0."""
@@ -183,16 +169,15 @@ class Session:
             return self._step(voltages, dt)
 
     def _step(self, voltages: Mapping[str, float], dt: float) -> TrialReply:
-        start = dict(self._voltages)
-        end = dict(zip(self.ports, self._vector(voltages)))
+        start, end = [self._voltages[port] for port in self.ports], self._vector(voltages)
         done, h = 0.0, 1.0
         while True:
             last = done + h >= 1.0
             h = 1.0 - done if last else h
-            mix = {p: end[p] if last else start[p] + (end[p] - start[p]) * (done + h) for p in self.ports}
-            reply = self.trial(mix, h * dt)
+            mix = end if last else [a + (b - a) * (done + h) for a, b in zip(start, end)]
+            reply = self._try(mix, h * dt, self.accepted)
             if reply.need_dt is None:
-                self.accept(reply, mix)
+                self._accept(reply, dict(zip(self.ports, mix)))
                 if last:
                     return reply
                 done += h
@@ -248,7 +233,7 @@ class Session:
         """Another session that goes on from here by itself; close it as well."""
         with self._lock:
             opened = self._channel.call("Fork", device_pb2.ForkRequest(session=self._session))
-            other = _opened(self._channel, self._model, self._timeout, opened.session)
+            other = opened_just_now(self._channel, self._model, self._timeout, opened.session)
             other.accepted, other.t, other._voltages = self.accepted, self.t, dict(self._voltages)
             return other
 
@@ -265,7 +250,7 @@ class Session:
         """
         with self._lock:
             ticket = self.ticket()
-            other = _resumed(self._channel, ticket, self._timeout)
+            other = resumed(self._channel, ticket, self._timeout)
             self._joined = False
             self.close()
             return other
@@ -273,17 +258,11 @@ class Session:
     def close(self) -> None:
         """Ends the stream; the server forgets the states. Later calls raise."""
         if self._pid == os.getpid():
-            self._hang_up(BimorphError("the session is closed; open another one"))
+            self._line.close(BimorphError("the session is closed; open another one"))
             if self._joined:
                 self._joined = False
                 with contextlib.suppress(BimorphError):
                     self._channel.call("Close", device_pb2.CloseRequest(session=self._session))
-
-    def _hang_up(self, why: BimorphError) -> None:
-        """Ends the stream alone."""
-        self._over = self._over or why
-        self._requests.put(None)
-        self._call.cancel()
 
     def __enter__(self) -> Session:
         return self
@@ -318,18 +297,14 @@ class Session:
             need_dt=need,
         )
 
-    def _put(self, question: _Question) -> None:
+    def _own(self) -> None:
         if self._pid != os.getpid():
             raise BimorphError("a session does not survive a fork; open one in this process")
-        if self._over is not None:
-            raise self._over
-        self._requests.put(question)
 
     def _ask(self, request: Any) -> Any:
-        question = _Question(request, queue.SimpleQueue())
         with self._lock:
-            self._put(question)
-            reply = self._answer(question)
+            self._own()
+            reply = self._line.ask(request)
         if reply.WhichOneof("kind") == "fault":
             fault = reply.fault
             kind = fault.WhichOneof("kind")
@@ -338,43 +313,8 @@ class Session:
             raise (NotFound if kind == "unknown_token" else InvalidRequest)(fault.message)
         return reply
 
-    def _answer(self, question: _Question) -> Any:
-        assert question.replies is not None
-        deadline = time.monotonic() + self._timeout
-        while True:
-            left = deadline - time.monotonic()
-            try:
-                return question.replies.get(timeout=max(min(left, _LOOK), 0.0))
-            except queue.Empty:
-                if self._over is not None and question.replies.empty():
-                    raise self._over from None
-                if left <= 0.0:
-                    # the server may have done what was asked: a kept session is there, to be resumed
-                    self._hang_up(Unavailable(f"server {self._channel.address}: no answer within {self._timeout} s"))
-                    assert self._over is not None
-                    raise self._over from None
 
-    def _outgoing(self) -> Iterator[Any]:
-        for question in iter(self._requests.get, None):
-            if question.replies is not None:
-                self._sent.append(question)
-            yield question.request
-
-    def _receive(self, call: Any) -> None:
-        # The server answers every question but an accept once, in the order in which they were sent.
-        over: BimorphError
-        try:
-            for reply in call:
-                replies = self._sent.popleft().replies
-                if replies is not None:
-                    replies.put(reply)
-            over = Unavailable(f"server {self._channel.address}: the stream has ended")
-        except grpc.RpcError as error:
-            over = from_rpc(error, self._channel.address)
-        self._over = self._over or over
-
-
-def _opened(channel: Channel, model: str, timeout: float, session: str) -> Session:
+def opened_just_now(channel: Channel, model: str, timeout: float, session: str) -> Session:
     """Joins a session that was opened just now; it is closed where that fails, as nobody knows of it."""
     try:
         return Session(channel, model, (), (), timeout, session)
@@ -384,17 +324,10 @@ def _opened(channel: Channel, model: str, timeout: float, session: str) -> Sessi
         raise
 
 
-def _resumed(channel: Channel, ticket: Ticket, timeout: float) -> Session:
+def resumed(channel: Channel, ticket: Ticket, timeout: float) -> Session:
     session = Session(channel, ticket.model, (), (), timeout, ticket.session)
     session.accepted, session.t, session._voltages = ticket.accepted, ticket.t, dict(ticket.voltages)
     return session
-
-
-class _Question(NamedTuple):
-    """A request, and where its reply goes; none: it has no reply."""
-
-    request: Any
-    replies: queue.SimpleQueue[Any] | None
 
 
 def _kind(number: int) -> str:

@@ -1,0 +1,103 @@
+"""Questions to one device, and their replies: over a stream of a server."""
+
+from __future__ import annotations
+
+import collections
+import queue
+import threading
+import time
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import grpc
+
+from .errors import BimorphError, Unavailable, from_rpc
+
+if TYPE_CHECKING:
+    from .channel import Channel
+
+_LOOK = 0.2
+"""While a call waits, it looks this often whether the stream is over [s]."""
+
+
+class Line:
+    """A Trial stream of its own.
+
+    Each question has a place for its own reply: that of an interrupted call stays there, and is not taken for the next.
+    """
+
+    def __init__(self, channel: Channel, timeout: float) -> None:
+        """``timeout`` [s] bounds the wait for each reply."""
+        self._address = channel.address
+        self.timeout = timeout
+        """Longest wait for a reply [s]."""
+        self._requests: queue.SimpleQueue[_Question | None] = queue.SimpleQueue()
+        self._sent: collections.deque[_Question] = collections.deque()
+        self.over: BimorphError | None = None
+        """Why it is over; None: it is not."""
+        stub = channel.stub
+        self._call = stub.Trial(self._outgoing(), metadata=channel.metadata)
+        threading.Thread(target=self._receive, args=(self._call,), daemon=True).start()
+
+    def ask(self, request: Any) -> Any:
+        """The reply to a question."""
+        question = _Question(request, queue.SimpleQueue())
+        self._put(question)
+        return self._answer(question)
+
+    def tell(self, request: Any) -> None:
+        """Says what has no reply."""
+        self._put(_Question(request, None))
+
+    def close(self, why: BimorphError) -> None:
+        """Ends the stream: later questions raise ``why``."""
+        self.over = self.over or why
+        self._requests.put(None)
+        self._call.cancel()
+
+    def _put(self, question: _Question) -> None:
+        if self.over is not None:
+            raise self.over
+        self._requests.put(question)
+
+    def _answer(self, question: _Question) -> Any:
+        assert question.replies is not None
+        deadline = time.monotonic() + self.timeout
+        while True:
+            left = deadline - time.monotonic()
+            try:
+                return question.replies.get(timeout=max(min(left, _LOOK), 0.0))
+            except queue.Empty:
+                if self.over is not None and question.replies.empty():
+                    raise self.over from None
+                if left <= 0.0:
+                    # the server may have done what was asked: a kept session is there, to be resumed
+                    self.close(Unavailable(f"server {self._address}: no answer within {self.timeout} s"))
+                    assert self.over is not None
+                    raise self.over from None
+
+    def _outgoing(self) -> Iterator[Any]:
+        for question in iter(self._requests.get, None):
+            if question.replies is not None:
+                self._sent.append(question)
+            yield question.request
+
+    def _receive(self, call: Any) -> None:
+        # The server answers every question but an accept once, in the order in which they were sent.
+        over: BimorphError
+        try:
+            for reply in call:
+                replies = self._sent.popleft().replies
+                if replies is not None:
+                    replies.put(reply)
+            over = Unavailable(f"server {self._address}: the stream has ended")
+        except grpc.RpcError as error:
+            over = from_rpc(error, self._address)
+        self.over = self.over or over
+
+
+class _Question(NamedTuple):
+    """A request, and where its reply goes; none: it has no reply."""
+
+    request: Any
+    replies: queue.SimpleQueue[Any] | None

@@ -1,0 +1,118 @@
+//! The session that a stream of questions is about: opened by it, or joined.
+
+use super::answerable::answerable;
+use super::proto;
+use super::question::Question;
+use super::session::{Session, refused};
+use super::shared::Shared;
+use proto::device_reply::Kind as ReplyKind;
+use proto::device_request::Kind as RequestKind;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use tonic::Status;
+
+/// The session of a stream; left when this goes away.
+pub(super) struct Joined {
+    shared: Arc<Shared>,
+    session: Option<Arc<Session>>,
+    /// The stream's number among those of the session.
+    number: u64,
+    /// Whether the session ends with the stream.
+    owned: bool,
+}
+
+/// What a request comes down to.
+pub(super) enum Next {
+    /// To be asked of the session there is.
+    Ask(Question),
+    /// To join the session of that id.
+    Attach(String),
+}
+
+impl Joined {
+    /// None yet.
+    pub(super) fn none(shared: &Arc<Shared>) -> Self {
+        Self { shared: Arc::clone(shared), session: None, number: 0, owned: false }
+    }
+
+    /// What a request comes down to, or its refusal. One that opens has a session when this returns.
+    pub(super) fn question(&mut self, request: proto::DeviceRequest) -> Result<Next, ReplyKind> {
+        self.shared.metrics.trials.fetch_add(1, Ordering::Relaxed);
+        Ok(Next::Ask(match request.kind {
+            Some(RequestKind::Open(open)) => {
+                self.enter(&open).map_err(|status| refused(&status))?;
+                Question::Open(open)
+            }
+            Some(RequestKind::Attach(attach)) => return Ok(Next::Attach(attach.session)),
+            Some(RequestKind::Trial(trial)) => Question::Trial(trial),
+            Some(RequestKind::Accept(accept)) => Question::Accept(accept, self.number),
+            Some(RequestKind::Linearize(request)) => {
+                if let Some(session) = &self.session {
+                    let bound = session.bound_small_signals(1, request.noise, &self.shared.limits);
+                    bound.map_err(|status| refused(&status))?;
+                }
+                Question::Linearize(request)
+            }
+            None => return Err(refused(&Status::invalid_argument("a request without a kind"))),
+        }))
+    }
+
+    /// Whom to ask, or the refusal where there is no session; none of what has no answer.
+    pub(super) fn session(&self, question: &Question) -> Result<&Arc<Session>, Option<ReplyKind>> {
+        self.session.as_ref().ok_or_else(|| {
+            let fault = super::convert::device::fault_to_wire(&crate::device::DeviceError::NotOpen);
+            (!question.is_silent()).then_some(ReplyKind::Fault(fault))
+        })
+    }
+
+    /// Makes sure there is a session for this model: a second open of the same model is only a new epoch.
+    fn enter(&mut self, open: &proto::OpenRequest) -> Result<(), Status> {
+        let shared = Arc::clone(&self.shared);
+        let limits = &shared.limits;
+        answerable(open, 0, limits)?;
+        let alive = |session: &Arc<Session>| session.model().id() == open.model && !session.is_closed();
+        if self.session.as_ref().is_some_and(alive) {
+            return Ok(());
+        }
+        self.leave();
+        let model = shared.models.get(&open.model)?;
+        answerable(open, model.compiled.parts.system.electrics.ports, limits)?;
+        let session = Session::new(shared.sessions.id(limits)?, None, &model, shared.make, limits)?;
+        let session = shared.sessions.admit(session, limits)?;
+        self.number = session.usage.hold();
+        self.session = Some(session);
+        self.owned = true;
+        Ok(())
+    }
+
+    /// Goes on with a session, in the place of the one before.
+    pub(super) fn join(&mut self, session: Result<Arc<Session>, Status>) -> ReplyKind {
+        match session {
+            Ok(session) => {
+                self.leave();
+                // first: what an earlier stream accepts from here on is refused, and not told
+                self.number = session.usage.hold();
+                let opened = session.opened();
+                self.session = Some(session);
+                ReplyKind::Opened(opened)
+            }
+            Err(status) => refused(&status),
+        }
+    }
+
+    fn leave(&mut self) {
+        if let Some(session) = self.session.take() {
+            session.usage.release();
+            if self.owned {
+                self.shared.sessions.close(session.id());
+            }
+        }
+        self.owned = false;
+    }
+}
+
+impl Drop for Joined {
+    fn drop(&mut self) {
+        self.leave();
+    }
+}

@@ -1,0 +1,109 @@
+//! The service without a network gives what a server gives: the same bytes, the same refusals.
+
+use super::attached::trial;
+use super::cuts::LOCAL;
+use super::running::{block_on, start_with, wire_bundle};
+use bimorph::service::inside::{Inside, Questions};
+use bimorph::service::limits::Limits;
+use bimorph::service::proto;
+use prost::Message;
+use proto::device_reply::Kind as ReplyKind;
+use proto::device_request::Kind as Ask;
+use std::cell::Cell;
+use tonic::Code;
+
+fn call<T: Message + Default>(inside: &Inside, name: &str, request: &impl Message) -> Result<T, tonic::Status> {
+    inside.call(name, &request.encode_to_vec(), &|| true).map(|bytes| T::decode(&*bytes).expect("a message"))
+}
+
+fn ask(questions: &mut Questions, kind: Ask) -> Option<ReplyKind> {
+    let request = proto::DeviceRequest { kind: Some(kind) }.encode_to_vec();
+    let reply = questions.ask(&request).expect("a question")?;
+    proto::DeviceReply::decode(&*reply).expect("a reply").kind
+}
+
+fn compiled(inside: &Inside) -> String {
+    let request = proto::CompileRequest { bundle: wire_bundle(), options: None };
+    call::<proto::CompileResponse>(inside, "Compile", &request).expect("compiles").model.expect("a model").id
+}
+
+/// Models have the same ids, analyses the same numbers, sessions the same replies, and what is refused the same words.
+#[test]
+fn it_says_what_a_server_says() {
+    let inside = Inside::new().expect("a thread");
+    let server = start_with("127.0.0.1:0", Limits::default(), LOCAL);
+    let model = compiled(&inside);
+    let mut questions = inside.questions();
+    block_on(async {
+        let mut client = server.client().await;
+        assert_eq!(super::running::compiled(&mut client).await, model);
+        let voltages = vec![proto::Named { name: "drive".into(), value: 3.0 }];
+        let request = proto::StaticRequest { model: model.clone(), voltages };
+        let there = client.r#static(request.clone()).await.expect("an equilibrium").into_inner();
+        assert_eq!(call::<proto::StaticResponse>(&inside, "Static", &request).expect("an equilibrium"), there);
+        let request = proto::PullInRequest { model: model.clone(), port: "drive".into(), max_v: 1.0 };
+        let there = client.pull_in(request.clone()).await.expect_err("nothing pulls in");
+        let here = call::<proto::PullInResponse>(&inside, "PullIn", &request).expect_err("nothing pulls in");
+        assert_eq!((here.code(), here.message(), here.details()), (there.code(), there.message(), there.details()));
+
+        let open = proto::OpenRequest { model: model.clone(), ..Default::default() };
+        let (mut stream, opened) = {
+            let session = client.open(open.clone()).await.expect("opens").into_inner();
+            super::attached::Attached::join(&mut client, &session.session).await.expect("attaches")
+        };
+        let Some(ReplyKind::Opened(here)) = ask(&mut questions, Ask::Open(open)) else { panic!("opens") };
+        assert_eq!(here.device, opened.device);
+        let mut parent = 0;
+        for step in 0..20 {
+            let question = || trial(parent, if step == 0 { 0.0 } else { 1e-6 }, f64::from(step));
+            let there = stream.ask(question()).await;
+            let here = ask(&mut questions, question()).expect("a reply");
+            assert_eq!(here, there);
+            let ReplyKind::Trial(reply) = here else { panic!("{here:?}") };
+            parent = reply.token;
+            let accept = proto::Accept { token: parent, answer: false };
+            assert_eq!(ask(&mut questions, Ask::Accept(accept)), None);
+            stream.say(Ask::Accept(accept)).await;
+        }
+    });
+}
+
+/// What is not wanted any more stops; names and bytes that mean nothing are refused; a session ends with its questions.
+#[test]
+fn it_stops_and_refuses() {
+    let inside = Inside::new().expect("a thread");
+    let model = compiled(&inside);
+    let transient = proto::TransientRequest { model: model.clone(), stop_s: 1000.0, tol: 1e-9, ..Default::default() };
+    let mut answers = inside.stream("Transient", &transient.encode_to_vec()).expect("begins");
+    let asked = Cell::new(0);
+    let stopped = loop {
+        let wanted = || {
+            asked.set(asked.get() + 1);
+            asked.get() < 3
+        };
+        match answers.next(&wanted) {
+            Ok(Some(_)) => {}
+            other => break other,
+        }
+    };
+    assert_eq!(stopped.expect_err("is stopped").code(), Code::Cancelled);
+    drop(answers);
+    assert_eq!(call::<proto::InfoResponse>(&inside, "NoSuch", &()).expect_err("no call").code(), Code::Unimplemented);
+    assert_eq!(inside.stream("Info", &[]).err().expect("one answer").code(), Code::Unimplemented);
+    let bytes = inside.call("Static", b"\xff", &|| true).expect_err("no message");
+    assert_eq!(bytes.code(), Code::InvalidArgument);
+
+    let mut questions = inside.questions();
+    let Some(ReplyKind::Opened(opened)) =
+        ask(&mut questions, Ask::Open(proto::OpenRequest { model, ..Default::default() }))
+    else {
+        panic!("opens")
+    };
+    let alive = |inside: &Inside| {
+        let request = proto::KeepAliveRequest { session: opened.session.clone(), lease_s: 0.0 };
+        call::<proto::KeepAliveResponse>(inside, "KeepAlive", &request).map_err(|status| status.code())
+    };
+    assert!(alive(&inside).is_ok());
+    drop(questions);
+    assert_eq!(alive(&inside).expect_err("is over"), Code::NotFound);
+}
