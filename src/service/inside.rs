@@ -108,6 +108,7 @@ impl Inside {
     }
 
     fn runtime(&self) -> Result<&Runtime, Status> {
+        not_asynchronous()?;
         self.runtime.as_ref().ok_or_else(status::stopping)
     }
 
@@ -170,6 +171,12 @@ where
     Box::pin(answers.into_inner().map(|answer| answer.map(|answer| answer.encode_to_vec())))
 }
 
+/// Whoever waits here must be on a thread that may wait.
+fn not_asynchronous() -> Result<(), Status> {
+    let text = "the service in process was called from asynchronous code; call it on a thread of its own";
+    Handle::try_current().map_or(Ok(()), |_| Err(Status::failed_precondition(text)))
+}
+
 /// Waits for an answer for as long as it is wanted; what computes it stops when it is not.
 fn wait<T>(
     runtime: &Handle,
@@ -194,6 +201,7 @@ impl Answers {
     /// # Errors
     /// Those of the call; CANCELLED where it is not wanted any more.
     pub fn next(&mut self, waits: &dyn Fn() -> bool) -> Result<Option<Vec<u8>>, Status> {
+        not_asynchronous()?;
         let stream = &mut self.stream;
         wait(&self.runtime, async { stream.next().await.transpose() }, waits)
     }

@@ -1,6 +1,6 @@
 //! The service without a network gives what a server gives: the same bytes, the same refusals.
 
-use super::attached::trial;
+use super::attached::{Attached, trial};
 use super::cuts::LOCAL;
 use super::running::{block_on, start_with, wire_bundle};
 use bimorph::service::inside::{Inside, Questions};
@@ -33,39 +33,49 @@ fn it_says_what_a_server_says() {
     let inside = Inside::new().expect("a thread");
     let server = start_with("127.0.0.1:0", Limits::default(), LOCAL);
     let model = compiled(&inside);
-    let mut questions = inside.questions();
-    block_on(async {
+    let voltages = vec![proto::Named { name: "drive".into(), value: 3.0 }];
+    let statics = proto::StaticRequest { model: model.clone(), voltages };
+    let pull_in = proto::PullInRequest { model: model.clone(), port: "drive".into(), max_v: 1.0 };
+    let open = proto::OpenRequest { model: model.clone(), ..Default::default() };
+    let (there, refused, device, replies) = block_on(async {
         let mut client = server.client().await;
         assert_eq!(super::running::compiled(&mut client).await, model);
-        let voltages = vec![proto::Named { name: "drive".into(), value: 3.0 }];
-        let request = proto::StaticRequest { model: model.clone(), voltages };
-        let there = client.r#static(request.clone()).await.expect("an equilibrium").into_inner();
-        assert_eq!(call::<proto::StaticResponse>(&inside, "Static", &request).expect("an equilibrium"), there);
-        let request = proto::PullInRequest { model: model.clone(), port: "drive".into(), max_v: 1.0 };
-        let there = client.pull_in(request.clone()).await.expect_err("nothing pulls in");
-        let here = call::<proto::PullInResponse>(&inside, "PullIn", &request).expect_err("nothing pulls in");
-        assert_eq!((here.code(), here.message(), here.details()), (there.code(), there.message(), there.details()));
-
-        let open = proto::OpenRequest { model: model.clone(), ..Default::default() };
-        let (mut stream, opened) = {
-            let session = client.open(open.clone()).await.expect("opens").into_inner();
-            super::attached::Attached::join(&mut client, &session.session).await.expect("attaches")
-        };
-        let Some(ReplyKind::Opened(here)) = ask(&mut questions, Ask::Open(open)) else { panic!("opens") };
-        assert_eq!(here.device, opened.device);
-        let mut parent = 0;
+        let there = client.r#static(statics.clone()).await.expect("an equilibrium").into_inner();
+        let refused = client.pull_in(pull_in.clone()).await.expect_err("nothing pulls in");
+        let session = client.open(open.clone()).await.expect("opens").into_inner().session;
+        let (mut stream, opened) = Attached::join(&mut client, &session).await.expect("attaches");
+        let (mut replies, mut parent) = (Vec::new(), 0);
         for step in 0..20 {
-            let question = || trial(parent, if step == 0 { 0.0 } else { 1e-6 }, f64::from(step));
-            let there = stream.ask(question()).await;
-            let here = ask(&mut questions, question()).expect("a reply");
-            assert_eq!(here, there);
-            let ReplyKind::Trial(reply) = here else { panic!("{here:?}") };
+            let reply = stream.trial(parent, dt(step), f64::from(step)).await;
             parent = reply.token;
-            let accept = proto::Accept { token: parent, answer: false };
-            assert_eq!(ask(&mut questions, Ask::Accept(accept)), None);
-            stream.say(Ask::Accept(accept)).await;
+            replies.push(reply);
+            stream.say(Ask::Accept(proto::Accept { token: parent, answer: false })).await;
         }
+        // a thread that may not wait is told so
+        let waits = inside.call("Static", &statics.encode_to_vec(), &|| true).expect_err("asynchronous code");
+        assert_eq!(waits.code(), Code::FailedPrecondition);
+        (there, refused, opened.device, replies)
     });
+    assert_eq!(call::<proto::StaticResponse>(&inside, "Static", &statics).expect("an equilibrium"), there);
+    let here = call::<proto::PullInResponse>(&inside, "PullIn", &pull_in).expect_err("nothing pulls in");
+    assert_eq!((here.code(), here.message(), here.details()), (refused.code(), refused.message(), refused.details()));
+
+    let mut questions = inside.questions();
+    let Some(ReplyKind::Opened(opened)) = ask(&mut questions, Ask::Open(open)) else { panic!("opens") };
+    assert_eq!(opened.device, device);
+    let mut parent = 0;
+    for (step, expected) in (0..).zip(replies) {
+        let token = expected.token;
+        let reply = ask(&mut questions, trial(parent, dt(step), f64::from(step)));
+        assert_eq!(reply, Some(ReplyKind::Trial(expected)));
+        assert_eq!(ask(&mut questions, Ask::Accept(proto::Accept { token, answer: false })), None);
+        parent = token;
+    }
+}
+
+/// Length of a step [s]; the first is static.
+fn dt(step: u32) -> f64 {
+    if step == 0 { 0.0 } else { 1e-6 }
 }
 
 /// What is not wanted any more stops; names and bytes that mean nothing are refused; a session ends with its questions.
@@ -73,7 +83,9 @@ fn it_says_what_a_server_says() {
 fn it_stops_and_refuses() {
     let inside = Inside::new().expect("a thread");
     let model = compiled(&inside);
-    let transient = proto::TransientRequest { model: model.clone(), stop_s: 1000.0, tol: 1e-9, ..Default::default() };
+    let voltages = vec![proto::Named { name: "drive".into(), value: 3.0 }];
+    let transient =
+        proto::TransientRequest { model: model.clone(), stop_s: 1000.0, tol: 1e-9, voltages, ..Default::default() };
     let mut answers = inside.stream("Transient", &transient.encode_to_vec()).expect("begins");
     let asked = Cell::new(0);
     let stopped = loop {
