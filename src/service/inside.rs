@@ -219,13 +219,10 @@ impl Questions {
     }
 
     fn reply(&mut self, request: proto::DeviceRequest) -> Option<ReplyKind> {
-        match self.joined.question(request) {
-            Ok(Next::Ask(question)) => match self.joined.session(&question) {
-                Ok(session) => session.answer(&question, &Budget::new(Allowance::default())),
-                Err(refusal) => refusal,
-            },
-            Ok(Next::Attach(id)) => Some(self.joined.join(self.shared.sessions.get(&id))),
-            Err(refusal) => Some(refusal),
+        match self.joined.next(request) {
+            Next::Ask(session, question) => session.answer(&question, &Budget::new(Allowance::default())),
+            Next::Attach(id) => Some(self.joined.join(self.shared.sessions.get(&id))),
+            Next::Answered(reply) => reply,
         }
     }
 }

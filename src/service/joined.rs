@@ -23,10 +23,12 @@ pub(super) struct Joined {
 
 /// What a request comes down to.
 pub(super) enum Next {
-    /// To be asked of the session there is.
-    Ask(Question),
+    /// To be asked of this session.
+    Ask(Arc<Session>, Question),
     /// To join the session of that id.
     Attach(String),
+    /// A refusal; none of what has no answer.
+    Answered(Option<ReplyKind>),
 }
 
 impl Joined {
@@ -35,34 +37,29 @@ impl Joined {
         Self { shared: Arc::clone(shared), session: None, number: 0, owned: false }
     }
 
-    /// What a request comes down to, or its refusal. One that opens has a session when this returns.
-    pub(super) fn question(&mut self, request: proto::DeviceRequest) -> Result<Next, ReplyKind> {
+    /// What a request comes down to. One that opens has a session when this returns.
+    pub(super) fn next(&mut self, request: proto::DeviceRequest) -> Next {
         self.shared.metrics.trials.fetch_add(1, Ordering::Relaxed);
-        Ok(Next::Ask(match request.kind {
-            Some(RequestKind::Open(open)) => {
-                self.enter(&open).map_err(|status| refused(&status))?;
-                Question::Open(open)
-            }
-            Some(RequestKind::Attach(attach)) => return Ok(Next::Attach(attach.session)),
-            Some(RequestKind::Trial(trial)) => Question::Trial(trial),
-            Some(RequestKind::Accept(accept)) => Question::Accept(accept, self.number),
+        let question = match request.kind {
+            Some(RequestKind::Open(open)) => self.enter(&open).map(|()| Question::Open(open)),
+            Some(RequestKind::Attach(attach)) => return Next::Attach(attach.session),
+            Some(RequestKind::Trial(trial)) => Ok(Question::Trial(trial)),
+            Some(RequestKind::Accept(accept)) => Ok(Question::Accept(accept, self.number)),
             Some(RequestKind::Linearize(request)) => {
-                if let Some(session) = &self.session {
-                    let bound = session.bound_small_signals(1, request.noise, &self.shared.limits);
-                    bound.map_err(|status| refused(&status))?;
-                }
-                Question::Linearize(request)
+                let limits = &self.shared.limits;
+                let bound = self.session.as_ref().map(|session| session.bound_small_signals(1, request.noise, limits));
+                bound.unwrap_or(Ok(())).map(|()| Question::Linearize(request))
             }
-            None => return Err(refused(&Status::invalid_argument("a request without a kind"))),
-        }))
-    }
-
-    /// Whom to ask, or the refusal where there is no session; none of what has no answer.
-    pub(super) fn session(&self, question: &Question) -> Result<&Arc<Session>, Option<ReplyKind>> {
-        self.session.as_ref().ok_or_else(|| {
-            let fault = super::convert::device::fault_to_wire(&crate::device::DeviceError::NotOpen);
-            (!question.is_silent()).then_some(ReplyKind::Fault(fault))
-        })
+            None => Err(Status::invalid_argument("a request without a kind")),
+        };
+        match (question, &self.session) {
+            (Ok(question), Some(session)) => Next::Ask(Arc::clone(session), question),
+            (Ok(question), None) => {
+                let fault = super::convert::device::fault_to_wire(&crate::device::DeviceError::NotOpen);
+                Next::Answered((!question.is_silent()).then_some(ReplyKind::Fault(fault)))
+            }
+            (Err(status), _) => Next::Answered(Some(refused(&status))),
+        }
     }
 
     /// Makes sure there is a session for this model: a second open of the same model is only a new epoch.

@@ -57,22 +57,18 @@ impl TrialStream {
 
     /// Starts on a request: a reply at once, none (an accept), or a thread in `running`.
     fn take(&mut self, request: proto::DeviceRequest) -> Option<ReplyKind> {
-        match self.joined.question(request) {
-            Ok(Next::Ask(question)) => self.ask(question),
-            Ok(Next::Attach(id)) => self.attach(id),
-            Err(refusal) => Some(refusal),
+        match self.joined.next(request) {
+            Next::Ask(session, question) => self.ask(session, question),
+            Next::Attach(id) => self.attach(id),
+            Next::Answered(reply) => reply,
         }
     }
 
-    fn ask(&mut self, question: Question) -> Option<ReplyKind> {
-        let session = match self.joined.session(&question) {
-            Ok(session) => session,
-            Err(refusal) => return refusal,
-        };
+    fn ask(&mut self, session: Arc<Session>, question: Question) -> Option<ReplyKind> {
         if let Ok(reply) = session.answer_at_once(&question) {
             return reply;
         }
-        let later = later(Arc::clone(&self.shared), Arc::clone(session), question);
+        let later = later(Arc::clone(&self.shared), session, question);
         self.running = Some(Box::pin(CLIENT.scope(self.client, later)));
         None
     }
