@@ -6,11 +6,11 @@
 //! extensions are passed over with a note. Shapes outside symbols make a cell `(top)`.
 
 mod error;
+mod shapes;
 mod text;
 
 use super::cells::{Call, Cell, Library, Shape, Text, Transform};
 use super::flatten::MOST_POINTS;
-use super::outline::{self, Style};
 use crate::budget;
 use std::collections::HashMap;
 use text::Reader;
@@ -134,64 +134,6 @@ impl Reading<'_> {
     fn size(&mut self, what: &'static str) -> Read<f64> {
         let value = self.reader.integer()?;
         if value > 0 { Ok(value as f64 * self.scale()) } else { Err(self.reader.error(CifFault::Size { what, value })) }
-    }
-
-    fn points(&mut self, what: &'static str, least: usize, expected: &'static str) -> Read<Vec<[f64; 2]>> {
-        let mut points = Vec::new();
-        while self.reader.number_follows()? {
-            points.push(self.point()?);
-            if points.len() > LONGEST {
-                return Err(self.reader.error(CifFault::Points { what, count: points.len(), expected }));
-            }
-        }
-        if points.len() < least {
-            return Err(self.reader.error(CifFault::Points { what, count: points.len(), expected }));
-        }
-        self.reader.end()?;
-        Ok(points)
-    }
-
-    fn polygon(&mut self) -> Read<()> {
-        self.reader.advance();
-        let points = self.points("a polygon", 3, "3 to 1048576")?;
-        self.add(points)
-    }
-
-    /// B length width x y [direction]: length along the direction.
-    fn block(&mut self) -> Read<()> {
-        self.reader.advance();
-        let [l, w] = [self.size("the length of a box")?, self.size("the width of a box")?].map(|v| v / 2.0);
-        let centre = self.point()?;
-        let mut turn = Transform::IDENTITY;
-        if self.reader.number_follows()? {
-            turn = self.direction()?;
-        }
-        self.reader.end()?;
-        let place = Transform::shift(centre).after(&turn);
-        self.add([[-l, -w], [l, -w], [l, w], [-l, w]].map(|p| place.apply(p)).to_vec())
-    }
-
-    fn direction(&mut self) -> Read<Transform> {
-        let direction = [self.reader.integer()? as f64, self.reader.integer()? as f64];
-        if direction == [0.0; 2] {
-            return Err(self.reader.error(CifFault::Direction));
-        }
-        Ok(Transform::turn(direction))
-    }
-
-    fn wire(&mut self) -> Read<()> {
-        self.reader.advance();
-        let width = self.size("the width of a wire")?;
-        let points = self.points("a wire", 1, "1 to 1048576")?;
-        outline::wire(&points, width, Style::Round).into_iter().try_for_each(|contour| self.add(contour))
-    }
-
-    fn flash(&mut self) -> Read<()> {
-        self.reader.advance();
-        let diameter = self.size("the diameter of a flash")?;
-        let centre = self.point()?;
-        self.reader.end()?;
-        self.add(outline::circle(centre, diameter))
     }
 
     fn layer(&mut self) -> Read<()> {

@@ -2,6 +2,11 @@
 //!
 //! TOML, all numbers SI; docs/layout.md describes it. Two processes travel inside the program ([`Process::builtin`]).
 
+mod error;
+mod file;
+
+pub use error::ProcessError;
+use file::File;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 
@@ -89,92 +94,6 @@ pub struct Metal {
     pub thickness: f64,
     /// Sheet resistance [Ω/square].
     pub sheetresistance: f64,
-}
-
-/// Why there is no process.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum ProcessError {
-    /// Neither a file nor one of those inside.
-    #[error(
-        "there is no process `{name}`: the known ones are {known}; a file of your own is named by its path (ending in .toml)"
-    )]
-    Unknown {
-        /// What was asked for.
-        name: String,
-        /// Names of those inside.
-        known: String,
-    },
-    /// Not TOML, or not a process.
-    #[error("{file}: {message}")]
-    Malformed {
-        /// Name of the file.
-        file: String,
-        /// What is wrong, with line and column.
-        message: String,
-    },
-    /// A number that cannot be.
-    #[error("{file}: {what} is {value}: {expected}")]
-    OutOfRange {
-        /// Name of the file.
-        file: String,
-        /// Which number.
-        what: String,
-        /// Its value.
-        value: f64,
-        /// What it must be.
-        expected: &'static str,
-    },
-    /// A name that leads nowhere, or that is there twice.
-    #[error("{file}: {message}")]
-    Inconsistent {
-        /// Name of the file.
-        file: String,
-        /// What does not fit.
-        message: String,
-    },
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct File {
-    name: String,
-    #[serde(default)]
-    about: String,
-    material: BTreeMap<String, BTreeMap<String, f64>>,
-    layer: Vec<FileLayer>,
-    #[serde(default)]
-    fixed: Vec<Fixed>,
-    metal: Option<Metal>,
-    #[serde(default)]
-    ignored: Ignored,
-}
-
-#[derive(Deserialize, Default)]
-#[serde(deny_unknown_fields)]
-struct Ignored {
-    #[serde(default)]
-    layers: Vec<String>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct FileLayer {
-    name: String,
-    drawn: Vec<String>,
-    thickness: f64,
-    material: String,
-    fluid: Option<f64>,
-    #[serde(default)]
-    anchors: Vec<String>,
-    #[serde(default)]
-    released: Vec<String>,
-    undercut: Option<f64>,
-    #[serde(default)]
-    holes: Vec<String>,
-    #[serde(default)]
-    metal: Vec<String>,
-    largest_hole: Option<f64>,
 }
 
 /// Holes up to this size are etch holes unless the process says otherwise [m]: those of PolyMUMPs and SOI are 3 to 10 µm.
@@ -299,58 +218,6 @@ pub fn canonical(layer: &str) -> String {
 
 fn is_name(text: &str) -> bool {
     text.starts_with(|c: char| c.is_ascii_alphabetic()) && text.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_')
-}
-
-impl FileLayer {
-    fn complete(self, materials: &BTreeMap<String, BTreeMap<String, f64>>, file: &str) -> Result<Layer, ProcessError> {
-        let Some(material) = materials.get(&self.material) else {
-            let known: Vec<&str> = materials.keys().map(String::as_str).collect();
-            let message = format!(
-                "layer `{}` is of `{}`, which is no [material.NAME] of this file; there are: {}",
-                self.name,
-                self.material,
-                known.join(", ")
-            );
-            return Err(ProcessError::Inconsistent { file: file.to_owned(), message });
-        };
-        let length = |what: &str, value: Option<f64>| match value {
-            Some(v) if !(v > 0.0 && v <= THICKEST) => Err(ProcessError::OutOfRange {
-                file: file.to_owned(),
-                what: format!("{what} of layer `{}`", self.name),
-                value: v,
-                expected: "expected metres, above 0 and at most 1e-2 (2 um are 2e-6)",
-            }),
-            other => Ok(other),
-        };
-        let finite = |(name, value): (&String, &f64)| match value.is_finite() {
-            true if is_name(name) => Ok(()),
-            true => Err(ProcessError::Inconsistent {
-                file: file.to_owned(),
-                message: format!("material `{}` has an entry `{name}`: expected a name as in netlists", self.material),
-            }),
-            false => Err(ProcessError::OutOfRange {
-                file: file.to_owned(),
-                what: format!("{name} of material `{}`", self.material),
-                value: *value,
-                expected: "expected a finite number",
-            }),
-        };
-        material.iter().try_for_each(finite)?;
-        length("thickness", Some(self.thickness))?;
-        let (fluid, undercut) = (length("fluid", self.fluid)?, length("undercut", self.undercut)?);
-        let largest_hole = length("largest_hole", self.largest_hole)?.unwrap_or(LARGEST_HOLE);
-        Ok(Layer {
-            name: self.name,
-            drawn: self.drawn,
-            thickness: self.thickness,
-            material: material.clone(),
-            fluid,
-            anchoring: Anchoring { drawn: self.anchors, released: self.released, undercut },
-            holes: self.holes,
-            metal: self.metal,
-            largest_hole,
-        })
-    }
 }
 
 #[cfg(test)]

@@ -1,9 +1,12 @@
 //! A structure as lines: each part as the element that makes it, at its place.
 
+mod circuit;
+mod fields;
+
 use super::{Line, Lines, ProcessLine};
 use crate::sets::Sets;
-use crate::structure::{Beam, BeamGap, CircuitKind, GapVoltage, NodeId, Structure};
-use std::collections::{BTreeMap, HashMap, HashSet};
+use crate::structure::{Beam, BeamGap, NodeId, Structure};
+use std::collections::{HashMap, HashSet};
 
 /// Parts that no line stands for.
 pub(crate) type Left = Vec<String>;
@@ -244,87 +247,6 @@ impl<'a> OfStructure<'a> {
         }
     }
 
-    /// `gap2d` at a fixed voltage brings its two beams with it; gives their names.
-    fn gaps_with_beams(&mut self) -> HashSet<String> {
-        let structure = self.structure;
-        let beams: HashMap<&str, &Beam> = structure.beams.iter().map(|b| (b.name.as_str(), b)).collect();
-        let mut inside = HashSet::new();
-        for gap in &structure.beam_gaps {
-            let GapVoltage::Fixed(voltage) = gap.voltage else { continue };
-            let parts = ["upper", "lower"].map(|part| format!("{}.{part}", gap.name));
-            let (Some(upper), Some(lower)) = (beams.get(parts[0].as_str()), beams.get(parts[1].as_str())) else {
-                self.left.push(format!("the gap `{}` at a fixed voltage without its beams", gap.name));
-                continue;
-            };
-            let process = self.process_of(upper);
-            let mut parameters = vec![("l", gap.length), ("w1", upper.width), ("w2", lower.width), ("gap", gap.gap)];
-            let (nodes, angle) = unmirrored(gap);
-            parameters.extend([("oz", angle), ("V", voltage), ("permittivity", gap.permittivity)]);
-            parameters.extend(gap.touch.map(|t| ("touch", t)));
-            self.push(&gap.name, "gap2d", &process, &nodes, &parameters);
-            inside.extend(parts);
-        }
-        inside
-    }
-
-    fn fields(&mut self) {
-        let structure = self.structure;
-        let turned = |axis: [f64; 2]| ("oz", axis[1].atan2(axis[0]));
-        let across: BTreeMap<(NodeId, NodeId), f64> =
-            structure.beams.iter().flat_map(|b| [((b.a, b.b), b.width), ((b.b, b.a), b.width)]).collect();
-        for comb in &structure.combs {
-            let mut parameters = vec![("N", comb.gaps), ("gap", comb.gap), ("l", comb.overlap), ("L", comb.finger[0])];
-            parameters.extend([("h", comb.height), turned(comb.axis), ("permittivity", comb.permittivity)]);
-            if comb.finger[1] > 0.0 {
-                parameters.push(("w", comb.finger[1]));
-            }
-            let model = match comb.voltage {
-                GapVoltage::Fixed(v) => {
-                    parameters.push(("V", v));
-                    "comb2d"
-                }
-                GapVoltage::Nodes(..) => {
-                    if comb.parasitic != 0.0 {
-                        parameters.push(("Cp", comb.parasitic));
-                    }
-                    "comb2de"
-                }
-            };
-            self.push(&comb.name, model, "*", &[comb.a, comb.b], &parameters);
-        }
-        for gap in structure.beam_gaps.iter().filter(|g| matches!(g.voltage, GapVoltage::Nodes(..))) {
-            let [a, b, c, d] = gap.nodes;
-            let (p, q) = (self.position(a), self.position(c));
-            // Both widths come back from the distance of the centre lines and the width of the beam that is there.
-            let both = 2.0 * ((p[0] - q[0]).hypot(p[1] - q[1]) - gap.gap);
-            let w1 = across.get(&(a, b)).copied();
-            let w2 = across.get(&(c, d)).copied();
-            let w1 = w1.or(w2.map(|w| both - w)).unwrap_or(both / 2.0);
-            let w2 = w2.unwrap_or(both - w1);
-            let mut parameters = vec![("l", gap.length), ("w1", w1), ("w2", w2), ("gap", gap.gap), ("h", gap.height)];
-            let (nodes, angle) = unmirrored(gap);
-            parameters.extend([("oz", angle), ("permittivity", gap.permittivity)]);
-            parameters.extend(gap.touch.map(|t| ("touch", t)));
-            self.push(&gap.name, "gap2dforce", "*", &nodes, &parameters);
-        }
-        for gap in &structure.plate_gaps {
-            if matches!(gap.voltage, GapVoltage::Fixed(_)) {
-                self.left.push(format!("the fixed voltage of `{}`", gap.name));
-            }
-            let mut parameters =
-                vec![("A", gap.area), ("gap", gap.gap), turned(gap.axis), ("permittivity", gap.permittivity)];
-            parameters.extend(gap.touch.map(|t| ("touch", t)));
-            self.push(&gap.name, "plategap2d", "*", &[gap.a, gap.b], &parameters);
-        }
-        for stop in &structure.stops {
-            let mut parameters = vec![("A", stop.area), turned(stop.axis)];
-            let optional = [("gap", stop.ways[0]), ("back", stop.ways[1]), ("k", stop.stiffness)];
-            parameters.extend(optional.into_iter().filter_map(|(n, v)| Some((n, v?))));
-            let nodes: Vec<NodeId> = [Some(stop.a), stop.b].into_iter().flatten().collect();
-            self.push(&stop.name, "stop2d", "*", &nodes, &parameters);
-        }
-    }
-
     fn loads(&mut self) {
         for load in &self.structure.loads {
             if load.name.strip_suffix(".bow").is_some_and(|beam| self.bows.contains_key(beam)) {
@@ -336,48 +258,6 @@ impl<'a> OfStructure<'a> {
                 parameters.push(("M", load.moment));
             }
             self.push(&load.name, "f2d", "*", &[load.node], &parameters);
-        }
-    }
-
-    fn circuit(&mut self) {
-        let structure = self.structure;
-        let drawn: HashSet<&str> = structure.circuit.iter().map(|c| c.name.as_str()).collect();
-        for (k, r) in structure.resistors.iter().enumerate() {
-            if !self.used_resistors.contains(&k) && !drawn.contains(r.name.as_str()) {
-                self.push(&r.name, "R", "*", &[r.a, r.b], &[("R", r.resistance)]);
-            }
-        }
-        for wire in &structure.wires {
-            self.push(&wire.name, "wire", "*", &wire.nodes, &[]);
-        }
-        for source in structure.voltage_sources.iter().filter(|s| !drawn.contains(s.name.as_str())) {
-            self.push(&source.name, "Vsrc", "*", &[source.plus, source.minus], &[("V", source.voltage)]);
-        }
-        for element in &structure.circuit {
-            let (model, parameter) = match element.kind {
-                CircuitKind::Resistor => ("R", "R"),
-                CircuitKind::Capacitor => ("C", "C"),
-                CircuitKind::Inductor => ("L", "L"),
-                CircuitKind::VoltageSource => ("Vsrc", "V"),
-                CircuitKind::CurrentSource => ("Isrc", "I"),
-                CircuitKind::OpAmp => ("opamp", ""),
-                CircuitKind::Amplifier => ("vcvs", "A"),
-            };
-            let value = element.value.map(|v| (parameter, v));
-            self.push(&element.name, model, "*", &element.nodes, value.as_slice());
-        }
-        // in the instance of their node, so that it keeps its name
-        let mut counts: HashMap<&str, usize> = HashMap::new();
-        for ground in &structure.electrical_grounds {
-            let instance = structure.nodes[ground.0].name.rsplit_once('.').map_or("", |(instance, _)| instance);
-            let count = counts.entry(instance).or_default();
-            *count += 1;
-            let dot = if instance.is_empty() { "" } else { "." };
-            self.push(&format!("{instance}{dot}ground{count}"), "eground", "*", &[*ground], &[]);
-        }
-        for port in &structure.ports {
-            let nodes: Vec<NodeId> = [Some(port.plus), port.minus].into_iter().flatten().collect();
-            self.push(&port.name, "port", "*", &nodes, &[]);
         }
     }
 
