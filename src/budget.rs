@@ -10,70 +10,24 @@
 //! value that outlives a stopped computation, as the storage of a device does, must be made anew:
 //! [`Device::recover`](crate::device::Device::recover).
 
+mod allowance;
+mod purse;
+mod stopped;
+
+pub use allowance::Allowance;
+pub use purse::{Purse, WINDOW};
+pub use stopped::Stopped;
+
 use std::cell::{Cell, RefCell};
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
-use thiserror::Error;
 
 /// Checks between two looks at the clock; a look costs some 30 ns.
 const CHECKS_PER_LOOK: u32 = 16;
 /// Time between two looks at the thread's processor time, which the system tells in a file.
 const CPU_INTERVAL: Duration = Duration::from_millis(100);
-
-/// Why a computation was stopped.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
-#[non_exhaustive]
-pub enum Stopped {
-    /// Nobody waits for it any more.
-    #[error("cancelled")]
-    Cancelled,
-    /// Its wall time is over.
-    #[error("its time is over")]
-    Late,
-    /// It used up its processor time.
-    #[error("processor time: at most {seconds} s")]
-    Cpu {
-        /// What it had [s].
-        seconds: u64,
-    },
-    /// It would lay out more than it may.
-    #[error("memory: at most {most} bytes, needs at least {needed}")]
-    Bytes {
-        /// What it may lay out [byte].
-        most: usize,
-        /// What it would have laid out by now [byte].
-        needed: usize,
-    },
-    /// A model with more unknowns than it may have.
-    #[error("unknowns: at most {most}, got at least {got}")]
-    Unknowns {
-        /// What it may have.
-        most: usize,
-        /// What it would have.
-        got: usize,
-    },
-}
-
-/// What a computation may use.
-#[derive(Debug, Clone)]
-pub struct Allowance {
-    /// Bytes that it may lay out, all together.
-    pub bytes: usize,
-    /// Mechanical unknowns of a model that it makes.
-    pub unknowns: usize,
-    /// Processor time of each of its threads; none: any.
-    pub cpu: Option<Duration>,
-    /// When it must have ended; none: any time.
-    pub deadline: Option<Instant>,
-}
-
-impl Default for Allowance {
-    fn default() -> Self {
-        Self { bytes: usize::MAX, unknowns: usize::MAX, cpu: None, deadline: None }
-    }
-}
 
 /// An allowance with what was used of it. Clones are the same budget.
 #[derive(Debug, Clone)]
@@ -85,6 +39,14 @@ struct Shared {
     used: AtomicUsize,
     /// 0 while it may go on; shared with budgets that are parts of one another.
     order: Arc<AtomicU8>,
+}
+
+impl Drop for Shared {
+    fn drop(&mut self) {
+        if let Some(purse) = &self.allowance.purse {
+            purse.give_back(self.used.load(Ordering::Relaxed));
+        }
+    }
 }
 
 const CANCELLED: u8 = 1;
@@ -111,11 +73,14 @@ impl Budget {
         let most = self.0.allowance.bytes;
         let before = self.0.used.fetch_add(bytes, Ordering::Relaxed);
         let needed = before.saturating_add(bytes);
-        if needed <= most {
-            return Ok(());
-        }
-        self.0.used.fetch_sub(bytes, Ordering::Relaxed);
-        Err(Stopped::Bytes { most, needed })
+        let taken = match &self.0.allowance.purse {
+            _ if needed > most => Err(Stopped::Bytes { most, needed }),
+            Some(purse) => purse.take(bytes),
+            None => Ok(()),
+        };
+        taken.inspect_err(|_| {
+            self.0.used.fetch_sub(bytes, Ordering::Relaxed);
+        })
     }
 
     /// Stops what runs under it, at its next check.
@@ -140,6 +105,8 @@ struct Held {
     checks: Cell<u32>,
     cpu_at_start: Option<Duration>,
     cpu_next: Cell<Instant>,
+    /// Processor time that the purse was told of.
+    cpu_told: Cell<Duration>,
 }
 
 thread_local! {
@@ -167,19 +134,32 @@ pub fn within<T>(budget: &Budget, job: impl FnOnce() -> T) -> Result<T, Stopped>
     let held = Held {
         budget: budget.clone(),
         checks: Cell::new(0),
-        cpu_at_start: budget.0.allowance.cpu.and_then(|_| thread_cpu()),
+        cpu_at_start: budget.0.allowance.counts_cpu().then(thread_cpu).flatten(),
         cpu_next: Cell::new(Instant::now() + CPU_INTERVAL),
+        cpu_told: Cell::default(),
     };
     let restore = Restore(HELD.with(|h| h.borrow_mut().replace(held)));
     let outcome = catch_unwind(AssertUnwindSafe(|| {
+        solvent();
         check();
         job()
     }));
+    if budget.0.allowance.purse.is_some() {
+        HELD.with(|held| held.borrow().as_ref().map(Held::settle));
+    }
     drop(restore);
     outcome.or_else(|payload| match payload.downcast::<Stop>() {
         Ok(stop) => Err(stop.0),
         Err(panic) => resume_unwind(panic),
     })
+}
+
+/// Stops here if the purse is empty.
+fn solvent() {
+    let purse = HELD.with(|held| held.borrow().as_ref().and_then(|held| held.budget.0.allowance.purse.clone()));
+    if let Some(Err(why)) = purse.map(|purse| purse.solvent()) {
+        unwind(why);
+    }
 }
 
 /// The budget of this thread, to be handed to others that work for it.
@@ -235,20 +215,31 @@ impl Held {
 
     fn look_at_clocks(&self) -> Option<Stopped> {
         let Allowance { deadline, cpu, .. } = self.budget.0.allowance;
-        if deadline.is_none() && cpu.is_none() {
+        if deadline.is_none() && self.cpu_at_start.is_none() {
             return None;
         }
         let now = Instant::now();
         if deadline.is_some_and(|deadline| now >= deadline) {
             return Some(Stopped::Late);
         }
-        let (Some(most), Some(start)) = (cpu, self.cpu_at_start) else { return None };
-        if now < self.cpu_next.get() {
+        if self.cpu_at_start.is_none() || now < self.cpu_next.get() {
             return None;
         }
         self.cpu_next.set(now + CPU_INTERVAL);
-        let used = thread_cpu()?.saturating_sub(start);
-        (used > most).then_some(Stopped::Cpu { seconds: most.as_secs() })
+        let used = self.settle()?;
+        if let Some(Err(why)) = self.budget.0.allowance.purse.as_ref().map(|purse| purse.solvent()) {
+            return Some(why);
+        }
+        cpu.filter(|most| used > *most).map(|most| Stopped::Cpu { seconds: most.as_secs() })
+    }
+
+    /// Processor time since the start, of which the purse is told.
+    fn settle(&self) -> Option<Duration> {
+        let used = thread_cpu()?.saturating_sub(self.cpu_at_start?);
+        if let Some(purse) = &self.budget.0.allowance.purse {
+            purse.spend(used.saturating_sub(self.cpu_told.replace(used)));
+        }
+        Some(used)
     }
 }
 

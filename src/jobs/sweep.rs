@@ -103,7 +103,9 @@ pub fn run_on(
     let source = Source::new(bundle);
     let family = Family::new(spec, &source, options);
     let counted = |outcome: &point::Outcome| {
-        if let Some(Err(Stopped::Bytes { most, .. })) = budget.as_ref().map(|budget| budget.take(outcome.bytes())) {
+        if let Some(Err(Stopped::Bytes { most, .. } | Stopped::OwnerBytes { most, .. })) =
+            budget.as_ref().map(|budget| budget.take(outcome.bytes()))
+        {
             let _ = full.set(most);
             stop.store(true, Ordering::Relaxed);
         }

@@ -1,5 +1,6 @@
 //! The gate through which calls come in: counts of them and of what their requests hold, and who may ask.
 
+use super::accounts::Accounts;
 use super::guard::Guard;
 use super::ids::Ids;
 use super::limits::Limits;
@@ -23,6 +24,7 @@ pub(super) struct Gate {
     pub(super) most_held: usize,
     pub(super) pause: Duration,
     pub(super) guard: Arc<Guard>,
+    pub(super) accounts: Accounts,
     pub(super) metrics: Arc<Metrics>,
     /// What requests of this server are called, before their number.
     pub(super) name: String,
@@ -52,6 +54,7 @@ impl Gate {
             most_held: limits.held_bytes,
             pause: limits.request_pause,
             guard,
+            accounts: Accounts::new(limits),
             metrics,
             name,
             requests: AtomicU64::new(1),

@@ -9,7 +9,7 @@
 use super::bodies::{Answering, Received};
 use super::gate::{Gate, OPEN, REQUEST_ID};
 use super::metrics::{self};
-use super::turns::CLIENT;
+use super::turns::{CLIENT, Client};
 use std::convert::Infallible;
 use std::future::Future;
 use std::pin::Pin;
@@ -67,15 +67,17 @@ where
             call = name,
             client = admitted.as_deref().unwrap_or("refused"),
         );
-        if let Err(status) = admitted {
+        if let Err(status) = &admitted {
             span.in_scope(|| tracing::warn!(reason = status.message(), "refused"));
             call.code.store(status.code() as i32, Ordering::Relaxed);
-            let mut response = status.into_http();
+            let mut response = status.clone().into_http();
             response.headers_mut().insert(REQUEST_ID, id);
             return Box::pin(std::future::ready(Ok(response)));
         }
         let stream = STREAMS.iter().any(|name| request.uri().path().ends_with(name));
-        let client = call.presence.as_ref().map_or(0, |presence| presence.number());
+        let number = call.presence.as_ref().map_or(0, |presence| presence.number());
+        let account = admitted.ok().and_then(|name| self.gate.accounts.of(&name));
+        let client = Client { number, account };
         let received = Arc::clone(&call);
         let request = request.map(|body| Body::new(Received::new(body, received, stream)));
         let answer = CLIENT.scope(client, self.service.call(request)).instrument(span.clone());

@@ -3,6 +3,7 @@
 use super::kept::Kept;
 use super::proto;
 use super::store::Store;
+use crate::device::{Device, DeviceError, Token};
 use std::io;
 use std::sync::Arc;
 
@@ -62,5 +63,25 @@ impl Keeper {
     /// Removes what is kept.
     pub(super) fn forget(&self) {
         self.store.forget(&self.id);
+    }
+}
+
+/// A state as bytes, with those that a client may go back to: the one it was tried from, and the one accepted `before`. A client
+/// that was not told of an accept takes its step again, or another one, from the state that it knows.
+pub(super) fn with_those_before(device: &dyn Device, token: Token, before: Token) -> Result<Vec<u8>, DeviceError> {
+    let mut tokens = vec![token];
+    for other in [device.parent(token), Some(before)].into_iter().flatten() {
+        if other.0 != 0 && !tokens.contains(&other) {
+            tokens.insert(0, other);
+        }
+    }
+    loop {
+        match device.save(Some(&tokens)) {
+            // one that is not held any more
+            Err(DeviceError::UnknownToken(unknown)) if unknown != token && tokens.contains(&unknown) => {
+                tokens.retain(|token| *token != unknown);
+            }
+            saved => return saved,
+        }
     }
 }

@@ -1,7 +1,7 @@
 //! What one server allows: a table, from which come the fields, their defaults, and what everybody is told of them.
 
 use super::proto;
-use super::written::{Bytes, BytesOrNone, Count, Time, Written};
+use super::written::{Bytes, BytesOrNone, Count, CountOrNone, Time, TimeOrNone, Written};
 use std::sync::LazyLock;
 use std::time::Duration;
 
@@ -71,6 +71,19 @@ limits! {
 
     /// Most sessions open at once. Each holds a bounded number of states.
     sessions: Count = 256;
+
+    /// Most sessions of one client open at once; 0: any. A client is the owner of a token, or of a certificate; all who come by a Unix
+    /// socket are one, and all who show nothing.
+    client_sessions: CountOrNone = 0;
+
+    /// Most unknowns of the models of all open sessions of one client, together; 0: any.
+    client_unknowns: CountOrNone = 0;
+
+    /// Most bytes that all computations of one client lay out at once, counted before they are laid out; 0: any.
+    client_bytes: BytesOrNone = 0;
+
+    /// Most processor time of one client within an hour, trials and threads of sweeps among it; what was used comes back evenly. 0: any.
+    client_cpu: TimeOrNone = Duration::ZERO;
 
     /// Most bytes of states and netlists in the folder `state_dir`; a session whose states would be beyond does not open, and an
     /// accepted state that would be is refused.

@@ -3,7 +3,7 @@
 //! # Layout
 //! [`proto`] is what travels and [`convert`] the only place that knows both it and the library's own types. [`client`]
 //! is built with the feature `remote` alone, and shows what [`access`] says; `tls` is for both ends. The rest is the feature `server`: [`server`] listens and stops
-//! (`sockets`, `connection`, `shutdown`), [`guard`] and `tokens` ask who comes, `intake` counts what comes in as `bodies`, `rpc` answers calls (`analyses` those that compute), `stream` is the Newton loop, about
+//! (`sockets`, `connection`, `shutdown`), [`guard`] and `tokens` ask who comes, `accounts` what each has, `intake` counts what comes in as `bodies`, `rpc` answers calls (`analyses` those that compute), `stream` is the Newton loop, about
 //! a session that it has `joined`, [`inside`] is all of it without a network,
 //! `models`, `sessions` and `sweeps` keep what clients can name, under `ids` that nobody guesses; a `session` answers each `question`, has its `usage` and its
 //! `spectra`, `snapshots` puts it into bytes, `store` and `keeper` hold what outlives the server, on a `disk`, which `waking` goes on with and
@@ -12,6 +12,8 @@
 //! that a server is told, in whichever way it is [`written`].
 
 pub mod access;
+#[cfg(feature = "server")]
+mod accounts;
 pub mod address;
 pub mod client;
 pub mod convert;

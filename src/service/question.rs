@@ -12,6 +12,11 @@ pub(super) enum Question {
 }
 
 impl Question {
+    /// Whether it accepts a state.
+    pub(super) fn is_accept(&self) -> bool {
+        matches!(self, Self::Accept(..))
+    }
+
     /// Whether it has no answer.
     pub(super) fn is_silent(&self) -> bool {
         matches!(self, Self::Accept(accept, _) if !accept.answer)

@@ -1,19 +1,21 @@
 //! One open device with its states: who may ask it, and what of it is kept.
 
+use super::accounts::Seat;
 use super::answerable::bounded;
 use super::convert::device as wire;
-use super::keeper::Keeper;
+use super::keeper::{Keeper, with_those_before};
 use super::limits::Limits;
 use super::models::Model;
 use super::question::Question;
 use super::server::MakeDevice;
 use super::small_signal::small_signal;
 use super::snapshots;
+use super::turns::client;
 use super::usage::Usage;
 use super::work::caught;
 use super::{proto, status};
-use crate::budget::{Allowance, Budget, Stopped};
-use crate::device::{Device, DeviceError, Token, TrialReply};
+use crate::budget::{Allowance, Budget, Purse, Stopped};
+use crate::device::{Device, Token, TrialReply};
 use proto::device_reply::Kind as ReplyKind;
 use std::panic::catch_unwind;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
@@ -37,6 +39,10 @@ pub(super) struct Session {
     turn: Arc<Semaphore>,
     pub(super) usage: Usage,
     closed: AtomicBool,
+    /// Its place in the account of who opened it, where that is bounded.
+    seat: Mutex<Option<Seat>>,
+    /// What its trials draw on.
+    purse: Option<Arc<Purse>>,
     /// Where its accepted states are kept, if they are to outlive the server.
     keeper: Option<Arc<Mutex<Keeper>>>,
     /// The last accepted state that is kept; 0: none yet.
@@ -64,8 +70,11 @@ impl Session {
         limits: &Limits,
     ) -> Result<Arc<Self>, Status> {
         let device = catch_unwind(|| make(Arc::clone(&model.compiled))).map_err(|_| status::fault())?;
+        let seat = client().account.map(|account| account.seat(model.unknowns())).transpose()?;
         Ok(Arc::new(Self {
             id,
+            purse: seat.as_ref().map(Seat::purse),
+            seat: Mutex::new(seat),
             accepted: AtomicU64::new(keeper.as_ref().map_or(0, |keeper| keeper.accepted)),
             keeper: keeper.map(|keeper| Arc::new(Mutex::new(keeper))),
             model: Arc::clone(model),
@@ -117,7 +126,16 @@ impl Session {
         };
         let deadline = Some(Instant::now() + SLICE);
         let slice = Budget::new(Allowance { deadline, ..Allowance::default() });
-        self.answer_with(device, question, &slice).map_err(|_| {
+        // a state that was computed is accepted whatever is left
+        let purse = self.purse.as_ref().filter(|_| !question.is_accept());
+        if let Some(Err(why)) = purse.map(|purse| purse.solvent()) {
+            return Ok(self.refuse(question, &status::stopped(why)));
+        }
+        let started = purse.map(|purse| (purse, Instant::now()));
+        let answer = self.answer_with(device, question, &slice);
+        // nothing waits here, so that time is processor time
+        started.into_iter().for_each(|(purse, at)| purse.spend(at.elapsed()));
+        answer.map_err(|_| {
             self.slow.store(AFTER_SLOW, Ordering::Relaxed);
             Later
         })
@@ -278,10 +296,15 @@ impl Session {
         self.closed.load(Ordering::Relaxed)
     }
 
+    fn end(&self) {
+        self.closed.store(true, Ordering::Relaxed);
+        drop(self.seat.lock().unwrap_or_else(PoisonError::into_inner).take());
+    }
+
     /// Closes after a panic: its states may be half made. What is kept of it stays, and sleeps until somebody asks for it.
     pub(super) fn fault(&self) {
         tracing::error!(session = self.id, model = self.model.id(), "internal fault: the session is closed");
-        self.closed.store(true, Ordering::Relaxed);
+        self.end();
         if let Some(keeper) = &self.keeper {
             keeper.lock().unwrap_or_else(PoisonError::into_inner).sleep();
         }
@@ -289,7 +312,7 @@ impl Session {
 
     /// Closes it; what is kept of it goes soon after.
     pub(super) fn close(&self) {
-        self.closed.store(true, Ordering::Relaxed);
+        self.end();
         let Some(keeper) = self.keeper.clone() else { return };
         let forget = move || forget(&keeper);
         match tokio::runtime::Handle::try_current() {
@@ -302,26 +325,6 @@ impl Session {
     pub(super) fn forget(&self) {
         if let Some(keeper) = &self.keeper {
             forget(keeper);
-        }
-    }
-}
-
-/// A state as bytes, with those that a client may go back to: the one it was tried from, and the one accepted `before`. A client
-/// that was not told of an accept takes its step again, or another one, from the state that it knows.
-fn with_those_before(device: &dyn Device, token: Token, before: Token) -> Result<Vec<u8>, DeviceError> {
-    let mut tokens = vec![token];
-    for other in [device.parent(token), Some(before)].into_iter().flatten() {
-        if other.0 != 0 && !tokens.contains(&other) {
-            tokens.insert(0, other);
-        }
-    }
-    loop {
-        match device.save(Some(&tokens)) {
-            // one that is not held any more
-            Err(DeviceError::UnknownToken(unknown)) if unknown != token && tokens.contains(&unknown) => {
-                tokens.retain(|token| *token != unknown);
-            }
-            saved => return saved,
         }
     }
 }

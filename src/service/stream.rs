@@ -9,9 +9,9 @@ use super::joined::{Joined, Next};
 use super::question::Question;
 use super::session::{Session, refused};
 use super::shared::Shared;
-use super::turns::{CLIENT, client};
+use super::turns::{CLIENT, Client, client};
 use super::{proto, status};
-use crate::budget::Budget;
+use crate::budget::{Allowance, Budget};
 use proto::device_reply::Kind as ReplyKind;
 use std::future::Future;
 use std::pin::Pin;
@@ -37,7 +37,7 @@ pub(super) struct TrialStream {
     waking: Option<Running<Result<Arc<Session>, Status>>>,
     running: Option<Running<Option<ReplyKind>>>,
     finished: bool,
-    client: u64,
+    client: Client,
 }
 
 impl TrialStream {
@@ -57,7 +57,7 @@ impl TrialStream {
 
     /// Starts on a request: a reply at once, none (an accept), or a thread in `running`.
     fn take(&mut self, request: proto::DeviceRequest) -> Option<ReplyKind> {
-        match self.joined.next(request) {
+        match CLIENT.sync_scope(self.client.clone(), || self.joined.next(request)) {
             Next::Ask(session, question) => self.ask(session, question),
             Next::Attach(id) => self.attach(id),
             Next::Answered(reply) => reply,
@@ -69,7 +69,7 @@ impl TrialStream {
             return reply;
         }
         let later = later(Arc::clone(&self.shared), session, question);
-        self.running = Some(Box::pin(CLIENT.scope(self.client, later)));
+        self.running = Some(Box::pin(CLIENT.scope(self.client.clone(), later)));
         None
     }
 
@@ -81,7 +81,7 @@ impl TrialStream {
         }
         let shared = Arc::clone(&self.shared);
         let woken = async move { shared.session(&id).await };
-        self.waking = Some(Box::pin(CLIENT.scope(self.client, woken)));
+        self.waking = Some(Box::pin(CLIENT.scope(self.client.clone(), woken)));
         None
     }
 }
@@ -95,7 +95,9 @@ async fn later(shared: Arc<Shared>, session: Arc<Session>, question: Question) -
     let silent = question.is_silent();
     let job = move |budget: &Budget| {
         let _turn = turn;
-        Ok(session.answer(&question, budget))
+        // a state that was computed is accepted whatever is left
+        let free = Budget::new(Allowance::default());
+        Ok(session.answer(&question, if question.is_accept() { &free } else { budget }))
     };
     shared.trials.run_with(job).await.unwrap_or_else(|status| (!silent).then(|| refused(&status)))
 }

@@ -3,7 +3,7 @@
 use super::convert::Violation;
 use super::ids::Ids;
 use super::limits::Limits;
-use super::work::{allowance, caught};
+use super::work::{allowance, caught, of_client};
 use super::{proto, status};
 use crate::budget::Budget;
 use crate::compile::CompileOptions;
@@ -164,7 +164,7 @@ impl Sweeps {
             asked,
             status: watch::Sender::new(first),
             table: OnceLock::new(),
-            budget: Budget::new(allowance(limits)),
+            budget: Budget::new(of_client(allowance(limits))),
             cancelled: AtomicBool::new(false),
             used: Mutex::new(Instant::now()),
         });

@@ -3,18 +3,28 @@
 //! Who asks for many computations at once waits for its own, not others for it: of those that wait, each connection gets
 //! one place before any gets its second.
 
+use super::accounts::Account;
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
 use tokio::sync::oneshot;
 
 tokio::task_local! {
-    /// The connection that the task at hand works for.
-    pub(super) static CLIENT: u64;
+    /// Whom the task at hand works for.
+    pub(super) static CLIENT: Client;
 }
 
-/// The connection that this task works for; 0 for the server's own.
-pub(super) fn client() -> u64 {
-    CLIENT.try_with(|client| *client).unwrap_or(0)
+/// Whom a task works for.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Client {
+    /// The connection; 0 for the server's own.
+    pub(super) number: u64,
+    /// What the client has of this server, where that is bounded.
+    pub(super) account: Option<Arc<Account>>,
+}
+
+/// Whom this task works for; the server itself where nobody is known.
+pub(super) fn client() -> Client {
+    CLIENT.try_with(Client::clone).unwrap_or_default()
 }
 
 /// So many places.

@@ -3,7 +3,7 @@
 use super::limits::Limits;
 use super::shutdown::Shutdown;
 use super::status;
-use super::turns::{Place, Turns, client};
+use super::turns::{CLIENT, Place, Turns, client};
 use crate::budget::{self, Allowance, Budget, Stopped};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::pin::Pin;
@@ -36,7 +36,7 @@ impl Work {
     /// Waits for a place, in the turn of the client at hand.
     pub(super) async fn place(&self) -> Result<Place, Status> {
         tokio::select! {
-            place = self.places.place(client()) => Ok(place),
+            place = self.places.place(client().number) => Ok(place),
             () = tokio::time::sleep(self.timeout) => Err(self.late("waiting for its turn")),
             () = self.shutdown.ending.cancelled() => Err(status::stopping()),
         }
@@ -52,7 +52,7 @@ impl Work {
 
     /// A budget without a deadline, for a computation that is not a unary call.
     pub(super) fn budget(&self) -> Budget {
-        Budget::new(self.allowance.clone())
+        Budget::new(of_client(self.allowance.clone()))
     }
 
     /// Runs `job` on a thread of its own. It is stopped when its time is over, when the server stops, and when nobody
@@ -71,12 +71,12 @@ impl Work {
     ) -> Result<T, Status> {
         let place = self.place().await?;
         let deadline = Some(Instant::now() + self.timeout);
-        let budget = Budget::new(Allowance { deadline, ..self.allowance.clone() });
+        let budget = Budget::new(Allowance { deadline, ..of_client(self.allowance.clone()) });
         let guard = CancelOnDrop(budget.clone());
-        let span = tracing::Span::current();
+        let (span, client) = (tracing::Span::current(), client());
         let running = tokio::task::spawn_blocking(move || {
             let _place = place;
-            span.in_scope(|| job(&budget))
+            CLIENT.sync_scope(client, || span.in_scope(|| job(&budget)))
         });
         tokio::select! {
             answer = running => answer.unwrap_or_else(|_| Err(status::fault())).map_err(|status| self.told(status)),
@@ -99,9 +99,14 @@ impl Work {
     }
 }
 
+/// The same, drawn on what the client at hand has.
+pub(super) fn of_client(allowance: Allowance) -> Allowance {
+    Allowance { purse: client().account.map(|account| Arc::clone(&account.purse)), ..allowance }
+}
+
 /// What one computation may use.
 pub(super) fn allowance(limits: &Limits) -> Allowance {
-    Allowance { bytes: limits.memory, unknowns: limits.unknowns, cpu: Some(limits.cpu), deadline: None }
+    Allowance { bytes: limits.memory, unknowns: limits.unknowns, cpu: Some(limits.cpu), deadline: None, purse: None }
 }
 
 /// Stops a computation that nobody waits for any more.

@@ -45,6 +45,23 @@ impl Written for Count {
     }
 }
 
+/// A whole number, or none.
+#[derive(Debug)]
+pub struct CountOrNone;
+
+impl Written for CountOrNone {
+    type Held = usize;
+    const PLACE: &'static str = "N";
+
+    fn read(text: &str) -> Result<usize, &'static str> {
+        if text == "0" { Ok(0) } else { Count::read(text).map_err(|_| "a whole number, at most 1e15; 0: any") }
+    }
+
+    fn write(held: &usize) -> String {
+        held.to_string()
+    }
+}
+
 /// Bytes: a whole number above 0, with an optional k, M or G (times 1024).
 #[derive(Debug)]
 pub struct Bytes;
@@ -103,6 +120,23 @@ impl Written for Time {
 
     fn write(held: &Duration) -> String {
         held.as_secs_f64().to_string()
+    }
+}
+
+/// A time in seconds, or none.
+#[derive(Debug)]
+pub struct TimeOrNone;
+
+impl Written for TimeOrNone {
+    type Held = Duration;
+    const PLACE: &'static str = "SECONDS";
+
+    fn read(text: &str) -> Result<Duration, &'static str> {
+        if text == "0" { Ok(Duration::ZERO) } else { Time::read(text).map_err(|_| "seconds, at most 1e9; 0: any") }
+    }
+
+    fn write(held: &Duration) -> String {
+        Time::write(held)
     }
 }
 

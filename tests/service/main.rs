@@ -13,6 +13,7 @@ mod inside;
 mod kept;
 mod limits;
 mod listening;
+mod quotas;
 mod random;
 mod refusals;
 mod running;

@@ -5,6 +5,7 @@ use bimorph::compile::CompileOptions;
 use bimorph::netlist::Bundle;
 use bimorph::service::address::Address;
 use bimorph::service::client::RemoteDevice;
+use bimorph::service::guard::GuardFiles;
 use bimorph::service::limits::Limits;
 use bimorph::service::proto;
 use bimorph::service::server::{MakeDevice, ServeError, ServeOptions, run_with};
@@ -41,16 +42,22 @@ pub(crate) fn start_kept(folder: &Path, limits: Limits, make: MakeDevice) -> Run
 }
 
 fn start_in(state_dir: Option<PathBuf>, listen: &str, limits: Limits, make: MakeDevice) -> Running {
+    let listen = vec![listen.parse().expect("an address")];
+    start_as(ServeOptions { listen, limits, state_dir, state_unsynced: true, ..ServeOptions::default() }, make)
+}
+
+/// Starts a server on port 0 that knows its clients by the tokens of a file.
+pub(crate) fn start_guarded(tokens: &Path, limits: Limits, make: MakeDevice) -> Running {
+    let listen = vec!["127.0.0.1:0".parse().expect("an address")];
+    let guard = GuardFiles { token_file: Some(tokens.to_owned()), ..GuardFiles::default() };
+    start_as(ServeOptions { listen, limits, guard, ..ServeOptions::default() }, make)
+}
+
+fn start_as(options: ServeOptions, make: MakeDevice) -> Running {
     let (stop, stopped) = oneshot::channel::<()>();
     let (ready, bound) = std::sync::mpsc::channel();
-    let options = ServeOptions {
-        listen: vec![listen.parse().expect("an address")],
-        limits,
-        state_dir,
-        state_unsynced: true,
-        ready: Box::new(move |addresses| ready.send(addresses[0].clone()).expect("the test waits")),
-        ..ServeOptions::default()
-    };
+    let ready = Box::new(move |addresses: &[Address]| ready.send(addresses[0].clone()).expect("the test waits"));
+    let options = ServeOptions { ready, ..options };
     let thread = std::thread::spawn(move || {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a runtime");
         let outcome = runtime.block_on(run_with(options, make, async {
