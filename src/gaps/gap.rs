@@ -44,6 +44,11 @@ pub enum Gap {
 }
 
 impl Gap {
+    /// False where a gap adds no force at this voltage, wherever the bodies are.
+    pub(crate) fn acts(&self, volts: f64) -> bool {
+        volts != 0.0 || !matches!(self, Gap::Single { contact: None, .. })
+    }
+
     /// True for electrodes that voltage draws upon each other.
     pub(crate) fn closes(&self) -> bool {
         matches!(self, Gap::Single { capacitor: Capacitor::Plates { .. }, .. } | Gap::Facing { .. })

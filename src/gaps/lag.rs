@@ -52,6 +52,11 @@ impl Lag {
         Self { time_constant, t, x, f, decay }
     }
 
+    /// Of a rise that goes towards one that stays: start·d + x·(last·f), as d, x and f.
+    pub(crate) fn towards(&self) -> [f64; 3] {
+        [self.decay, self.x, self.f[0]]
+    }
+
     /// See [`lagged`].
     #[inline]
     pub fn rise(&self, start: f64, p: [f64; 3]) -> f64 {

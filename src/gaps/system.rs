@@ -65,16 +65,22 @@ impl System {
     /// `r +=` the share of gaps, contacts and dead loads in the residual: minus the wrench on each body. A formulation that
     /// has its own way with joints needs only this of a system.
     pub fn add_body_forces(&self, q: &[Pose], drive: &Drive, r: &mut [Pose]) {
-        for (gap, &volts) in self.gaps.iter().zip(&drive.volts) {
+        for (gap, &volts) in self.gaps.iter().zip(&drive.volts).filter(|(gap, volts)| gap.acts(**volts)) {
             gap.add_force(self.model.linear, q, -0.5 * volts * volts, true, r);
         }
         self.add_loads(q, -drive.load, r);
         self.add_input_forces(q, drive, r);
     }
 
+    /// True where [`System::add_body_forces`] adds anything.
+    pub(crate) fn is_acted_on(&self, drive: &Drive) -> bool {
+        !(self.loads.is_empty() && drive.inputs.is_empty() && drive.push.is_empty())
+            || self.gaps.iter().zip(&drive.volts).any(|(gap, volts)| gap.acts(*volts))
+    }
+
     /// `tangent +=` the share of gaps, contacts and dead loads in ∂r/∂q.
     pub fn add_body_tangent(&self, q: &[Pose], drive: &Drive, tangent: &mut BlockMatrix<f64, 3>) {
-        for (gap, &volts) in self.gaps.iter().zip(&drive.volts) {
+        for (gap, &volts) in self.gaps.iter().zip(&drive.volts).filter(|(gap, volts)| gap.acts(**volts)) {
             gap.add_tangent((&self.model.pattern, self.model.linear), q, -0.5 * volts * volts, tangent);
         }
         self.add_load_tangent(q, -drive.load, tangent);

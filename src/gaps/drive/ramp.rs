@@ -36,6 +36,11 @@ impl<'a> Ramp<'a> {
         Self { push, ..self }
     }
 
+    /// Rise of heater `k` that the sources at the start lead to [K].
+    pub(crate) fn steady_at_start(&self, k: usize) -> f64 {
+        self.heat[k][0]
+    }
+
     /// Rise of heater `k` at time `s` after the start [K].
     pub fn rise_at(&self, k: usize, s: f64) -> f64 {
         self.rise_after(k, &mut Lags::new(s))

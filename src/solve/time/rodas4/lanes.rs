@@ -4,6 +4,7 @@
 //! `stages`; gaps and dead loads act on few bodies and have branches of their own, and go variant by variant.
 
 mod acted;
+mod heat;
 mod kernels;
 mod motion;
 mod storage;
@@ -14,8 +15,8 @@ pub use storage::{Lane, LaneRodas4};
 use kernels::{Task, Work};
 
 use super::tableau::{ALPHA, moves_on};
-use crate::gaps::{Lags, Ramp, System};
-use crate::multibody::lanes::{LANES, Real, across};
+use crate::gaps::{Ramp, System};
+use crate::multibody::lanes::{LANES, across};
 use crate::solve::time::method::Motion;
 
 impl LaneRodas4 {
@@ -23,7 +24,7 @@ impl LaneRodas4 {
     pub fn fits(&self, system: &System) -> bool {
         self.model.fits(&system.model)
             && system.electrics.inputs.is_empty()
-            && self.expansion.len() == system.electrics.heating.heaters.len()
+            && self.heat.count() == system.electrics.heating.heaters.len()
             && self.drives[0].volts.len() == system.gaps.len()
             && self.acted == system.acted_on()
     }
@@ -34,6 +35,7 @@ impl LaneRodas4 {
         debug_assert_eq!(ramp.from, ramp.to);
         self.model.put(lane, &system.model);
         self.motion.put(lane, motion);
+        self.heat.put(lane, ramp);
         ramp.at(0.0, &mut self.drives[lane]);
         self.drives[lane].load = 1.0;
     }
@@ -42,14 +44,7 @@ impl LaneRodas4 {
     /// Returns the lanes whose matrix could not be factored: their motion is nothing.
     pub fn step(&mut self, lanes: &[Option<Lane<'_>>; LANES], s: &[f64; LANES], h: &[f64; LANES]) -> [bool; LANES] {
         self.h.0 = *h;
-        let (expansion, rate) = (&mut self.expansion, &mut self.rate);
-        for (k, lane) in lanes.iter().enumerate() {
-            if let Some(lane) = lane {
-                let mut lags = Lags::new(s[k]);
-                lane.ramp.expansions(&mut lags, |j, x| expansion[j].set_lane(k, x));
-                lane.ramp.expansion_rates(&mut lags, |j, x| rate[j].set_lane(k, x));
-            }
-        }
+        self.heat.at(of_lanes(lanes, s));
         self.run(Task::Forcing);
         for (i, alpha) in ALPHA.into_iter().enumerate() {
             if moves_on(i) {
@@ -57,7 +52,8 @@ impl LaneRodas4 {
                 for (at, h) in at.iter_mut().zip(h) {
                     *at += alpha * h;
                 }
-                self.drive(lanes, &at);
+                self.heat.at(of_lanes(lanes, &at));
+                self.run(Task::Expand);
             }
             self.run(Task::Begin(i));
             if i == 0 {
@@ -82,14 +78,9 @@ impl LaneRodas4 {
     fn run(&mut self, task: Task) {
         across(Work(self, task));
     }
+}
 
-    /// Free strains at the time of each lane.
-    fn drive(&mut self, lanes: &[Option<Lane<'_>>; LANES], s: &[f64; LANES]) {
-        let expansion = &mut self.expansion;
-        for (k, lane) in lanes.iter().enumerate() {
-            if let Some(lane) = lane {
-                lane.ramp.expansions(&mut Lags::new(s[k]), |j, x| expansion[j].set_lane(k, x));
-            }
-        }
-    }
+/// The time of each lane that is one.
+fn of_lanes(lanes: &[Option<Lane<'_>>; LANES], s: &[f64; LANES]) -> [Option<f64>; LANES] {
+    std::array::from_fn(|k| lanes[k].as_ref().map(|_| s[k]))
 }

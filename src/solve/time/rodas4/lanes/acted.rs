@@ -16,6 +16,9 @@ impl LaneRodas4 {
         let pose = |p: &LanePose, k: usize| Pose::new(p[0].lane(k), p[1].lane(k), p[2].lane(k));
         for (k, (lane, drive)) in lanes.iter().zip(drives).enumerate() {
             let Some(lane) = lane else { continue };
+            if !lane.system.is_acted_on(drive) {
+                continue;
+            }
             for &b in acted.iter() {
                 (q[b], r[b]) = (pose(&from[b], k), pose(&force[b], k));
             }

@@ -15,6 +15,7 @@ use crate::multibody::lanes::{
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Task {
     Forcing,
+    Expand,
     Begin(usize),
     Elastic(usize),
     Tangent,
@@ -28,6 +29,8 @@ pub(super) struct Work<'a>(pub(super) &'a mut LaneRodas4, pub(super) Task);
 impl LaneRodas4 {
     #[inline(always)]
     fn forcing<W: Wide>(&mut self, simd: W::Simd) {
+        self.heat.expansions::<W>(simd, &mut self.expansion);
+        self.heat.rates::<W>(simd, &mut self.rate);
         self.before.q.copy_from_slice(&self.motion.q);
         self.before.v.copy_from_slice(&self.motion.v);
         self.forcing.fill(STILL);
@@ -152,6 +155,7 @@ impl Kernel for Work<'_> {
         let m = self.0;
         match self.1 {
             Task::Forcing => m.forcing::<W>(simd),
+            Task::Expand => m.heat.expansions::<W>(simd, &mut m.expansion),
             Task::Begin(0) => m.begin::<W, 0>(simd),
             Task::Begin(1) => m.begin::<W, 1>(simd),
             Task::Begin(2) => m.begin::<W, 2>(simd),

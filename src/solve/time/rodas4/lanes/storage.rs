@@ -1,5 +1,6 @@
 //! What a step of variants side by side works on.
 
+use super::heat::LaneHeat;
 use super::motion::{LaneMotion, Norms};
 use crate::gaps::{Drive, Ramp, System};
 use crate::multibody::lanes::joint::LanePlaced;
@@ -55,6 +56,7 @@ pub struct LaneRodas4 {
     /// Rates by which dampers lag, for each body; empty without dampers.
     pub(super) lags: Vec<LanePose>,
     pub(super) placed: Vec<LanePlaced>,
+    pub(super) heat: LaneHeat,
     pub(super) expansion: Vec<Eight>,
     pub(super) rate: Vec<Eight>,
     pub(super) vanished: [bool; LANES],
@@ -94,6 +96,7 @@ impl LaneRodas4 {
             increments: vec![[none; 5]; n],
             lags: vec![STILL; if model.dampers.is_empty() { 0 } else { n }],
             placed: vec![LanePlaced::GROUND; n + 1],
+            heat: LaneHeat::new(&system.electrics.heating.heaters),
             expansion: vec![Eight::NONE; heaters],
             rate: vec![Eight::NONE; heaters],
             vanished: [false; LANES],
