@@ -17,7 +17,7 @@ pub use crate::options::{CompileOptions, Formulation, Junctions, Scheme};
 #[derive(Debug, Clone)]
 pub struct Compiled {
     /// What was drawn.
-    pub structure: Structure,
+    pub structure: Arc<Structure>,
     /// Netlist parameters with the values they took.
     pub parameters: Vec<(String, Setting)>,
     /// Warnings of the netlist.
@@ -50,7 +50,7 @@ impl Compiled {
         let like = (rigid(&self.order.segments) == rigid(&order.segments)).then_some(&self.parts);
         let parts = laid_out(&self.structure, &self.options, &order.segments, like)?;
         Ok(Self {
-            structure: self.structure.clone(),
+            structure: Arc::clone(&self.structure),
             parameters: self.parameters.clone(),
             warnings: self.warnings.clone(),
             options: self.options.clone(),
@@ -88,7 +88,7 @@ pub fn compile(bundle: &Bundle, options: &CompileOptions) -> Result<Compiled, Co
 #[derive(Debug, Clone)]
 pub struct Drawn {
     /// What was drawn.
-    pub structure: Structure,
+    pub structure: Arc<Structure>,
     /// Netlist parameters with the values they took.
     pub parameters: Vec<(String, Setting)>,
     /// Warnings of the netlist.
@@ -110,7 +110,7 @@ pub fn draw(source: &Source, options: &CompileOptions) -> Result<Drawn, CompileE
     }
     let loaded = source.load(&options.set).map_err(CompileError::Netlist)?;
     let structure = if options.without_circuit { loaded.structure.without_circuit() } else { loaded.structure };
-    Ok(Drawn { structure, parameters: loaded.parameters, warnings: loaded.warnings, options })
+    Ok(Drawn { structure: Arc::new(structure), parameters: loaded.parameters, warnings: loaded.warnings, options })
 }
 
 impl Drawn {

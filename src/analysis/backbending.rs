@@ -9,6 +9,7 @@ use crate::multibody::forces::{RestStrain, add_offset_change, axial_change, axia
 use crate::multibody::planar::Pose;
 use crate::solve::SolveError;
 use nalgebra::{DMatrix, DVector};
+use std::sync::Arc;
 
 /// Steps in which the voltages are raised: plastic strain depends on the way.
 const STEPS: usize = 8;
@@ -168,7 +169,7 @@ fn pressures(
 
 fn apply(bent: &mut Compiled, arms: &[Arm]) {
     for arm in arms {
-        let before = std::mem::replace(&mut bent.structure.yields[arm.index].strain, -arm.strain);
+        let before = std::mem::replace(&mut Arc::make_mut(&mut bent.structure).yields[arm.index].strain, -arm.strain);
         yielded::strain(&mut bent.parts, &arm.joints, -arm.strain - before);
     }
 }

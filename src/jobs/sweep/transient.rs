@@ -154,7 +154,7 @@ impl<'a> Transients<'a> {
             let Some(compiled) = drawn.ok().and_then(|drawn| drawn.compile().ok()) else { continue };
             let Ok(order) = mesh::order_in_time(&compiled, &options) else { continue };
             match &mut shared {
-                None => shared = Some(Shared { beams: compiled.structure.beams, order, step_error: None }),
+                None => shared = Some(Shared { beams: compiled.structure.beams.clone(), order, step_error: None }),
                 Some(shared) if alike(&shared.beams, &compiled.structure.beams) => {
                     for (most, n) in shared.order.segments.iter_mut().zip(order.segments) {
                         *most = (*most).max(n);

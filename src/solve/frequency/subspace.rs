@@ -94,7 +94,13 @@ pub fn iterate(
 /// Body vectors as the columns of a matrix.
 pub fn columns(vectors: &[Vec<Pose>]) -> DMatrix<f64> {
     let rows = vectors.first().map_or(0, |v| 3 * v.len());
-    DMatrix::from_iterator(rows, vectors.len(), vectors.iter().flatten().flat_map(|p| [p.x, p.y, p.z]))
+    let mut matrix = DMatrix::zeros(rows, vectors.len());
+    for (mut column, vector) in matrix.column_iter_mut().zip(vectors) {
+        for (to, p) in column.as_mut_slice().chunks_exact_mut(3).zip(vector) {
+            to.copy_from_slice(p.as_slice());
+        }
+    }
+    matrix
 }
 
 /// Eigenvalues, ascending, and vectors of A·v = μ·B·v with B definite, vᵀBv = 1. None where B is not.
