@@ -74,7 +74,8 @@ fn limits() -> Limits {
     }
 }
 
-fn decoded<T: Message + Default>(request: &[u8]) -> Result<Request<T>, Status> {
+/// A message of the protocol.
+pub(super) fn decoded<T: Message + Default>(request: &[u8]) -> Result<Request<T>, Status> {
     let read = T::decode(request).map(Request::new);
     read.map_err(|error| Status::invalid_argument(format!("expected a message of the protocol: {error}")))
 }
@@ -172,13 +173,13 @@ where
 }
 
 /// Whoever waits here must be on a thread that may wait.
-fn not_asynchronous() -> Result<(), Status> {
+pub(super) fn not_asynchronous() -> Result<(), Status> {
     let text = "the service in process was called from asynchronous code; call it on a thread of its own";
     Handle::try_current().map_or(Ok(()), |_| Err(Status::failed_precondition(text)))
 }
 
 /// Waits for an answer for as long as it is wanted; what computes it stops when it is not.
-fn wait<T>(
+pub(super) fn wait<T>(
     runtime: &Handle,
     answer: impl Future<Output = Result<T, Status>>,
     waits: &dyn Fn() -> bool,

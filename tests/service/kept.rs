@@ -1,7 +1,7 @@
 //! What is kept of a session outlives panics, wakes that are stopped, and whatever happens while one wakes.
 
 use super::attached::{Attached, refusal, trial};
-use super::running::{block_on, compiled, start_kept};
+use super::running::{Running, block_on, compiled, start_kept};
 use bimorph::budget;
 use bimorph::compile::Compiled;
 use bimorph::device::local::LocalDevice;
@@ -16,6 +16,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Duration;
+use tempfile::TempDir;
 use tonic::Code;
 use tonic::transport::Channel;
 
@@ -128,6 +129,42 @@ fn asleep(folder: &Path, make: MakeDevice) -> (String, u64) {
     })
 }
 
+/// A server with a kept session that sleeps, and a gate that stops who wakes it.
+struct Asleep {
+    server: Running,
+    folder: TempDir,
+    gate: &'static Gate,
+    session: String,
+    /// Its accepted state.
+    token: u64,
+}
+
+impl Asleep {
+    fn new(gate: &'static Gate, make: MakeDevice, limits: Limits) -> Self {
+        let folder = tempfile::tempdir().expect("a folder");
+        let (session, token) = asleep(folder.path(), make);
+        let server = start_kept(folder.path(), limits, make);
+        Self { server, folder, gate, session, token }
+    }
+
+    /// Somebody who wakes it, and stands at the gate.
+    async fn waking(&self, client: &mut BimorphClient<Channel>) -> Attached {
+        self.gate.shut.store(true, Ordering::SeqCst);
+        let waking = Attached::ask_to_join(client, &self.session).await;
+        self.gate.has(1).await;
+        waking
+    }
+
+    fn open_the_gate(&self) {
+        self.gate.shut.store(false, Ordering::SeqCst);
+    }
+
+    /// What is left of sessions and of models.
+    fn left(&self) -> [usize; 2] {
+        ["sessions", "models"].map(|name| std::fs::read_dir(self.folder.path().join(name)).expect("a folder").count())
+    }
+}
+
 /// A trial that panics closes its session; the states are there as they were accepted, and a new stream goes on with them.
 #[test]
 fn a_panic_takes_no_state_along() {
@@ -153,21 +190,17 @@ fn a_panic_takes_no_state_along() {
 #[test]
 fn a_wake_that_is_stopped_leaves_it_asleep() {
     static GATE: Gate = Gate::open();
-    let folder = tempfile::tempdir().expect("a folder");
-    let (session, token) = asleep(folder.path(), gated!(GATE));
-    let server = start_kept(folder.path(), limits(), gated!(GATE));
+    let asleep = Asleep::new(&GATE, gated!(GATE), limits());
     block_on(async {
-        let mut client = server.client().await;
-        GATE.shut.store(true, Ordering::SeqCst);
-        let waking = Attached::ask_to_join(&mut client, &session).await;
-        GATE.has(1).await;
+        let mut client = asleep.server.client().await;
+        let waking = asleep.waking(&mut client).await;
         drop(waking);
         GATE.has(0).await;
-        GATE.shut.store(false, Ordering::SeqCst);
-        let (mut stream, opened) = Attached::join(&mut client, &session).await.expect("it is kept");
+        asleep.open_the_gate();
+        let (mut stream, opened) = Attached::join(&mut client, &asleep.session).await.expect("it is kept");
         assert_eq!(opened.device.expect("a description").ports, ["drive"]);
-        assert_eq!(opened.accepted, token);
-        stream.trial(token, DT, 2.0).await;
+        assert_eq!(opened.accepted, asleep.token);
+        stream.trial(asleep.token, DT, 2.0).await;
     });
 }
 
@@ -201,20 +234,16 @@ fn a_restore_that_is_stopped_leaves_nothing() {
 #[test]
 fn a_slow_wake_holds_nobody_up() {
     static GATE: Gate = Gate::open();
-    let folder = tempfile::tempdir().expect("a folder");
-    let (session, token) = asleep(folder.path(), gated!(GATE));
-    let server = start_kept(folder.path(), limits(), gated!(GATE));
+    let asleep = Asleep::new(&GATE, gated!(GATE), limits());
     block_on(async {
-        let mut client = server.client().await;
-        GATE.shut.store(true, Ordering::SeqCst);
-        let mut slow = Attached::ask_to_join(&mut client, &session).await;
-        GATE.has(1).await;
+        let mut client = asleep.server.client().await;
+        let mut slow = asleep.waking(&mut client).await;
         let other = open(&mut client).await;
         assert!(other.kept);
         client.close(proto::CloseRequest { session: other.session }).await.expect("closes");
-        GATE.shut.store(false, Ordering::SeqCst);
+        asleep.open_the_gate();
         let opened = slow.answer().await;
-        assert!(matches!(&opened, proto::device_reply::Kind::Opened(o) if o.accepted == token), "{opened:?}");
+        assert!(matches!(&opened, proto::device_reply::Kind::Opened(o) if o.accepted == asleep.token), "{opened:?}");
     });
 }
 
@@ -222,23 +251,23 @@ fn a_slow_wake_holds_nobody_up() {
 #[test]
 fn two_who_wake_one_session() {
     static GATE: Gate = Gate::open();
-    let folder = tempfile::tempdir().expect("a folder");
-    let (session, token) = asleep(folder.path(), gated!(GATE));
-    let server = start_kept(folder.path(), Limits { sessions: 1, ..limits() }, gated!(GATE));
+    let asleep = Asleep::new(&GATE, gated!(GATE), Limits { sessions: 1, ..limits() });
     block_on(async {
-        let mut client = server.client().await;
+        let mut client = asleep.server.client().await;
         GATE.shut.store(true, Ordering::SeqCst);
-        let mut both =
-            [Attached::ask_to_join(&mut client, &session).await, Attached::ask_to_join(&mut client, &session).await];
+        let mut both = [
+            Attached::ask_to_join(&mut client, &asleep.session).await,
+            Attached::ask_to_join(&mut client, &asleep.session).await,
+        ];
         GATE.has(2).await;
-        GATE.shut.store(false, Ordering::SeqCst);
+        asleep.open_the_gate();
         for stream in &mut both {
             let opened = stream.answer().await;
             assert!(matches!(opened, proto::device_reply::Kind::Opened(_)), "{opened:?}");
         }
         let [first, second] = &mut both;
-        let next = first.trial(token, DT, 2.0).await;
-        assert_eq!(second.trial(token, DT, 2.0).await, next);
+        let next = first.trial(asleep.token, DT, 2.0).await;
+        assert_eq!(second.trial(asleep.token, DT, 2.0).await, next);
         let accept = || Ask::Accept(proto::Accept { token: next.token, answer: true });
         let answers = [first.ask(accept()).await, second.ask(accept()).await];
         let accepted = answers.iter().filter(|answer| matches!(answer, ReplyKind::Accepted(_))).count();
@@ -251,23 +280,17 @@ fn two_who_wake_one_session() {
 #[test]
 fn what_wakes_too_late() {
     static GATE: Gate = Gate::open();
-    let folder = tempfile::tempdir().expect("a folder");
-    let (session, _) = asleep(folder.path(), gated!(GATE));
-    let server = start_kept(folder.path(), Limits { stream_idle: Duration::from_secs(2), ..limits() }, gated!(GATE));
+    let asleep = Asleep::new(&GATE, gated!(GATE), Limits { stream_idle: Duration::from_secs(2), ..limits() });
     block_on(async {
-        let mut client = server.client().await;
-        GATE.shut.store(true, Ordering::SeqCst);
-        let mut waking = Attached::ask_to_join(&mut client, &session).await;
-        GATE.has(1).await;
-        while std::fs::read_dir(folder.path().join("sessions")).expect("a folder").count() > 0 {
+        let mut client = asleep.server.client().await;
+        let mut waking = asleep.waking(&mut client).await;
+        while asleep.left() != [0, 0] {
             tokio::time::sleep(Duration::from_millis(1)).await;
         }
-        GATE.shut.store(false, Ordering::SeqCst);
+        asleep.open_the_gate();
         assert_eq!(refusal(&waking.answer().await), Code::NotFound);
-        assert_eq!(Attached::join(&mut client, &session).await.err(), Some(Code::NotFound));
-        for left in ["sessions", "models"] {
-            assert_eq!(std::fs::read_dir(folder.path().join(left)).expect("a folder").count(), 0, "{left}");
-        }
+        assert_eq!(Attached::join(&mut client, &asleep.session).await.err(), Some(Code::NotFound));
+        assert_eq!(asleep.left(), [0, 0]);
     });
 }
 
@@ -275,19 +298,15 @@ fn what_wakes_too_late() {
 #[test]
 fn closing_what_wakes() {
     static GATE: Gate = Gate::open();
-    let folder = tempfile::tempdir().expect("a folder");
-    let (session, _) = asleep(folder.path(), gated!(GATE));
-    let server = start_kept(folder.path(), limits(), gated!(GATE));
+    let asleep = Asleep::new(&GATE, gated!(GATE), limits());
     block_on(async {
-        let mut client = server.client().await;
-        GATE.shut.store(true, Ordering::SeqCst);
-        let mut waking = Attached::ask_to_join(&mut client, &session).await;
-        GATE.has(1).await;
-        client.close(proto::CloseRequest { session: session.clone() }).await.expect("closes");
-        GATE.shut.store(false, Ordering::SeqCst);
+        let mut client = asleep.server.client().await;
+        let mut waking = asleep.waking(&mut client).await;
+        client.close(proto::CloseRequest { session: asleep.session.clone() }).await.expect("closes");
+        asleep.open_the_gate();
         assert_eq!(refusal(&waking.answer().await), Code::NotFound);
-        assert_eq!(Attached::join(&mut client, &session).await.err(), Some(Code::NotFound));
-        assert_eq!(std::fs::read_dir(folder.path().join("sessions")).expect("a folder").count(), 0);
+        assert_eq!(Attached::join(&mut client, &asleep.session).await.err(), Some(Code::NotFound));
+        assert_eq!(asleep.left(), [0, 0]);
     });
 }
 

@@ -12,6 +12,7 @@ mod endings;
 mod inside;
 mod kept;
 mod limits;
+mod lines;
 mod listening;
 mod quotas;
 mod random;

@@ -14,6 +14,7 @@ import pytest
 from conftest import PLATE
 
 import bimorph
+from bimorph import native
 
 pytest.importorskip("bimorph._native", reason="the package was installed without models in process: make wheel")
 
@@ -123,6 +124,26 @@ def test_states_go_on_on_either_side(both: tuple[bimorph.Model, bimorph.Model]) 
     kept.close()
     with pytest.raises(bimorph.BimorphError, match="closed"):
         kept.step({"drive": 2.0}, DT)
+
+
+def test_streams_of_both_kinds_say_the_same(
+    server: bimorph.Server, program: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A session on a server has the same replies and errors by gRPC's own streams and by those of the module."""
+
+    def said() -> str:
+        with server.client() as client:
+            model = client.compile(bimorph.Netlist.text(PLATE))
+            found = repr(pull_in(model))
+            with model.session() as session, pytest.raises(bimorph.InvalidRequest) as refused:
+                session.trial({"drive": float("inf")}, DT)
+            with pytest.raises(bimorph.InvalidRequest) as unknown:
+                model.session(["nosuch"])
+            return found + str(refused.value) + str(unknown.value)
+
+    with_module = said()
+    monkeypatch.setattr(native, "found", lambda: None)
+    assert said() == with_module
 
 
 def in_child(model: bimorph.Model) -> float:

@@ -1,10 +1,12 @@
 //! Blocking clients: a [`RemoteDevice`] for circuits and a [`Client`] for analyses.
 //!
 //! Both drive a single-threaded runtime of their own, only while a call runs: no thread is started in the host, and a
-//! round trip never waits for another thread to be woken.
+//! round trip never waits for another thread to be woken. [`Lines`] are for programs in other languages.
 
 mod analyses;
 mod device;
+#[cfg(feature = "server")]
+mod line;
 mod link;
 #[cfg(feature = "tls")]
 mod secure;
@@ -12,3 +14,5 @@ mod sweeps;
 
 pub use analyses::{Client, ClientError, RemoteTransient};
 pub use device::RemoteDevice;
+#[cfg(feature = "server")]
+pub use line::{Line, Lines};

@@ -4,6 +4,7 @@
 //! Python's lock is let go of while anything is computed. Nothing starts at import; an [`Engine`] has threads, and none of them
 //! survives a fork: the package makes one for each process.
 
+use bimorph::service::client;
 use bimorph::service::inside::{Answers, Inside, Questions};
 use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyOSError};
@@ -12,6 +13,7 @@ use pyo3::types::PyBytes;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
 use tonic::Status;
 
 create_exception!(_native, Refusal, PyException, "What a call refuses: (code, message, details).");
@@ -141,6 +143,47 @@ impl Line {
     }
 }
 
+/// Connections to servers.
+#[pyclass(frozen)]
+struct Servers(client::Lines);
+
+#[pymethods]
+impl Servers {
+    #[new]
+    fn new() -> PyResult<Self> {
+        client::Lines::new().map(Self).map_err(|error| PyOSError::new_err(error.to_string()))
+    }
+
+    /// The questions of one device on the server at an address without TLS, each answered within `patience` [s].
+    fn line(&self, py: Python<'_>, address: &str, authorization: Option<&str>, patience: f64) -> PyResult<RemoteLine> {
+        let patience = Duration::try_from_secs_f64(patience).unwrap_or(Duration::MAX);
+        let line = wait(py, None, |wanted| self.0.open(address, authorization, patience, wanted))?;
+        Ok(RemoteLine(Mutex::new(Some(line))))
+    }
+}
+
+/// The questions of one device on a server, in order.
+#[pyclass(frozen)]
+struct RemoteLine(Mutex<Option<client::Line>>);
+
+#[pymethods]
+impl RemoteLine {
+    /// The reply to a question within `patience` [s]; none to one that asks for none, or where the line is closed.
+    fn ask<'py>(&self, py: Python<'py>, request: &[u8], patience: f64) -> PyResult<Option<Bound<'py, PyBytes>>> {
+        let patience = Duration::try_from_secs_f64(patience).unwrap_or(Duration::MAX);
+        let reply = wait(py, None, |wanted| {
+            let mut line = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+            line.as_mut().map_or(Ok(None), |line| line.ask(request, patience, wanted))
+        })?;
+        Ok(reply.map(|bytes| PyBytes::new(py, &bytes)))
+    }
+
+    /// Ends the stream. Whoever asks at this moment has its answer first, or its patience ends.
+    fn close(&self, py: Python<'_>) {
+        py.detach(|| *self.0.lock().unwrap_or_else(PoisonError::into_inner) = None);
+    }
+}
+
 /// The service in this process.
 #[pymodule]
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -148,6 +191,8 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Stream>()?;
     module.add_class::<Line>()?;
     module.add_class::<Stop>()?;
+    module.add_class::<Servers>()?;
+    module.add_class::<RemoteLine>()?;
     module.add("Refusal", module.py().get_type::<Refusal>())?;
     module.add("VERSION", env!("CARGO_PKG_VERSION"))
 }

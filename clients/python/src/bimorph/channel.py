@@ -19,9 +19,10 @@ from typing import Any, TypeVar
 
 import grpc
 
+from . import native
 from .access import Access, is_secure, target
 from .errors import BimorphError, Unavailable, from_rpc
-from .line import Line
+from .line import Line, NativeLine
 from .stopping import current
 from .v1 import model_pb2, service_pb2_grpc
 
@@ -178,9 +179,13 @@ class Channel:
         finally:
             call.cancel()
 
-    def line(self, timeout: float) -> Line:
+    def line(self, timeout: float) -> Line | NativeLine:
         """Questions to one device, each with a reply within ``timeout`` [s]."""
-        return Line(self, timeout)
+        if is_secure(self.address) or native.found() is None:
+            return Line(self, timeout)
+        # what every call carries is known once the stub is
+        _ = self.stub
+        return NativeLine(self, timeout)
 
     def persist(self, ask: Callable[[Callable[[], None]], T]) -> T:
         """Asks again where the network fails. ``ask`` is given what to call when it hears that things go on.

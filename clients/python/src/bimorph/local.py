@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import importlib
-import os
-import threading
 from collections.abc import Iterator
 from typing import Any
 
 from google.protobuf import message_factory
 
+from . import native
 from .channel import Channel
 from .errors import BimorphError, from_status
 from .stopping import current
@@ -19,36 +17,10 @@ ADDRESS = "local:"
 """What a client calls this process."""
 
 _METHODS = service_pb2.DESCRIPTOR.services_by_name["Bimorph"].methods_by_name
-_lock = threading.Lock()
-_engines: dict[int, Any] = {}
-"""By process: an engine has threads, which no fork takes along. Those of parents are never used, nor let go of."""
-
-
-def _native() -> Any:
-    try:
-        return importlib.import_module("bimorph._native")
-    except ImportError as error:
-        text = "this package has no models in process: install one that `make wheel` made, or use bimorph.serve()"
-        raise BimorphError(f"{text} ({error})") from None
 
 
 def _engine() -> Any:
-    found = _engines.get(os.getpid())
-    if found is None:
-        with _lock:
-            found = _engines.get(os.getpid())
-            if found is None:
-                found = _engines[os.getpid()] = _native().Engine()
-    return found
-
-
-if hasattr(os, "register_at_fork"):
-
-    def _forked() -> None:
-        global _lock
-        _lock = threading.Lock()
-
-    os.register_at_fork(after_in_child=_forked)
+    return native.of_process("Engine")
 
 
 class LocalChannel(Channel):
@@ -56,7 +28,7 @@ class LocalChannel(Channel):
 
     def __init__(self) -> None:
         super().__init__(ADDRESS, float("inf"))
-        self._refusal = _native().Refusal
+        self._refusal = native.module().Refusal
 
     def call(self, method: str, request: Any) -> Any:
         """A call with one answer."""
@@ -86,7 +58,7 @@ class LocalChannel(Channel):
         stopping = current.get()
         if stopping is None:
             return None
-        stop = _native().Stop()
+        stop = native.module().Stop()
         stopping.begun(stop.cancel)
         return stop
 

@@ -1,0 +1,180 @@
+//! Questions to one device on a server, as bytes: what [`Questions`](crate::service::inside::Questions) are in process. For programs
+//! in other languages, whose own gRPC is slower.
+//!
+//! Connections are driven by a thread of their own, so that a network that fails is noticed whether or not anybody asks.
+
+use super::link::{is_broken, reason};
+use crate::service::address::Address;
+use crate::service::inside::{decoded, not_asynchronous, wait};
+use crate::service::proto;
+use prost::Message;
+use proto::bimorph_client::BimorphClient;
+use proto::device_request::Kind;
+use std::collections::BTreeMap;
+use std::io;
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
+use tokio::runtime::{Builder, Handle, Runtime};
+use tokio::sync::mpsc;
+use tokio_stream::wrappers::ReceiverStream;
+use tonic::metadata::{Ascii, MetadataValue};
+use tonic::transport::{Channel, Endpoint};
+use tonic::{Request, Status, Streaming};
+
+/// Requests on their way: accepts, which nobody waits for, and a question.
+const QUEUE: usize = 64;
+/// A server is asked this often whether it is there, while anything is under way; and has so long to say so.
+const PING: Duration = Duration::from_millis(2000);
+const PONG: Duration = Duration::from_millis(2500);
+
+/// Connections to servers without TLS, one to each.
+pub struct Lines {
+    /// None once it is over.
+    runtime: Option<Runtime>,
+    open: Mutex<BTreeMap<String, Channel>>,
+}
+
+/// A Trial stream.
+pub struct Line {
+    runtime: Handle,
+    requests: mpsc::Sender<proto::DeviceRequest>,
+    replies: Streaming<proto::DeviceReply>,
+    /// Replies to come.
+    owed: usize,
+}
+
+impl Lines {
+    /// None yet.
+    ///
+    /// # Errors
+    /// A system that gives no thread.
+    pub fn new() -> io::Result<Self> {
+        let runtime =
+            Builder::new_multi_thread().worker_threads(1).thread_name("bimorph-lines").enable_all().build()?;
+        Ok(Self { runtime: Some(runtime), open: Mutex::default() })
+    }
+
+    /// A stream to the server at `uri` (`unix:///path`, `host:port`), showing `authorization`; the connection is shared with others.
+    /// Waits at most for `patience`, while `waits` says that it is still wanted.
+    ///
+    /// # Errors
+    /// UNAVAILABLE where there is no server; what it refuses.
+    pub fn open(
+        &self,
+        uri: &str,
+        authorization: Option<&str>,
+        patience: Duration,
+        waits: &dyn Fn() -> bool,
+    ) -> Result<Line, Status> {
+        not_asynchronous()?;
+        let runtime = self.runtime.as_ref().ok_or_else(|| Status::unavailable("it is over"))?.handle().clone();
+        let value = authorization.map(str::parse::<MetadataValue<Ascii>>).transpose();
+        let value = value.map_err(|_| Status::invalid_argument("a token has characters that no token has"))?;
+        let asked = Instant::now();
+        let still = || waits() && asked.elapsed() < patience;
+        let begin = || {
+            let (requests, queue) = mpsc::channel(QUEUE);
+            let mut request = Request::new(ReceiverStream::new(queue));
+            if let Some(value) = &value {
+                request.metadata_mut().insert("authorization", value.clone());
+            }
+            let mut rpc = BimorphClient::new(self.channel(uri, &runtime)?).max_decoding_message_size(usize::MAX);
+            Ok((wait(&runtime, rpc.trial(request), &still)?, requests))
+        };
+        // a connection that broke while nobody asked shows at the next question; this one may be asked again
+        let begun = begin().or_else(|status| {
+            if !is_broken(&status) {
+                return Err(status);
+            }
+            self.open.lock().unwrap_or_else(PoisonError::into_inner).remove(uri);
+            begin()
+        });
+        let (replies, requests) = begun.map_err(|status: Status| said(&status, asked, patience))?;
+        Ok(Line { runtime, requests, replies: replies.into_inner(), owed: 0 })
+    }
+
+    fn channel(&self, uri: &str, runtime: &Handle) -> Result<Channel, Status> {
+        let mut open = self.open.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(channel) = open.get(uri) {
+            return Ok(channel.clone());
+        }
+        let address: Address = uri.parse().map_err(|error| Status::invalid_argument(format!("{error}")))?;
+        let endpoint = Endpoint::from_shared(address.uri()).map_err(|e| Status::invalid_argument(e.to_string()))?;
+        let _within = runtime.enter();
+        let channel = endpoint
+            .tcp_nodelay(true)
+            .connect_timeout(PONG)
+            .http2_keep_alive_interval(PING)
+            .keep_alive_timeout(PONG)
+            .connect_lazy();
+        open.insert(uri.to_owned(), channel.clone());
+        Ok(channel)
+    }
+}
+
+impl Drop for Lines {
+    fn drop(&mut self) {
+        if let Some(runtime) = self.runtime.take() {
+            runtime.shutdown_background();
+        }
+    }
+}
+
+impl Line {
+    /// The reply to a question, within `patience`; none to an accept that asks for none. Where the answer is not waited for to its
+    /// end, the next question still gets its own.
+    ///
+    /// # Errors
+    /// UNAVAILABLE, DEADLINE_EXCEEDED, CANCELLED. What a device refuses is a reply.
+    pub fn ask(
+        &mut self,
+        request: &[u8],
+        patience: Duration,
+        waits: &dyn Fn() -> bool,
+    ) -> Result<Option<Vec<u8>>, Status> {
+        not_asynchronous()?;
+        let request = decoded::<proto::DeviceRequest>(request)?.into_inner();
+        let is_silent = matches!(&request.kind, Some(Kind::Accept(accept)) if !accept.answer);
+        let asked = Instant::now();
+        let still = || waits() && asked.elapsed() < patience;
+        let Self { runtime, requests, replies, owed } = self;
+        let sent = async { requests.reserve().await.map_err(|_| Status::unknown("")) };
+        // a place first: what is dropped on the way to it was not sent
+        match wait(runtime, sent, &still) {
+            Ok(place) => place.send(request),
+            // the stream has ended, and says why
+            Err(status) if status.code() == tonic::Code::Unknown => {
+                let why = wait(runtime, async { replies.message().await }, &still).err();
+                return Err(said(&why.unwrap_or_else(ended), asked, patience));
+            }
+            Err(status) => return Err(said(&status, asked, patience)),
+        }
+        if is_silent {
+            return Ok(None);
+        }
+        *owed += 1;
+        let reply = async {
+            loop {
+                let reply = replies.message().await?.ok_or_else(ended)?;
+                *owed -= 1;
+                if *owed == 0 {
+                    return Ok(reply);
+                }
+            }
+        };
+        let reply = wait(runtime, reply, &still).map_err(|status| said(&status, asked, patience))?;
+        Ok(Some(reply.encode_to_vec()))
+    }
+}
+
+fn ended() -> Status {
+    Status::unavailable("the stream has ended")
+}
+
+/// A status as it is told: what broke is UNAVAILABLE, and what took too long says so.
+fn said(status: &Status, asked: Instant, patience: Duration) -> Status {
+    if status.code() == tonic::Code::Cancelled && asked.elapsed() >= patience {
+        return Status::deadline_exceeded(format!("no answer within {} s", patience.as_secs_f64()));
+    }
+    if is_broken(status) { Status::unavailable(reason(status)) } else { status.clone() }
+}
