@@ -1,4 +1,5 @@
-//! Names that nobody can guess: who knows the id of a session or a sweep may use it, and only its client was told.
+//! Names that nobody can guess: who knows the id of a session or a sweep may use it, and only its client was told. Clients name their
+//! requests so as well.
 
 use std::fs::File;
 use std::io::Read;
@@ -28,8 +29,7 @@ impl Ids {
 }
 
 fn no_bytes(error: &std::io::Error) -> Status {
-    tracing::error!(%error, "no random bytes from {SOURCE}");
-    Status::unavailable("the system gives no random bytes for an id")
+    Status::unavailable(format!("the system gives no random bytes for an id ({SOURCE}: {error})"))
 }
 
 #[cfg(test)]
