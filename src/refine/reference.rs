@@ -5,7 +5,7 @@
 //! ```
 //! for each mode (λ, y) of the model, then Rayleigh–Ritz with K and M_r over the block of all x.
 
-use super::span::Span;
+use super::span::{Scratch, Span};
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, Pattern};
 use crate::solve::frequency::mac;
@@ -38,26 +38,28 @@ pub(super) struct Compared {
 /// Modes by inverse iteration and Rayleigh–Ritz with the reference.
 pub(super) fn compare(pencil: &Pencil<'_>, spans: &[Span], lambda: &[f64], shapes: &[Vec<Pose>]) -> Option<Compared> {
     let count = lambda.len();
-    let softer = |x: &[Pose]| {
+    let tight: Vec<&Span> = spans.iter().filter(|span| span.softer != Matrix6::zeros()).collect();
+    let softer = |x: &[Pose], scratch: &mut Scratch| {
         let mut f = vec![Pose::zeros(); x.len()];
-        for span in spans.iter().filter(|span| span.softer != Matrix6::zeros()) {
-            span.scatter(&span.segments(&span.local(x), &span.softer), &mut f);
+        for span in &tight {
+            span.add_segments(x, &span.softer, scratch, &mut f);
         }
         f
     };
-    let weigh = |x: &[Pose], lambda: f64| {
+    let weigh = |x: &[Pose], lambda: f64, scratch: &mut Scratch| {
         let mut z = (pencil.mass)(x);
         let base = z.clone();
         for span in spans {
-            span.scatter(&span.defect(&span.local(x), lambda), &mut z);
+            span.add_defect(x, lambda, scratch, &mut z);
         }
         (z, base)
     };
+    let scratch = &mut Scratch::default();
     let (mut x, mut kx, mut norms) = (Vec::new(), Vec::new(), Vec::new());
     let (mut mx, mut second, mut plain) = (Vec::new(), Vec::new(), Vec::new());
     for (y, &lambda) in shapes.iter().zip(lambda) {
-        let (full, base) = weigh(y, lambda);
-        let give = softer(y);
+        let (full, base) = weigh(y, lambda, scratch);
+        let give = softer(y, scratch);
         let mut z: Vec<Pose> =
             full.iter().zip(&base).zip(&give).map(|((f, b), s)| f * lambda + s - b * pencil.shift).collect();
         (pencil.project)(&mut z);
@@ -66,13 +68,13 @@ pub(super) fn compare(pencil: &Pencil<'_>, spans: &[Span], lambda: &[f64], shape
         (pencil.project)(&mut solved);
         norms.push(dot(&solved, &full));
         plain.push(base);
-        let (full, base) = weigh(&solved, 0.0);
-        let give = softer(&solved);
+        let (full, base) = weigh(&solved, 0.0, scratch);
+        let give = softer(&solved, scratch);
         kx.push(z.iter().zip(&base).zip(&give).map(|((z, b), s)| z + b * pencil.shift - s).collect::<Vec<Pose>>());
         mx.push(full);
         let mut bent = vec![Pose::zeros(); solved.len()];
         for span in spans {
-            span.scatter(&span.segments(&span.local(&solved), &span.second), &mut bent);
+            span.add_segments(&solved, &span.second, scratch, &mut bent);
         }
         second.push(bent);
         x.push(solved);

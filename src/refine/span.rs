@@ -28,26 +28,59 @@ pub(super) struct Span {
     pub(super) lumps: Vec<Part>,
 }
 
+/// Motions and forces at the points of a span.
+#[derive(Default)]
+pub(super) struct Scratch {
+    x: Vec<Vector3<f64>>,
+    f: Vec<Vector3<f64>>,
+}
+
 impl Span {
+    /// `out +=` (M_r − M)·x of this beam, N·A included.
+    pub(super) fn add_defect(&self, x: &[Pose], lambda: f64, scratch: &mut Scratch, out: &mut [Pose]) {
+        self.fill(x, &(self.mass + self.second * lambda), scratch);
+        for ((f, x), lump) in scratch.f.iter_mut().zip(&scratch.x).zip(&self.lumps) {
+            lighten(f, x, lump);
+        }
+        self.scatter(&scratch.f, out);
+    }
+
+    /// `out +=` the same matrix for every segment, times x.
+    pub(super) fn add_segments(&self, x: &[Pose], segment: &Matrix6<f64>, scratch: &mut Scratch, out: &mut [Pose]) {
+        self.fill(x, segment, scratch);
+        self.scatter(&scratch.f, out);
+    }
+
+    /// Motion of the points, and what the matrix of every segment makes of it.
+    fn fill(&self, x: &[Pose], segment: &Matrix6<f64>, scratch: &mut Scratch) {
+        scratch.x.clear();
+        scratch.x.extend(self.points_of(x));
+        scratch.f.clear();
+        scratch.f.resize(scratch.x.len(), Vector3::zeros());
+        multiply(segment, &scratch.x, &mut scratch.f);
+    }
+
     /// Motion of the points along and across the beam.
     pub(super) fn local(&self, x: &[Pose]) -> Vec<Vector3<f64>> {
-        let at = |p: &Point| match p.body {
+        self.points_of(x).collect()
+    }
+
+    fn points_of<'a>(&'a self, x: &'a [Pose]) -> impl Iterator<Item = Vector3<f64>> + 'a {
+        let at = move |p: &Point| match p.body {
             BodyId::Ground => Vector3::zeros(),
             BodyId::Free(k) => {
                 let (dx, dy) = (x[k].x - x[k].z * p.arm.y, x[k].y + x[k].z * p.arm.x);
                 Vector3::new(dx * self.along.x + dy * self.along.y, dy * self.along.x - dx * self.along.y, x[k].z)
             }
         };
-        self.points.iter().map(at).collect()
+        self.points.iter().map(at)
     }
 
     /// (M_r − M)·x of this beam, over its points, N·A included.
     pub(super) fn defect(&self, x: &[Vector3<f64>], lambda: f64) -> Vec<Vector3<f64>> {
         let mut f = self.segments(x, &(self.mass + self.second * lambda));
         for ((f, x), lump) in f.iter_mut().zip(x).zip(&self.lumps) {
-            f.x -= lump.mass * x.x;
-            f.y -= lump.mass * x.y + lump.first * x.z;
-            f.z -= lump.first * x.y + lump.second * x.z;
+            lighten(f, x, lump);
         }
         f
     }
@@ -62,12 +95,7 @@ impl Span {
     /// The same matrix for every segment, times x.
     pub(super) fn segments(&self, x: &[Vector3<f64>], segment: &Matrix6<f64>) -> Vec<Vector3<f64>> {
         let mut f = vec![Vector3::zeros(); x.len()];
-        for k in 0..x.len() - 1 {
-            let (a, b) = (x[k], x[k + 1]);
-            let both = segment * Vector6::new(a.x, a.y, a.z, b.x, b.y, b.z);
-            f[k] += both.fixed_rows::<3>(0);
-            f[k + 1] += both.fixed_rows::<3>(3);
-        }
+        multiply(segment, x, &mut f);
         f
     }
 
@@ -80,6 +108,23 @@ impl Span {
             }
         }
     }
+}
+
+/// `f +=` the same matrix for every segment, times x.
+fn multiply(segment: &Matrix6<f64>, x: &[Vector3<f64>], f: &mut [Vector3<f64>]) {
+    for k in 0..x.len() - 1 {
+        let (a, b) = (x[k], x[k + 1]);
+        let both = segment * Vector6::new(a.x, a.y, a.z, b.x, b.y, b.z);
+        f[k] += both.fixed_rows::<3>(0);
+        f[k + 1] += both.fixed_rows::<3>(3);
+    }
+}
+
+/// Takes away what a lump of the model has for itself.
+fn lighten(f: &mut Vector3<f64>, x: &Vector3<f64>, lump: &Part) {
+    f.x -= lump.mass * x.x;
+    f.y -= lump.mass * x.y + lump.first * x.z;
+    f.z -= lump.first * x.y + lump.second * x.z;
 }
 
 /// Every beam over its `points`, less the offsets at both ends.

@@ -7,7 +7,8 @@
 //!
 //! Reference: B. N. Parlett, "The symmetric eigenvalue problem" (1998), chapter 13.
 
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use super::tridiagonal::{eigen, last_entries};
+use nalgebra::{DMatrix, DVector};
 
 /// Ritz pairs, |θ| descending.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,10 +23,14 @@ pub struct Pairs {
 
 /// A step that leaves less than this share of the largest eigenvalue has closed a subspace.
 pub(super) const CLOSED: f64 = 1e-14;
+/// Vectors beyond the wanted ones before the first look at what has settled, and between two looks at least.
+const FIRST_LOOK: usize = 6;
+const NEXT_LOOK: usize = 3;
+/// Vectors that memory is taken for at first beyond the wanted ones.
+const ROOM: usize = 16;
 
 /// The `wanted` largest eigenvalues in magnitude of `apply`, an operator on vectors of `n` numbers of rank `rank`, each
-/// settled when its residual is below `tolerance` of it. At most `most` vectors are built up. `direction(k)` is the k-th
-/// direction to begin with, in the range of the operator.
+/// settled when its residual is below `tolerance` of it. At most `most` vectors are built up. `direction(k)` is the k-th direction to begin with, in the range of the operator.
 pub fn largest(
     (n, rank): (usize, usize),
     apply: &mut dyn FnMut(&DVector<f64>) -> DVector<f64>,
@@ -34,81 +39,132 @@ pub fn largest(
     tolerance: f64,
     most: usize,
 ) -> Pairs {
+    let direction = &|k: usize| direction(k).as_slice().to_vec();
+    let mut given = DVector::zeros(n);
+    let apply: &mut dyn FnMut(&[f64], &mut [f64]) = &mut |x, y| {
+        given.copy_from_slice(x);
+        y.copy_from_slice(apply(&given).as_slice());
+    };
     let most = most.min(rank).max(1);
     // the basis, then vectors as they are wanted, as shapes of bodies and of nodes
     crate::budget::lay_out_matrix(n, most + 4 * wanted.min(most));
-    let mut basis = DMatrix::<f64>::zeros(n, most);
+    // one vector after the other
+    let mut basis: Vec<f64> = Vec::with_capacity(n * (wanted + ROOM).min(most));
     let (mut diagonal, mut beside): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
     let mut begun = 0;
-    let mut next = fresh(&basis.columns(0, 0), direction, apply, &mut begun);
+    let mut next = fresh(&basis, direction, apply, &mut begun);
+    let mut w = vec![0.0; n];
     let mut scale: f64 = 0.0;
-    let mut check = wanted + 8;
+    let mut check = wanted + FIRST_LOOK;
     for j in 0..most {
-        basis.set_column(j, &next);
-        let mut w = apply(&next);
-        diagonal.push(next.dot(&w));
-        orthogonalize(&basis.columns(0, j + 1), &mut w);
+        basis.extend_from_slice(&next);
+        apply(&next, &mut w);
+        diagonal.push(dot(&next, &w));
+        orthogonalize(&basis, &mut w);
         scale = scale.max(diagonal[j].abs());
-        let length = w.norm();
+        let length = dot(&w, &w).sqrt();
         let closed = length.is_nan() || length <= CLOSED * scale;
         beside.push(if closed { 0.0 } else { length });
         let last = j + 1 == most;
         if last || j + 1 >= check {
-            check = (j + 1) + ((j + 1) / 4).max(6);
-            let (theta, shapes, settled) = ritz(&diagonal, &beside, wanted, tolerance);
+            check = (j + 1) + ((j + 1) / 4).max(NEXT_LOOK);
+            let settled = settled(&diagonal, &beside, wanted, tolerance);
             if last || settled >= wanted.min(j + 1) && j + 1 >= wanted {
-                return Pairs { theta, vectors: basis.columns(0, j + 1) * shapes, settled };
+                let (theta, shapes) = ritz(&diagonal, &beside, wanted);
+                return Pairs { theta, vectors: combined(&basis, n, &shapes), settled };
             }
         }
-        next = if closed { fresh(&basis.columns(0, j + 1), direction, apply, &mut begun) } else { w / length };
+        if closed {
+            next = fresh(&basis, direction, apply, &mut begun);
+        } else {
+            next.iter_mut().zip(&w).for_each(|(next, w)| *next = w / length);
+        }
     }
     Pairs { theta: Vec::new(), vectors: DMatrix::zeros(n, 0), settled: 0 }
 }
 
-type Columns<'a> = nalgebra::DMatrixView<'a, f64>;
+/// aᵀb, in eight sums: always the same eight, and as fast as vectors are read.
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let mut sums = [0.0; 8];
+    let (a, b) = (a.chunks_exact(8), b.chunks_exact(8));
+    let rest: f64 = a.remainder().iter().zip(b.remainder()).map(|(a, b)| a * b).sum();
+    for (a, b) in a.zip(b) {
+        for k in 0..8 {
+            sums[k] += a[k] * b[k];
+        }
+    }
+    sums.iter().sum::<f64>() + rest
+}
 
-/// Removes from `w` what lies in the span of orthonormal columns, twice.
-fn orthogonalize(basis: &Columns<'_>, w: &mut DVector<f64>) {
+/// `w += factor·v`.
+fn add(w: &mut [f64], factor: f64, v: &[f64]) {
+    w.iter_mut().zip(v).for_each(|(w, v)| *w += factor * v);
+}
+
+/// Removes from `w` what lies in the span of orthonormal vectors, twice.
+fn orthogonalize(basis: &[f64], w: &mut [f64]) {
+    let mut h = Vec::with_capacity(basis.len() / w.len().max(1));
     for _ in 0..2 {
-        let h = basis.tr_mul(w);
-        w.gemv(-1.0, basis, &h, 1.0);
+        h.clear();
+        h.extend(basis.chunks_exact(w.len()).map(|v| dot(v, w)));
+        for (v, h) in basis.chunks_exact(w.len()).zip(&h) {
+            add(w, -h, v);
+        }
     }
 }
 
 /// A direction of length 1 that the basis does not have yet.
 fn fresh(
-    basis: &Columns<'_>,
-    direction: &dyn Fn(usize) -> DVector<f64>,
-    apply: &mut dyn FnMut(&DVector<f64>) -> DVector<f64>,
+    basis: &[f64],
+    direction: &dyn Fn(usize) -> Vec<f64>,
+    apply: &mut dyn FnMut(&[f64], &mut [f64]),
     begun: &mut usize,
-) -> DVector<f64> {
-    let mut w = apply(&direction(*begun));
+) -> Vec<f64> {
+    let from = direction(*begun);
+    let mut w = vec![0.0; from.len()];
+    apply(&from, &mut w);
     *begun += 1;
-    let length = w.norm();
-    w /= length;
+    let length = dot(&w, &w).sqrt();
+    w.iter_mut().for_each(|w| *w /= length);
     orthogonalize(basis, &mut w);
-    let left = w.norm();
-    w / left
+    let left = dot(&w, &w).sqrt();
+    w.iter_mut().for_each(|w| *w /= left);
+    w
 }
 
-/// Largest eigenvalues of the tridiagonal matrix, its vectors, and how many of them settled, counted from the largest.
-fn ritz(diagonal: &[f64], beside: &[f64], wanted: usize, tolerance: f64) -> (Vec<f64>, DMatrix<f64>, usize) {
-    let m = diagonal.len();
-    let mut t = DMatrix::<f64>::zeros(m, m);
-    for j in 0..m {
-        t[(j, j)] = diagonal[j];
-        if j + 1 < m {
-            (t[(j, j + 1)], t[(j + 1, j)]) = (beside[j], beside[j]);
+/// The combinations of basis vectors that `shapes` tell.
+fn combined(basis: &[f64], n: usize, shapes: &[Vec<f64>]) -> DMatrix<f64> {
+    let mut vectors = DMatrix::zeros(n, shapes.len());
+    for (mut column, shape) in vectors.column_iter_mut().zip(shapes) {
+        for (v, share) in basis.chunks_exact(n).zip(shape) {
+            add(column.as_mut_slice(), *share, v);
         }
     }
-    let eigen = SymmetricEigen::new(t);
-    let mut order: Vec<usize> = (0..m).collect();
-    order.sort_by(|&a, &b| eigen.eigenvalues[b].abs().total_cmp(&eigen.eigenvalues[a].abs()));
+    vectors
+}
+
+/// Places of the largest numbers in magnitude, the largest first.
+fn largest_of(values: &[f64], wanted: usize) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..values.len()).collect();
+    order.sort_by(|&a, &b| values[b].abs().total_cmp(&values[a].abs()));
     order.truncate(wanted);
-    let theta: Vec<f64> = order.iter().map(|&k| eigen.eigenvalues[k]).collect();
-    let rest = |k: usize| (beside[m - 1] * eigen.eigenvectors[(m - 1, k)]).abs();
-    let settled = order.iter().zip(&theta).take_while(|(k, theta)| rest(**k) <= tolerance * theta.abs()).count();
-    (theta, DMatrix::from_fn(m, order.len(), |r, c| eigen.eigenvectors[(r, order[c])]), settled)
+    order
+}
+
+/// How many of the largest eigenvalues of the tridiagonal matrix have settled, counted from the largest.
+fn settled(diagonal: &[f64], beside: &[f64], wanted: usize, tolerance: f64) -> usize {
+    let m = diagonal.len();
+    let (values, last) = last_entries(diagonal, &beside[..m - 1]);
+    let rest = |k: usize| (beside[m - 1] * last[k][0]).abs();
+    largest_of(&values, wanted).into_iter().take_while(|&k| rest(k) <= tolerance * values[k].abs()).count()
+}
+
+/// Largest eigenvalues of the tridiagonal matrix, and its vectors.
+fn ritz(diagonal: &[f64], beside: &[f64], wanted: usize) -> (Vec<f64>, Vec<Vec<f64>>) {
+    let (values, mut vectors) = eigen(diagonal, &beside[..diagonal.len() - 1]);
+    let order = largest_of(&values, wanted);
+    let theta = order.iter().map(|&k| values[k]).collect();
+    (theta, order.into_iter().map(|k| std::mem::take(&mut vectors[k])).collect())
 }
 
 #[cfg(test)]

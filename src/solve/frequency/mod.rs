@@ -24,3 +24,4 @@ mod mass;
 pub mod pole;
 pub mod refined;
 pub mod subspace;
+mod tridiagonal;
