@@ -1,19 +1,21 @@
 //! Points per second of processor time in sweeps of the bank, one line each, in one run on one thread:
 //! `analysis,points,way,points_per_s,over_alone`.
 //!
-//!     taskset -c 0 cargo run --release --no-default-features --example sweep_speed [POINTS] [transient|static|modes]
+//!     taskset -c 0 cargo run --release --no-default-features --example sweep_speed [POINTS] [transient|static|modes|parts]
 //!
 //! *alone*: every point as a call of its own, read, searched a mesh for and analysed. *given mesh*: the same on the a priori
 //! mesh, without any estimate. *sweep*: `jobs::sweep`, with the estimate of every point. Transients are on two segments a beam in all
 //! ways; *lanes* is the integration alone, *sweep* has the reading and the estimate too. Their ends are compared bit by bit.
+//! *parts*, on its own: what a point is made of, `part,us`.
 
 use bimorph::analysis::mesh::{Request, fitted};
 use bimorph::analysis::side_by_side;
 use bimorph::analysis::transient::{TransientOptions, transient};
 use bimorph::analysis::{modes::modes, statics::static_equilibrium};
-use bimorph::compile::{CompileOptions, Compiled, compile};
+use bimorph::compile::{CompileOptions, Compiled, compile, draw};
 use bimorph::jobs::sweep::{self, Shard, SweepAnalysis, SweepParameter, SweepSpec};
-use bimorph::netlist::Bundle;
+use bimorph::netlist::{Bundle, Source};
+use bimorph::refine::model_order::ModelOrder;
 use std::hint::black_box;
 use std::path::Path;
 
@@ -22,6 +24,9 @@ fn main() {
     let points = argument(1).and_then(|n| n.parse().ok()).unwrap_or(2000);
     let only = argument(2).unwrap_or_default();
     let wanted = |name: &str| only.is_empty() || only == name;
+    if only == "parts" {
+        parts(points);
+    }
     if wanted("transient") {
         transients(points / 8);
     }
@@ -140,6 +145,34 @@ fn rate(count: usize, work: impl FnOnce()) -> f64 {
     let before = used();
     work();
     count as f64 / (used() - before)
+}
+
+/// What one point is made of, each part done `points` times.
+fn parts(points: usize) {
+    let voltages = vec![("heat".to_owned(), 2.2)];
+    let (spec, bundle) = grid(9, SweepAnalysis::Modes { count: 3, voltages: Vec::new() });
+    let source = Source::new(&bundle);
+    let options = CompileOptions { set: spec.settings(4), ..CompileOptions::default() };
+    let drawn = draw(&source, &options).expect("the bank");
+    let compiled = drawn.clone().compile().expect("the bank");
+    let part =
+        |name: &str, work: &dyn Fn()| println!("{name},{:.1}", 1e6 / rate(points, || (0..points).for_each(|_| work())));
+    part("draw", &|| drop(black_box(draw(&source, &options))));
+    for (name, request) in
+        [("static", Request::Static { voltages: &voltages }), ("modes", Request::Modes { count: 3, voltages: &[] })]
+    {
+        let order = fitted(&compiled, &request).expect("a mesh").order;
+        let mesh = drawn.clone().on(order.clone()).expect("a mesh");
+        let twice = ModelOrder { segments: order.segments.iter().map(|n| 2 * n).collect(), ..order.clone() };
+        part(&format!("{name} mesh"), &|| drop(black_box(drawn.clone().on(order.clone()))));
+        match request {
+            Request::Static { voltages } => {
+                part("second mesh", &|| drop(black_box(mesh.with_order(twice.clone()))));
+                part("equilibrium", &|| drop(black_box(static_equilibrium(&mesh, voltages))));
+            }
+            _ => part("modes", &|| drop(black_box(modes(&mesh, 3, &[])))),
+        }
+    }
 }
 
 /// Processor time of all threads of this process [s], in ticks of a hundredth (Linux).
