@@ -3,7 +3,7 @@
 use crate::discretize::{DiscretizeError, Discretized, discretize_like, order, yielded};
 use crate::equations::Joints;
 use crate::multibody::relative::Unfit;
-use crate::netlist::{Bundle, Diagnostics, Setting, Source};
+use crate::netlist::{Bundle, Diagnostic, Diagnostics, Setting, Source};
 use crate::options::Refused;
 use crate::refine::imperfection;
 use crate::refine::model_order::{self, ModelOrder};
@@ -133,8 +133,9 @@ impl Drawn {
     ///
     /// # Errors
     /// See [`DiscretizeError`].
-    pub fn on(self, order: ModelOrder) -> Result<Compiled, DiscretizeError> {
+    pub fn on(mut self, order: ModelOrder) -> Result<Compiled, DiscretizeError> {
         let parts = laid_out(&self.structure, &self.options, &order.segments, None)?;
+        self.warnings.items.extend(beyond_table(&self.structure, &self.options, &parts));
         Ok(Compiled {
             joints: in_joints_of(&parts, &self.options),
             structure: self.structure,
@@ -145,6 +146,19 @@ impl Drawn {
             order,
         })
     }
+}
+
+/// What to say of junctions that the calibration does not know.
+fn beyond_table(structure: &Structure, options: &CompileOptions, parts: &Discretized) -> Option<Diagnostic> {
+    if options.junctions != Junctions::Calibrated {
+        return None;
+    }
+    let found = parts.beyond_table(structure)?;
+    let more = if found.count > 1 { format!(" ({} such beams in all)", found.count) } else { String::new() };
+    let name = &structure.beams[found.first].name;
+    let message = format!("the junctions of `{name}` are beyond what they were calibrated for: {}{more}", found.why);
+    let help = "the accuracy that docs/junctions.md tells does not hold there; compare with `--junctions offset`";
+    Some(Diagnostic::warning("W017", message, help))
 }
 
 /// Bodies and joints, with the imperfection asked for.

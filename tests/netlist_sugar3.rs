@@ -268,3 +268,33 @@ fn the_order_is_always_the_same() {
         assert_eq!(drawn(&text), first);
     }
 }
+
+/// Every angle is in degrees, those of arcs and arms too; coordinates of a node that is there already hold where it had none and are
+/// told where they differ; a string is no number of a material, and misspelt entries are told.
+#[test]
+fn angles_coordinates_and_materials() {
+    let arc = |alpha: f64| {
+        drawn(&format!(
+            "{LAYER}anchor {{node \"A\"; material=p1}}\narc2d {{node \"A\", node \"B\"; material=p1, w=2u, radius=100u, alpha={alpha}}}\n"
+        ))
+    };
+    let end = arc(90.0).nodes[1].position;
+    assert!((end[0] - 100e-6).abs() < 1e-12 && (end[1] - 100e-6).abs() < 1e-12, "{end:?}");
+    let nodes = "O = node {0, 0; name=\"O\"}\nnode \"B\"\nB = node {0, 50u; name=\"B\"}\nanchor {O; material=p1}\n";
+    let beam = drawn(&format!("{LAYER}{nodes}beam2d {{O, B; material=p1, w=2u}}\n"));
+    assert_eq!(beam.beams[0].length, 50e-6);
+    let warned = |text: &str| {
+        let loaded = load(&Bundle::from_text("t.net", text), &[]).unwrap_or_else(|d| panic!("{d}"));
+        loaded.warnings.items.into_iter().map(|d| (d.code, d.line, d.message)).collect::<Vec<_>>()
+    };
+    let again = "node {0, 60u; name=\"B\"}\n";
+    let told = warned(&format!("{LAYER}{nodes}{again}beam2d {{O, B; material=p1, w=2u}}\n"));
+    assert_eq!(told.len(), 1, "{told:?}");
+    assert!(told[0].0 == "W011" && told[0].1 == 6 && told[0].2.contains("`B`"), "{told:?}");
+    let cantilever = "anchor {node \"A\"; material=q}\nbeam2d {node \"A\", node \"B\"; material=q, l=100u, w=2u}\n";
+    let text = format!("{LAYER}q = material {{parent=p1, stress=\"100M\"}}\n{cantilever}");
+    let found = refused(&text);
+    assert!(found.code == "E050" && found.message.contains("`stress`"), "{found:?}");
+    let told = warned(&format!("{LAYER}q = material {{parent=p1, strss=1}}\n{cantilever}"));
+    assert!(told.len() == 1 && told[0].0 == "W004" && told[0].2.contains("`strss`"), "{told:?}");
+}

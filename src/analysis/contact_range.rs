@@ -1,7 +1,9 @@
-//! No result from beyond the law of contact: a part pressed further into another than the law knows is refused by name.
+//! No result from beyond the law of contact: a part pressed further into another than the law knows is refused by name. Combs have
+//! no contact at the ends of their fingers: what goes through is told.
 
 use super::AnalysisError;
 use crate::compile::Compiled;
+use crate::gaps::Gap;
 use crate::multibody::planar::Pose;
 
 /// Refuses a configuration in which a gap is closed beyond the range of its law, see [`crate::gaps::contact`].
@@ -18,4 +20,17 @@ pub(crate) fn within_contact_range(compiled: &Compiled, q: &[Pose]) -> Result<()
             least: system.touching(gap).map_or(0.0, |[_, least]| least),
         }),
     }
+}
+
+/// The comb whose fingers go furthest through the other side at `q`: its name, and how far its sides have come together of how
+/// much they can [m].
+pub(crate) fn comb_beyond<'a>(compiled: &'a Compiled, q: &[Pose]) -> Option<(&'a str, [f64; 2])> {
+    let system = &compiled.parts.system;
+    // combs are the first gaps, in their order
+    let beyond = compiled.structure.combs.iter().zip(&system.gaps).filter_map(|(comb, gap)| {
+        let Gap::Single { approach, .. } = gap else { return None };
+        let (way, room) = (approach.value(q, system.model.linear), comb.finger[0] - comb.overlap);
+        (comb.finger[0] > 0.0 && way > room * (1.0 + 1e-9)).then_some((comb.name.as_str(), [way, room]))
+    });
+    beyond.max_by(|a, b| (a.1[0] - a.1[1]).total_cmp(&(b.1[0] - b.1[1])))
 }

@@ -93,8 +93,7 @@ pub fn assemble(structure: &Structure, options: &FrameOptions) -> Result<Frame, 
     for spring in &structure.springs {
         lay_spring(spring, undamped, &rigid, &mut joints, &mut dampers);
     }
-    let stiffest = pieces.iter().map(Piece::axial).fold(0.0, f64::max);
-    rigid.hold_hinges(structure, stiffest, &mut joints);
+    rigid.hold_hinges(structure, &mut joints);
 
     let (gaps, _, across) = match options.gaps {
         FrameGaps::LeftOut => Default::default(),
@@ -113,7 +112,7 @@ pub fn assemble(structure: &Structure, options: &FrameOptions) -> Result<Frame, 
     };
     let n = system.bodies();
     let mut load = vec![Pose::zeros(); n];
-    let heated: Vec<&str> = structure.beams.iter().filter(|b| b.heater.is_some()).map(|b| b.name.as_str()).collect();
+    let heated: Vec<usize> = (0..structure.beams.len()).filter(|&k| structure.beams[k].heater.is_some()).collect();
     let mut expansion = vec![vec![Pose::zeros(); n]; heated.len()];
     let add = |system: &mut LinearSystem, a: BodyId, b: BodyId, k: &Matrix6<f64>, m: &Matrix6<f64>, drag: f64| {
         let (a, b) = (moved(a), moved(b));
@@ -129,7 +128,7 @@ pub fn assemble(structure: &Structure, options: &FrameOptions) -> Result<Frame, 
         let strain =
             piece.beam.temperature.map_or(0.0, |t| material.thermal_expansion * (t - material.ambient_temperature))
                 - material.stress / material.youngs_modulus;
-        let heater = heated.iter().position(|&name| name == piece.beam.name);
+        let heater = heated.binary_search(&piece.index).ok();
         for (id, row) in ends {
             if let BodyId::Free(body) = id {
                 let force: Vector3<f64> = push.fixed_rows::<3>(row).into_owned();
@@ -196,7 +195,7 @@ fn cut<'a>(
             let at = start + (end - start) * (k as f64 / count as f64);
             let to =
                 if k == count { rigid.point(beam.b.0) } else { rigid.add_segment(BodyName::segment(&name, k), at) };
-            pieces.push(Piece { beam, from, to, length: beam.length / count as f64 });
+            pieces.push(Piece { index, beam, from, to, length: beam.length / count as f64 });
             points.push(to);
             from = to;
         }
@@ -207,6 +206,8 @@ fn cut<'a>(
 
 /// One element.
 struct Piece<'a> {
+    /// Of its beam in the structure.
+    index: usize,
     beam: &'a Beam,
     from: Point,
     to: Point,
@@ -214,11 +215,6 @@ struct Piece<'a> {
 }
 
 impl Piece<'_> {
-    /// EA/h [N/m].
-    fn axial(&self) -> f64 {
-        self.beam.material.youngs_modulus * self.beam.width * self.beam.thickness / self.length
-    }
-
     fn drag_per_mass(&self) -> f64 {
         let m = &self.beam.material;
         if m.viscosity == 0.0 { 0.0 } else { m.viscosity / (m.fluid * m.density * self.beam.thickness) }

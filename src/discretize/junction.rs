@@ -19,7 +19,7 @@
 use super::junction_springs::{End, corner, interpolate};
 use super::junction_table as table;
 use super::overlap::{self, IN_LINE, Strip, turn};
-use super::rigid::Assembly;
+use super::rigid::{Assembly, Lump};
 use crate::budget;
 use crate::multibody::BodyId;
 use crate::options::Junctions;
@@ -47,13 +47,16 @@ struct Branch {
 pub struct Ends {
     /// For each beam, its start and its end.
     pub beams: Vec<[End; 2]>,
-    /// Junctions with two beams or more: node, its strips, a beam whose material they are taken to be of.
-    meetings: Vec<(usize, Vec<Strip>, usize)>,
+    /// Junctions with two beams or more: node, its strips, and the beam of each.
+    pub(super) meetings: Vec<(usize, Vec<Strip>, Vec<usize>)>,
+    /// Beams whose offsets were cut down.
+    pub(super) cut: Vec<usize>,
 }
 
 /// Finds the junctions of a drawing.
 pub fn find(structure: &Structure, rigid: &Assembly, kind: Junctions) -> Ends {
-    let mut ends = Ends { beams: vec![[End::default(); 2]; structure.beams.len()], meetings: Vec::new() };
+    let mut ends =
+        Ends { beams: vec![[End::default(); 2]; structure.beams.len()], meetings: Vec::new(), cut: Vec::new() };
     if kind == Junctions::Centreline {
         return ends;
     }
@@ -75,16 +78,19 @@ pub fn find(structure: &Structure, rigid: &Assembly, kind: Junctions) -> Ends {
             }
         } else if branches.len() > 1 {
             meet(branches, &structure.beams, &mut ends.beams);
-            let strips = branches.iter().map(|b| Strip { angle: b.angle, width: b.width }).collect();
-            ends.meetings.push((node, strips, branches[0].beam));
+            let strips = branches.iter().map(|b| Strip { angle: b.angle, width: b.width, weight: 1.0 }).collect();
+            ends.meetings.push((node, strips, branches.iter().map(|b| b.beam).collect()));
         } else if let [b] = branches.as_slice() {
             ends.beams[b.beam][b.end].free = true;
         }
     }
-    for (beam, [start, end]) in structure.beams.iter().zip(&mut ends.beams) {
+    for (k, (beam, [start, end])) in structure.beams.iter().zip(&mut ends.beams).enumerate() {
         let share = (start.offset + end.offset) / (MOST * beam.length);
         let taken = (start.offset + end.offset) / share.max(1.0);
         let room = 0.5 * (MOST * beam.length - taken).max(0.0);
+        if share > 1.0 {
+            ends.cut.push(k);
+        }
         for end in [start, end] {
             if share > 1.0 {
                 end.offset /= share;
@@ -109,23 +115,51 @@ impl Ends {
                 brought[node.0] += 0.5 * beam.material.density * beam.width * beam.thickness * beam.length;
             }
         }
-        for (node, strips, beam) in &self.meetings {
-            let beam = &structure.beams[*beam];
-            let m = &beam.material;
-            let mut excess = overlap::overlap(strips);
+        for (node, strips, beams) in &self.meetings {
+            let beams = || beams.iter().map(|beam| &structure.beams[*beam]);
+            let (mass, strips) = weighted(strips, beams().map(|b| b.material.density * b.thickness));
+            if mass <= 0.0 {
+                continue;
+            }
+            let mut excess = overlap::overlap(&strips);
             // beams shorter than the junction have no such overlap
             let shortest = shortest[*node];
             let widest = strips.iter().map(|s| s.width).fold(0.0, f64::max);
-            let whole = m.density * beam.thickness * (shortest / widest).min(1.0);
+            let room = (shortest / widest).min(1.0);
+            let whole = mass * room;
             // where junctions of stout beams overlap in turn, no more goes than leaves half of what the beams bring
             let left = MOST_MASS * brought[*node] / (whole * excess.amount).max(f64::MIN_POSITIVE);
             let scale = -whole * left.min(1.0);
-            excess.amount *= scale;
-            excess.first *= scale;
-            excess.second *= scale;
-            rigid.add_mass(rigid.point(*node), &excess, super::beam::drag_per_mass(beam, undamped));
+            scaled(&mut excess, scale);
+            let drag = |beam: &Beam| super::beam::drag_per_mass(beam, undamped);
+            let first = beams().next().map_or(0.0, drag);
+            let point = rigid.point(*node);
+            if beams().all(|beam| drag(beam) == first) {
+                rigid.add_mass(point, &excess, first);
+                continue;
+            }
+            rigid.add_mass(point, &excess, 0.0);
+            let film =
+                |b: &Beam| if b.material.density > 0.0 { drag(b) * b.material.density * b.thickness } else { 0.0 };
+            let (most, strips) = weighted(&strips, beams().map(film));
+            let mut twice = overlap::overlap(&strips);
+            scaled(&mut twice, -most * room * left.min(1.0));
+            rigid.add_drag(point, &twice);
         }
     }
+}
+
+/// The largest of some amounts per area, and strips with their shares in it.
+fn weighted(strips: &[Strip], amounts: impl Iterator<Item = f64> + Clone) -> (f64, Vec<Strip>) {
+    let most = amounts.clone().fold(0.0, f64::max);
+    let share = |amount: f64| if most > 0.0 { amount / most } else { 1.0 };
+    (most, strips.iter().zip(amounts).map(|(strip, amount)| Strip { weight: share(amount), ..*strip }).collect())
+}
+
+fn scaled(lump: &mut Lump, scale: f64) {
+    lump.amount *= scale;
+    lump.first *= scale;
+    lump.second *= scale;
 }
 
 /// Nodes on anchors, plates and rigid links: beams end there where they are drawn.

@@ -12,6 +12,7 @@
 //! | [`order`] | model order: how many segments a beam gets |
 //! | [`rigid`] | nodes → rigid groups, supports → ground and held directions |
 //! | [`junction`] | which beams meet where, and what that does to their ends |
+//! | [`junction_limits`] | where a drawing goes beyond the table of junctions |
 //! | [`junction_springs`] | offset and spring at the end of a beam |
 //! | [`junction_table`] | the springs' numbers, from plane stress |
 //! | [`overlap`] | mass that is drawn twice where beams meet |
@@ -29,6 +30,7 @@ mod error;
 pub mod frame;
 pub mod gap;
 pub mod junction;
+pub mod junction_limits;
 pub mod junction_springs;
 pub mod junction_table;
 pub mod order;
@@ -136,12 +138,10 @@ pub fn discretize_like(
     for mass in &structure.masses {
         rigid.add_plate(mass, options.undamped);
     }
-    let elastic = joints.iter().map(|j| if j.locked[0] { 0.0 } else { j.stiffness[(0, 0)] });
-    let stiffest = elastic.fold(0.0, f64::max);
     for spring in &structure.springs {
         lay_spring(spring, options.undamped, &rigid, &mut joints, &mut dampers);
     }
-    rigid.hold_hinges(structure, stiffest, &mut joints);
+    rigid.hold_hinges(structure, &mut joints);
     let (gaps, gap_names, mut couplings) = gap::lay(structure, &rigid, options.as_sugar);
     let loads: Vec<(usize, Load)> = structure
         .loads
@@ -191,6 +191,13 @@ pub fn discretize_like(
     Ok(Discretized { system, nodes, beams, offsets, ends, heaters, gap_names })
 }
 
+impl Discretized {
+    /// The beams whose junctions are beyond what the table was made from.
+    pub fn beyond_table(&self, structure: &Structure) -> Option<junction_limits::Beyond> {
+        junction_limits::beyond(structure, &self.ends)
+    }
+}
+
 /// A lumped spring and damper: a joint half way between its two nodes.
 fn lay_spring(
     spring: &crate::structure::SpringDamper,
@@ -203,7 +210,7 @@ fn lay_spring(
     if a.body == b.body {
         return;
     }
-    let frame = rigid.frame(a, b, spring.angle);
+    let frame = rigid.frame(spring.a.0, spring.b.0, spring.angle);
     if spring.stiffness.iter().any(|&k| k != 0.0) {
         joints.push(Joint {
             a: a.body,

@@ -4,6 +4,9 @@
 //! the other hand, material is missing that is there: the outline fills the corner, each rectangle reaching past the node
 //! by (w/2)·tan(turn/2), w the other's width. The difference between the beams' rectangles and their union, with its first
 //! and second moment, is integrated over lines across the junction.
+//!
+//! Where the beams' masses per area differ, the union has at each place the largest of those that cover it: what lies above each
+//! other there is one piece, and the heavier layer goes through. That does not depend on the order in which beams are written.
 
 use super::rigid::Lump;
 use nalgebra::Vector2;
@@ -18,6 +21,8 @@ pub struct Strip {
     pub angle: f64,
     /// Width [m].
     pub width: f64,
+    /// Its mass per area over the largest of the junction's strips [1].
+    pub weight: f64,
 }
 
 /// Turn below which two branches go on in line and leave no outer corner [rad].
@@ -39,16 +44,24 @@ const MOST_KNOWN: usize = 512;
 
 thread_local! {
     /// What is known of junctions: a drawing is laid out on many meshes, and has many junctions of one kind.
-    static KNOWN: RefCell<HashMap<Vec<[u64; 2]>, Lump>> = RefCell::default();
+    static KNOWN: RefCell<HashMap<Vec<[u64; 3]>, Lump>> = RefCell::default();
 }
 
-/// Area that the strips have in excess of their union, with its moments about the node: [m²], [m³], [m⁴].
+/// Area, by its weight, that the strips have in excess of their union, with its moments about the node: [m²], [m³], [m⁴].
 pub fn overlap(strips: &[Strip]) -> Lump {
-    let key: Vec<[u64; 2]> = strips.iter().map(|s| [s.angle.to_bits(), s.width.to_bits()]).collect();
+    let bits = |s: &Strip| [s.angle.to_bits(), s.width.to_bits(), s.weight.to_bits()];
+    let key: Vec<[u64; 3]> = strips.iter().map(bits).collect();
     if let Some(known) = KNOWN.with_borrow(|known| known.get(&key).copied()) {
         return known;
     }
-    let found = integrated(strips);
+    let found = if strips.iter().all(|s| s.weight == 1.0) {
+        integrated(strips)
+    } else {
+        // lines run across one of the strips: the same one in any order
+        let mut sorted = strips.to_vec();
+        sorted.sort_by(|a, b| a.angle.total_cmp(&b.angle).then(a.width.total_cmp(&b.width)));
+        integrated(&sorted)
+    };
     KNOWN.with_borrow_mut(|known| {
         if known.len() >= MOST_KNOWN {
             known.clear();
@@ -77,23 +90,44 @@ fn integrated(strips: &[Strip]) -> Lump {
         crate::budget::check();
         for line in 0..LINES {
             let y = band[0] + (line as f64 + 0.5) * step;
-            for (low, high) in drawn.iter().filter_map(|q| q.cut(y)) {
-                add(&mut excess, y, low, high, step);
-            }
-            let mut cuts: Vec<(f64, f64)> = filled.iter().filter_map(|q| q.cut(y)).collect();
-            cuts.sort_by(|a, b| a.0.total_cmp(&b.0));
-            let mut reached = f64::NEG_INFINITY;
-            for (low, high) in cuts {
-                if high > reached {
-                    add(&mut excess, y, low.max(reached), high, -step);
-                    reached = high;
+            for (strip, quad) in strips.iter().zip(&drawn) {
+                if let Some((low, high)) = quad.cut(y) {
+                    add(&mut excess, y, low, high, step * strip.weight);
                 }
+            }
+            let cut = |(strip, quad): (&Strip, &Quad)| quad.cut(y).map(|(low, high)| (low, high, strip.weight));
+            for (low, high, weight) in highest(strips.iter().zip(&filled).filter_map(cut).collect()) {
+                add(&mut excess, y, low, high, -step * weight);
             }
         }
     }
     let first = excess.first;
     excess.first = Vector2::new(c0 * first.x - s0 * first.y, s0 * first.x + c0 * first.y);
     excess
+}
+
+/// The union of weighted intervals as intervals that do not overlap, each with the largest weight there.
+fn highest(mut cuts: Vec<(f64, f64, f64)>) -> Vec<(f64, f64, f64)> {
+    cuts.sort_by(|a, b| b.2.total_cmp(&a.2).then(a.0.total_cmp(&b.0)));
+    let mut covered: Vec<(f64, f64, f64)> = Vec::with_capacity(cuts.len());
+    for (mut low, high, weight) in cuts {
+        let heavier = covered.len();
+        for k in 0..heavier {
+            let (from, to, _) = covered[k];
+            if from >= high {
+                break;
+            }
+            if from > low {
+                covered.push((low, from, weight));
+            }
+            low = low.max(to);
+        }
+        if high > low {
+            covered.push((low, high, weight));
+        }
+        covered.sort_by(|a, b| a.0.total_cmp(&b.0));
+    }
+    covered
 }
 
 /// How far a strip reaches past the node.
@@ -145,7 +179,7 @@ mod tests {
 
     fn excess(strips: &[(f64, f64)]) -> Lump {
         let strips: Vec<Strip> =
-            strips.iter().map(|&(degrees, width)| Strip { angle: degrees.to_radians(), width }).collect();
+            strips.iter().map(|&(degrees, width)| Strip { angle: degrees.to_radians(), width, weight: 1.0 }).collect();
         overlap(&strips)
     }
 
@@ -161,6 +195,13 @@ mod tests {
         near(corner, 0.0);
         // the square at (½, ½) is there twice, that at (−½, −½) not at all: the first moment shows it
         assert!((corner.first - Vector2::new(1.0, 1.0)).norm() < 1e-9, "{corner:?}");
+        // with a stem of ten times the mass per area, the bar's half loses its own mass there and the stem nothing
+        let tee = |order: [usize; 3]| {
+            let of = |k: usize| [(0.0, 0.1), (PI, 0.1), (0.5 * PI, 1.0)][k];
+            overlap(&order.map(|k| Strip { angle: of(k).0, width: 2.0, weight: of(k).1 }))
+        };
+        near(tee([0, 1, 2]), 0.2);
+        assert_eq!(tee([2, 0, 1]), tee([0, 1, 2]));
         // turned as a whole, the moments turn with it
         let turned = excess(&[(30.0, 2.0), (120.0, 2.0)]);
         assert!((turned.first.norm() - corner.first.norm()).abs() < 1e-9, "{turned:?}");

@@ -8,8 +8,11 @@ use crate::gaps::Point;
 use crate::multibody::planar::JointFrame;
 use crate::multibody::{Body, BodyId, BodyName, Drag, Joint};
 use crate::sets::Sets;
-use crate::structure::{Mass, Structure};
+use crate::structure::{Beam, Mass, Structure};
 use nalgebra::{Matrix2, Matrix3, Vector2};
+
+/// Stiffness of a hinge over that of the stiffest beam or spring.
+const HINGE: f64 = 1e6;
 
 /// Mass, first and second moment of something, and the same for its drag.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -130,6 +133,13 @@ impl Assembly {
         }
     }
 
+    /// Adds drag to the body of a point; `lump` is about that point.
+    pub fn add_drag(&mut self, point: Point, lump: &Lump) {
+        if let BodyId::Free(k) = point.body {
+            self.bodies[k].drag.add(lump, point.arm, 1.0);
+        }
+    }
+
     /// Adds a plate or lumped mass.
     pub fn add_plate(&mut self, plate: &Mass, undamped: bool) {
         let point = self.point(plate.node.0);
@@ -143,19 +153,10 @@ impl Assembly {
         }
     }
 
-    /// The frame of a joint half way between two points (of nodes: ground points carry no position, so they coincide
-    /// with the other side).
-    pub fn frame(&self, a: Point, b: Point, angle: f64) -> JointFrame {
-        let at = |p: Point| match p.body {
-            BodyId::Ground => None,
-            BodyId::Free(k) => Some(self.bodies[k].reference + p.arm),
-        };
-        let middle = match (at(a), at(b)) {
-            (Some(a), Some(b)) => (a + b) * 0.5,
-            (Some(p), None) | (None, Some(p)) => p,
-            (None, None) => Vector2::zeros(),
-        };
-        self.frame_at(a, b, middle, angle)
+    /// The frame of a joint half way between two nodes as drawn.
+    pub fn frame(&self, a: usize, b: usize, angle: f64) -> JointFrame {
+        let middle = (self.position[a] + self.position[b]) * 0.5;
+        self.frame_at(self.point(a), self.point(b), middle, angle)
     }
 
     /// The frame of a joint at a drawn position.
@@ -167,10 +168,14 @@ impl Assembly {
         JointFrame { arm_a: arm(a), arm_b: arm(b), axis: Vector2::new(angle.cos(), angle.sin()) }
     }
 
-    /// Supports that hold a translation but let the body turn: a joint to ground ten thousand times stiffer than the
-    /// stiffest beam. (Held directions of the centre of mass would be wrong: the node moves when the body turns.)
-    pub fn hold_hinges(&self, structure: &Structure, stiffest: f64, joints: &mut Vec<Joint>) {
-        let stiffness = if stiffest > 0.0 { 1e4 * stiffest } else { 1e10 };
+    /// Supports that hold a translation but let the body turn: a joint to ground a million times stiffer than the stiffest beam
+    /// or spring as drawn, whatever the mesh. (Held directions of the centre of mass would be wrong: the node moves when the
+    /// body turns.)
+    pub fn hold_hinges(&self, structure: &Structure, joints: &mut Vec<Joint>) {
+        let along = |beam: &Beam| beam.material.youngs_modulus * beam.width * beam.thickness / beam.length;
+        let springs = structure.springs.iter().flat_map(|s| [s.stiffness[0].abs(), s.stiffness[1].abs()]);
+        let stiffest = structure.beams.iter().map(along).chain(springs).fold(0.0, f64::max);
+        let stiffness = if stiffest > 0.0 { HINGE * stiffest } else { 1e10 };
         for support in &structure.supports {
             let point = self.point(support.node.0);
             let BodyId::Free(k) = point.body else { continue };

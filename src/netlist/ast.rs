@@ -59,6 +59,19 @@ pub(crate) enum ExprKind {
     Call(Arc<str>, Vec<Expr>),
 }
 
+impl Expr {
+    /// True when the variable of that slot is named in it.
+    pub(crate) fn names(&self, slot: Slot) -> bool {
+        match &self.kind {
+            ExprKind::Number(_) | ExprKind::Text(_) | ExprKind::Undefined => false,
+            ExprKind::Variable(_, own) => *own == slot,
+            ExprKind::Negate(operand) | ExprKind::Not(operand) => operand.names(slot),
+            ExprKind::Binary(_, left, right) => left.names(slot) || right.names(slot),
+            ExprKind::Call(_, arguments) => arguments.iter().any(|argument| argument.names(slot)),
+        }
+    }
+}
+
 /// `ID = expr`.
 #[derive(Debug, Clone)]
 pub(crate) struct Def {

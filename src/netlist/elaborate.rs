@@ -1,6 +1,6 @@
 //! Runs a resolved program: definitions, loops and subnets become elements of a drawing.
 
-use super::ast::{Expr, Name, PI_SLOT, Program, Slot, Statement};
+use super::ast::{Def, Expr, Name, PI_SLOT, Program, Slot, Statement};
 use super::drawing::Drawing;
 use super::rotation::Rotation;
 use super::setting::Setting;
@@ -29,6 +29,8 @@ pub(super) struct Frame {
     pub(super) rotation: Rotation,
     /// What `parent` means here.
     pub(super) layer: Option<usize>,
+    /// How often each anonymous line was run here.
+    pub(super) anonymous: HashMap<usize, usize>,
 }
 
 /// Walks a program. See [`Elaborator::run`].
@@ -40,6 +42,8 @@ pub(crate) struct Elaborator<'p> {
     pub(super) layers: Vec<Option<LayerValues<'p>>>,
     pub(super) drawing: Drawing,
     parameters: Vec<(String, Setting)>,
+    /// Variables that were set from outside.
+    from_outside: HashSet<usize>,
     /// Where each stands in `parameters`.
     parameter_at: HashMap<&'p str, usize>,
     /// Full names given so far, without the anonymous ones.
@@ -62,8 +66,14 @@ impl<'p> Elaborator<'p> {
     pub(crate) fn run(program: &'p Program, set: &'p [(String, Setting)], sink: &'p mut Sink) -> Elaborated {
         let mut values = vec![Value::Undefined; program.variables];
         values[PI_SLOT.index] = Value::Number(std::f64::consts::PI);
-        let frame =
-            Frame { values, nodes: HashMap::new(), prefix: String::new(), rotation: Rotation::IDENTITY, layer: None };
+        let frame = Frame {
+            values,
+            nodes: HashMap::new(),
+            prefix: String::new(),
+            rotation: Rotation::IDENTITY,
+            layer: None,
+            anonymous: HashMap::new(),
+        };
         let mut elaborator = Self {
             program,
             settings: set.iter().map(|(name, value)| (name.as_str(), value)).collect(),
@@ -72,6 +82,7 @@ impl<'p> Elaborator<'p> {
             layers: vec![None; program.layers.len()],
             drawing: Drawing::default(),
             parameters: Vec::new(),
+            from_outside: HashSet::new(),
             parameter_at: HashMap::new(),
             names: HashSet::new(),
             steps: 0,
@@ -136,11 +147,15 @@ impl<'p> Elaborator<'p> {
         match statement {
             Statement::Param { name, slot, default } => {
                 let value = self.parameter(&name.name, name.span, default.as_ref());
+                if slot.global && self.settings.contains_key(&*name.name) {
+                    self.from_outside.insert(slot.index);
+                }
                 self.assign(*slot, value);
             }
             Statement::Process(_) | Statement::Subnet(_) => {}
             Statement::Def(def) => {
                 let value = self.evaluate(&def.value).unwrap_or(Value::Failed);
+                self.keep_setting(def, &value);
                 self.assign(def.slot, value);
             }
             Statement::Block(body) => self.nested(body),
@@ -208,6 +223,17 @@ impl<'p> Elaborator<'p> {
             }
         }
         value
+    }
+
+    /// Warns of a definition that replaces what was set from outside by something else.
+    fn keep_setting(&mut self, def: &Def, value: &Value) {
+        let set = def.slot.global && self.from_outside.contains(&def.slot.index);
+        if !set || value == self.variable(def.slot) || def.value.names(def.slot) {
+            return;
+        }
+        let name = &def.name.name;
+        let message = format!("the parameter `{name}` was set from outside, and this line replaces its value");
+        self.sink.warning("W023", def.name.span, message, format!("write `param {name} = …` in place of this line"));
     }
 
     fn for_loop(&mut self, slot: Slot, (from, to): (&'p Expr, &'p Expr), body: &'p [Statement]) {

@@ -51,7 +51,7 @@ impl<'p> Elaborator<'p> {
             }
             None => {
                 budget::lay_out(ELEMENT_BYTES + NAME_COPIES * self.here().prefix.len());
-                Arc::from(format!("anon{}", element.number))
+                self.anonymous(element.number)
             }
         };
         let mut nodes = Vec::with_capacity(element.nodes.len());
@@ -59,7 +59,7 @@ impl<'p> Elaborator<'p> {
             nodes.push(self.node(name)?);
         }
         let mut given = Vec::with_capacity(element.parameters.len());
-        let mut angles = [0.0; 3];
+        let (mut angles, mut turned) = ([0.0; 3], [false; 3]);
         let mut failed = false;
         let degrees = self.in_degrees(element.model.span.file);
         for def in &element.parameters {
@@ -74,6 +74,7 @@ impl<'p> Elaborator<'p> {
                     self.sink.error("E050", def.value.span, message, "");
                     failed = true;
                 }
+                (Some(axis), _) if std::mem::replace(&mut turned[axis], true) => {}
                 (Some(axis), Value::Number(angle)) => {
                     angles[axis] = if degrees { angle.to_radians() } else { *angle };
                     if !degrees {
@@ -95,6 +96,11 @@ impl<'p> Elaborator<'p> {
                     failed = true;
                 }
                 (None, _) => {
+                    if let (None, Value::Number(angle), true) =
+                        (element.subnet, &value, elements::turns(&def.name.name))
+                    {
+                        self.check_angle(*angle, def.value.span);
+                    }
                     given.push(Argument { name: &def.name.name, value, span: def.name.span.to(def.value.span) });
                 }
             }
@@ -135,6 +141,14 @@ impl<'p> Elaborator<'p> {
                 }
             }
         }
+    }
+
+    /// The name of an anonymous line; where a loop comes to it again in one instance, `anonN(2)`, `anonN(3)` and so on.
+    fn anonymous(&mut self, number: usize) -> Arc<str> {
+        let at = self.frames.len() - 1;
+        let count = self.frames[at].anonymous.entry(number).or_insert(0);
+        *count += 1;
+        Arc::from(if *count == 1 { format!("anon{number}") } else { format!("anon{number}({count})") })
     }
 
     /// True when the file writes `ox oy oz` in degrees.
@@ -205,6 +219,7 @@ impl<'p> Elaborator<'p> {
             prefix,
             rotation: call.rotation,
             layer,
+            anonymous: HashMap::new(),
         };
         let instance = frame.prefix.trim_end_matches('.').to_owned();
         self.frames.push(frame);

@@ -59,7 +59,9 @@ pub(super) fn suffix(letter: u8) -> Option<i32> {
 /// The double nearest to `digits` times a power of ten, rounded once: `30u` is 30e-6, not 30 × 1e-6.
 pub(super) fn scaled(digits: &str, power: i32) -> f64 {
     let (mantissa, exponent) = digits.split_once('e').unwrap_or((digits, "0"));
-    let exponent = exponent.parse::<i32>().unwrap_or(0).saturating_add(power);
+    // an exponent beyond any number is as good as the largest
+    let beyond = if exponent.starts_with('-') { i32::MIN } else { i32::MAX };
+    let exponent = exponent.parse::<i32>().unwrap_or(beyond).saturating_add(power);
     format!("{mantissa}e{exponent}").parse().unwrap_or(f64::NAN)
 }
 

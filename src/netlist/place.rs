@@ -10,6 +10,8 @@ use super::value::short;
 
 /// A loop is open when it misses by more than this part of its largest element [1].
 const OPEN_LOOP: f64 = 1e-6;
+/// Nodes nearer to each other than this part of the drawing's size are in one place [1].
+const ROUNDING: f64 = 1e-9;
 /// So many open loops, and so many unplaced parts, are told one by one.
 const TOLD: usize = 3;
 
@@ -133,13 +135,15 @@ fn open_loops(drawing: &Drawing, sink: &mut Sink) {
 
 /// Length and direction of beams without `l=`, from the positions of their nodes.
 fn measure(drawing: &mut Drawing, sink: &mut Sink) {
+    // what sums of offsets leave between two nodes in one place
+    let rounding = if drawing.unmeasured.is_empty() { 0.0 } else { ROUNDING * drawing.structure.extent() };
     for unmeasured in &drawing.unmeasured {
         let beam = &mut drawing.structure.beams[unmeasured.beam];
         let (a, b) = (drawing.structure.nodes[beam.a.0].position, drawing.structure.nodes[beam.b.0].position);
         let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
         beam.length = dx.hypot(dy);
         beam.angle = dy.atan2(dx);
-        if beam.length <= 0.0 {
+        if beam.length <= rounding {
             let message = format!("`{}` has no length, and its nodes have no distance", beam.name);
             sink.error("E064", unmeasured.span, message, "give `l=`, or place its nodes with `pos`");
         }

@@ -3,7 +3,7 @@
 //! A block opens a scope: names first defined inside it end with it, assignments to outer names stay. A definition
 //! inside a subnet never touches a variable of the netlist; those can be read there.
 
-use super::ast::{Def, Element, Expr, ExprKind, Ident, LayerRef, Name, Program, Slot, Statement};
+use super::ast::{Def, Element, Expr, ExprKind, Ident, Layer, LayerRef, Name, Program, Slot, Statement};
 use super::elements;
 use super::functions;
 use super::sink::Sink;
@@ -139,6 +139,7 @@ impl Resolver<'_> {
 
     fn process(&mut self, index: usize, program: &mut Program) {
         let mut layer = program.layers[index].clone();
+        self.misspelt_entries(&layer, program);
         let before = self.layers_used;
         self.list(&mut layer.entries);
         layer.constant = before == self.layers_used;
@@ -153,6 +154,20 @@ impl Resolver<'_> {
         }
         self.layers.insert(Arc::clone(&layer.name.name), index);
         program.layers[index] = layer;
+    }
+
+    /// Warns of entries that nothing reads and that look like a slip of one that is read.
+    fn misspelt_entries(&mut self, layer: &Layer, program: &Program) {
+        for entry in &layer.entries {
+            let name = &*entry.name.name;
+            let formal = || program.subnets.iter().flat_map(|s| &s.formals).any(|f| *f.name.name == *name);
+            if let Some(meant) = elements::meant_entry(name)
+                && !formal()
+            {
+                let message = format!("nothing reads `{name}` of the layer `{}`: ignored", layer.name.name);
+                self.sink.warning("W004", entry.name.span, message, format!("did you mean `{meant}`?"));
+            }
+        }
     }
 
     fn subnet(&mut self, index: usize, program: &mut Program) {

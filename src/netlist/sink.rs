@@ -3,15 +3,23 @@
 use super::bundle::Bundle;
 use super::diagnostic::{Diagnostic, Diagnostics, Severity};
 use super::source::Span;
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
 use std::sync::Arc;
 
 /// Marks that an error was already put into the [`Sink`]: nothing more needs to be said about it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Reported;
 
-/// Messages beyond this many are dropped: nobody reads them, and a loop could make millions.
+/// Errors, and lines that the netlist prints, beyond this many are left out: nobody reads them, and a loop could make millions.
 const MOST_MESSAGES: usize = 100;
+
+/// Warnings of one code beyond this many are left out, so that none hides another.
+const MOST_WARNINGS: usize = 20;
+
+/// Code of the last line, which tells how many messages were left out.
+const LEFT_OUT: &str = "W016";
+/// Code of what the netlist prints.
+const PRINT: &str = "W002";
 
 /// Messages that look for a near name.
 const MOST_SUGGESTIONS: usize = 20;
@@ -30,13 +38,26 @@ pub(crate) struct Sink {
     items: Vec<(Span, Severity, &'static str, String, String)>,
     seen: HashSet<(Span, &'static str)>,
     errors: usize,
+    /// Errors kept, and by code how many warnings came and how many messages were left out.
+    kept_errors: usize,
+    warnings: BTreeMap<&'static str, usize>,
+    left_out: BTreeMap<&'static str, usize>,
     /// Full names of the subnet instances being built, innermost last.
     pub(crate) instances: Vec<String>,
 }
 
 impl Sink {
     pub(crate) fn new(root: &str) -> Self {
-        Self { files: vec![root.to_owned()], items: Vec::new(), seen: HashSet::new(), errors: 0, instances: Vec::new() }
+        Self {
+            files: vec![root.to_owned()],
+            items: Vec::new(),
+            seen: HashSet::new(),
+            errors: 0,
+            kept_errors: 0,
+            warnings: BTreeMap::new(),
+            left_out: BTreeMap::new(),
+            instances: Vec::new(),
+        }
     }
 
     /// Reports an error. The same code at the same place is reported once.
@@ -59,14 +80,14 @@ impl Sink {
 
     /// Records output of the netlist itself (`call print`): never merged with other messages.
     pub(crate) fn output(&mut self, code: &'static str, span: Span, message: String) {
-        if self.items.len() < MOST_MESSAGES {
+        if self.room(Severity::Warning, code) {
             self.items.push((span, Severity::Warning, code, cut(message), String::new()));
         }
     }
 
     /// Whether messages still look for what was meant, which takes a look at every known name.
     pub(crate) fn suggests(&self) -> bool {
-        self.items.len() < MOST_SUGGESTIONS
+        self.items.len() - self.warnings.get(PRINT).map_or(0, |n| MOST_MESSAGES.min(*n)) < MOST_SUGGESTIONS
     }
 
     /// True once an error was reported.
@@ -75,11 +96,8 @@ impl Sink {
     }
 
     fn push(&mut self, severity: Severity, code: &'static str, span: Span, message: String, mut help: String) {
-        if self.items.len() >= MOST_MESSAGES && severity == Severity::Warning {
-            return;
-        }
         let repeated = span != Span::NOWHERE && !self.seen.insert((span, code));
-        if repeated || self.items.len() >= 2 * MOST_MESSAGES {
+        if repeated || !self.room(severity, code) {
             return;
         }
         if let Some(instance) = self.instances.last() {
@@ -93,13 +111,36 @@ impl Sink {
         self.items.push((span, severity, code, cut(message), cut(help)));
     }
 
-    /// All messages in order of place.
+    /// Counts a message; false where it is one too many of its kind.
+    fn room(&mut self, severity: Severity, code: &'static str) -> bool {
+        let (count, most) = match severity {
+            Severity::Error => (&mut self.kept_errors, 2 * MOST_MESSAGES),
+            Severity::Warning if code == PRINT => (self.warnings.entry(code).or_default(), MOST_MESSAGES),
+            Severity::Warning => (self.warnings.entry(code).or_default(), MOST_WARNINGS),
+        };
+        *count += 1;
+        let room = *count <= most;
+        if !room {
+            *self.left_out.entry(code).or_default() += 1;
+        }
+        room
+    }
+
+    /// The last line, where messages were left out.
+    fn left_out(&self) -> Option<Diagnostic> {
+        let more: Vec<String> = self.left_out.iter().map(|(code, count)| format!("{count} more of {code}")).collect();
+        let help = "the first of each kind are shown; mend those and look again";
+        (!more.is_empty()).then(|| Diagnostic::warning(LEFT_OUT, format!("left out: {}", more.join(", ")), help))
+    }
+
+    /// All messages in order of place, and how many were left out.
     pub(crate) fn finish(mut self, bundle: &Arc<Bundle>) -> Diagnostics {
         self.items.sort_by_key(|(span, severity, ..)| {
             (span.file.wrapping_add(1), span.start, *severity == Severity::Warning)
         });
+        let left_out = self.left_out();
         let files = &self.files;
-        let items = self
+        let mut items: Vec<Diagnostic> = self
             .items
             .into_iter()
             .map(|(span, severity, code, message, help)| {
@@ -107,6 +148,7 @@ impl Sink {
                 Diagnostic { code: code.to_owned(), severity, file, line, column, width, message, help }
             })
             .collect();
+        items.extend(left_out);
         Diagnostics { items, bundle: Arc::clone(bundle) }
     }
 }

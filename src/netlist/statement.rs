@@ -6,6 +6,8 @@ use super::parser::{Parsed, Parser};
 use super::sink::Reported;
 use super::source::Span;
 use super::token::{Kind, Token};
+use std::collections::HashSet;
+use std::sync::Arc;
 
 /// Parameters of one element, layer or subnet.
 const MOST_PARAMETERS: usize = 1000;
@@ -23,8 +25,38 @@ impl Parser<'_> {
                 Ok(Statement::Call(self.outermost(|p| p.call(function, open))?))
             }
             Kind::Identifier if self.ahead(1).kind == Kind::Equals => Ok(Statement::Def(self.def()?)),
-            Kind::Identifier => Ok(Statement::Element(Box::new(self.element()?))),
+            Kind::Identifier => {
+                let element = self.element()?;
+                self.stray_list();
+                Ok(Statement::Element(Box::new(element)))
+            }
             _ => Err(self.unexpected("a statement")),
+        }
+    }
+
+    /// Warns of a list on an element's line that looks like more parameters and is a block of definitions.
+    fn stray_list(&mut self) {
+        let open = self.peek();
+        let entry = (self.ahead(1).kind, self.ahead(2).kind) == (Kind::Identifier, Kind::Equals);
+        if open.kind != Kind::OpenList || open.starts_line || !entry {
+            return;
+        }
+        let inside = (1..).map(|n| self.ahead(n).kind);
+        let ends = inside.take_while(|kind| *kind != Kind::End).find(|k| matches!(k, Kind::OpenList | Kind::CloseList));
+        if ends == Some(Kind::CloseList) {
+            let message = "a second list of definitions on an element's line is a block of its own".to_owned();
+            self.sink.warning("W019", open.span, message, "an element has one list of parameters: put them into it");
+        }
+    }
+
+    /// Warns of a name that a list has twice.
+    fn twice<'n>(&mut self, names: impl Iterator<Item = &'n Ident>, what: &str, holds: &str) {
+        let mut seen = HashSet::new();
+        for name in names {
+            if !seen.insert(Arc::clone(&name.name)) {
+                let message = format!("the {what} `{}` stands twice in this list: the {holds} holds", name.name);
+                self.sink.warning("W018", name.span, message, "remove one of them, or give it its own name");
+            }
         }
     }
 
@@ -135,6 +167,9 @@ impl Parser<'_> {
             formals.push(Formal { name, slot: Slot::NONE, default });
             self.short(formals.len(), open)?;
         }
+        self.twice(formals.iter().map(|formal| &formal.name), "parameter", "last");
+        // nodes with indices may be told apart by these
+        self.twice(nodes.iter().filter(|n| n.indices.is_empty()).map(|n| &n.base), "node", "last");
         let body = self.block()?;
         self.program.subnets.push(Subnet { name, nodes, formals, body, variables: 0 });
         Ok(Statement::Subnet(self.program.subnets.len() - 1))
@@ -237,6 +272,7 @@ impl Parser<'_> {
             match self.peek().kind {
                 Kind::CloseList => {
                     let close = self.next();
+                    self.twice(defs.iter().map(|def: &Def| &def.name), "parameter", "first");
                     return Ok((defs, open.span.to(close.span)));
                 }
                 Kind::Comma => {

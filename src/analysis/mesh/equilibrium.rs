@@ -11,7 +11,7 @@ use super::super::statics::{
 };
 use super::super::{AnalysisError, BeamMotions, PortVoltages};
 use super::meshed::{chosen, meshed, on};
-use super::warnings::{of_pieces, of_stress};
+use super::warnings::{of_fingers, of_pieces, of_stress};
 use crate::compile::Compiled;
 use crate::netlist::Diagnostic;
 use crate::refine::carry::carried;
@@ -163,7 +163,8 @@ pub fn static_fitted(
 pub(super) fn told_of_static(fitted: &Compiled, point: OperatingPoint) -> (OperatingPoint, Vec<Diagnostic>) {
     let share = if fitted.options.linear { left_out(fitted, &point, &point.q) } else { None };
     let points = [(point, OF_DEFLECTION)];
-    let told = of_stress(fitted, share).into_iter().chain(of_pieces(fitted, &points)).collect();
+    let told = of_stress(fitted, share).into_iter().chain(of_pieces(fitted, &points));
+    let told = told.chain(of_fingers(fitted, &points[0].0)).collect();
     let [(point, _)] = points;
     (point, told)
 }

@@ -1,5 +1,6 @@
 //! What fitting a model to a request warns of.
 
+use super::super::contact_range::comb_beyond;
 use super::super::gap_pieces;
 use super::super::statics::OperatingPoint;
 use crate::compile::Compiled;
@@ -11,6 +12,8 @@ pub(crate) const WARNING: &str = "W040";
 const PIECES: &str = "W042";
 /// Code of the warning that a linear model leaves out what its stress does.
 const STRESS: &str = "W041";
+/// Code of the warning that the fingers of a comb go through its other side.
+const FINGERS: &str = "W024";
 
 /// What fitting a model to a request warns of, as sentences for who has no other way to see them.
 pub fn warnings(fitted: &Compiled) -> impl Iterator<Item = String> {
@@ -18,7 +21,7 @@ pub fn warnings(fitted: &Compiled) -> impl Iterator<Item = String> {
         .warnings
         .items
         .iter()
-        .filter(|d| [WARNING, STRESS, PIECES].contains(&d.code.as_str()))
+        .filter(|d| [WARNING, STRESS, PIECES, FINGERS].contains(&d.code.as_str()))
         .map(|d| d.message.clone())
 }
 
@@ -55,6 +58,17 @@ pub(super) fn of_pieces(compiled: &Compiled, points: &[(OperatingPoint, f64)]) -
         Some((name.to_owned(), times * share))
     };
     of_share_in_pieces(compiled, points.iter().filter_map(one).max_by(|a, b| a.1.total_cmp(&b.1)))
+}
+
+/// Where the fingers of a comb go through its other side at an equilibrium.
+pub(super) fn of_fingers(compiled: &Compiled, point: &OperatingPoint) -> Option<Diagnostic> {
+    let (name, [way, room]) = comb_beyond(compiled, &point.q)?;
+    let message = format!(
+        "the comb `{name}` closes by {:.3} µm, and its fingers have {:.3} µm to the other side: nothing stops them there",
+        1e6 * way,
+        1e6 * room
+    );
+    Some(Diagnostic::warning(FINGERS, message, "draw the `stop2d` that holds the part, or longer fingers"))
 }
 
 /// The same where the gap that leaves out most is known, and how far it may be off.

@@ -177,6 +177,15 @@ impl Site<'_, '_> {
         }
     }
 
+    /// Warns of an element between two ends whose ends are one node.
+    pub(super) fn told_apart(&mut self) {
+        if self.node(0) == self.node(1) {
+            let node = &self.drawing.structure.nodes[self.node(0).0].name;
+            let message = format!("`{}` does nothing: both its ends are the node `{node}`", self.instance.name);
+            self.sink.warning("W006", self.instance.span, message, "give it two nodes");
+        }
+    }
+
     /// The direction of the local x axis [rad].
     ///
     /// # Errors

@@ -71,11 +71,17 @@ impl Site<'_, '_> {
         Ok(())
     }
 
-    /// A rest curvature [1/m], positive to the left of the beam's direction, as the pair of end moments E·I·curvature that
+    /// A rest curvature [1/m], positive towards local y, as the pair of end moments E·I·curvature that
     /// is the same thing: the moment is constant along the beam and does not turn with it.
     fn bow(&mut self, beam: &Beam) -> Result<(), Reported> {
         let Some(curvature) = self.number("curvature")?.filter(|c| *c != 0.0) else { return Ok(()) };
-        let bending = beam.material.youngs_modulus * beam.thickness * beam.width.powi(3) / 12.0;
+        let Some(side) = self.instance.rotation.side().filter(|side| *side != 0) else {
+            let message = format!("`curvature` bends `{}` out of the drawing plane and is left out", beam.name);
+            let span = self.span_of("curvature");
+            self.sink.warning("W020", span, message, "models are planar (x, y, rotation about z)");
+            return Ok(());
+        };
+        let bending = f64::from(side) * beam.material.youngs_modulus * beam.thickness * beam.width.powi(3) / 12.0;
         for (node, sign) in [(beam.a, -1.0), (beam.b, 1.0)] {
             let name = format!("{}.bow", beam.name);
             self.drawing.structure.loads.push(Load { name, node, force: [0.0; 2], moment: sign * bending * curvature });

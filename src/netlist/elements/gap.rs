@@ -78,6 +78,17 @@ impl Site<'_, '_> {
         self.drawing.structure.resistors.push(Resistor { name, a, b, resistance });
     }
 
+    /// Warns of a voltage given to a gap that takes it from its nodes.
+    fn no_voltage(&mut self, fixed: &str) {
+        if self.is_given("V") {
+            let model = self.instance.model;
+            let message = format!("`{model}` takes no `V`: its voltage is that between its nodes a and c");
+            let help = format!("use `{fixed}` for a fixed voltage, or put a `Vsrc` or a `port` between the nodes");
+            let span = self.span_of("V");
+            self.sink.warning("W004", span, message, help);
+        }
+    }
+
     /// The potential difference of the nodes `i` and `j`.
     pub(super) fn across(&mut self, i: usize, j: usize) -> GapVoltage {
         let (a, b) = (self.node(i), self.node(j));
@@ -95,12 +106,14 @@ pub(super) fn gap2d(site: &mut Site<'_, '_>) -> Result<(), Reported> {
 
 /// gap2dforce: the field alone, at the voltage between nodes a and c.
 pub(super) fn gap2dforce(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+    site.no_voltage("gap2d");
     let voltage = site.across(0, 2);
     site.facing(voltage)
 }
 
 /// gap2de: two conducting beams and the field between them.
 pub(super) fn gap2de(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+    site.no_voltage("gap2dV");
     let [w1, w2] = site.widths()?;
     for (end, part, width, r, g) in [(0, "upper", w1, "R1", "G1"), (2, "lower", w2, "R2", "G2")] {
         let own = site.is_given(r) || site.is_given(g);
@@ -115,6 +128,7 @@ pub(super) fn gap2de(site: &mut Site<'_, '_>) -> Result<(), Reported> {
 
 /// gap2de_b and those after it: two beams of the sheet resistance `Rs` and the field between them, which is that of `gap2de`.
 pub(super) fn gap2de_b(site: &mut Site<'_, '_>) -> Result<(), Reported> {
+    site.no_voltage("gap2dV");
     let ([w1, w2], length, sheet) = (site.widths()?, site.positive("l")?, site.positive("Rs")?);
     site.drawing.note(Fact::TrialGap, site.instance.span);
     site.add_resistor(0, "upper", sheet * length / w1);

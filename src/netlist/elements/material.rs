@@ -38,9 +38,13 @@ impl Site<'_, '_> {
         if self.number_or("straingradient", 0.0)? != 0.0 {
             self.drawing.note(Fact::StrainGradient, span);
         }
+        let poisson = self.number_or("Poisson", POISSON)?;
+        if !(poisson > -1.0 && poisson <= 0.5) {
+            return Err(self.out_of_range("Poisson", poisson, "above −1 and at most 0.5"));
+        }
         Ok(Material {
             youngs_modulus,
-            poisson: self.number_or("Poisson", POISSON)?,
+            poisson,
             density: self.density()?,
             viscosity,
             fluid,
@@ -68,6 +72,9 @@ impl Site<'_, '_> {
     pub(super) fn film(&mut self) -> Result<[f64; 2], Reported> {
         let viscosity = self.non_negative_or("viscosity", 0.0)?;
         match self.number("fluid")? {
+            Some(fluid) if fluid <= 0.0 && viscosity > 0.0 => {
+                Err(self.out_of_range("fluid", fluid, "positive where there is a `viscosity`"))
+            }
             Some(fluid) if fluid > 0.0 && viscosity > 0.0 => Ok([viscosity, fluid]),
             _ => Ok([0.0, NO_FILM]),
         }
@@ -78,14 +85,14 @@ impl Site<'_, '_> {
         Ok(self.positive_if_any("permittivity")?.unwrap_or(VACUUM))
     }
 
-    /// Prescribed mean temperature [K], if the element gives one.
+    /// Prescribed mean temperature [K], if the element or its layer gives one.
     pub(super) fn temperature(&mut self, material: &Material) -> Result<Option<f64>, Reported> {
-        if !self.is_given("T") {
-            return Ok(None);
-        }
-        let temperature = self.required("T")?;
+        let Some(temperature) = self.number("T")? else { return Ok(None) };
         if self.number("thermalexpansion")?.is_none() {
             return Err(self.missing("thermalexpansion"));
+        }
+        if temperature < 0.0 && material.ambient_temperature > 0.0 {
+            return Err(self.out_of_range("T", temperature, "an absolute temperature, zero or positive"));
         }
         if material.ambient_temperature == 0.0 && temperature != 0.0 {
             let span = self.span_of("T");

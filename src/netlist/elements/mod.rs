@@ -28,6 +28,26 @@ use super::sink::{Reported, Sink};
 use super::source::Span;
 use super::suggest::{did_you_mean, nearest};
 
+/// The entry of a layer that a name which nothing reads is a slip of: near it, or the same but for its case.
+pub(crate) fn meant_entry(name: &str) -> Option<&'static str> {
+    if is_entry(name) || MODELS.iter().any(|model| model.takes(name)) {
+        return None;
+    }
+    let alike = table::LAYER_ENTRIES.iter().find(|entry| entry.eq_ignore_ascii_case(name));
+    let near = || if name.len() < 3 { None } else { nearest(name, table::LAYER_ENTRIES.iter().copied()) };
+    alike.copied().or_else(near)
+}
+
+/// True for an entry that a layer may have.
+pub(crate) fn is_entry(name: &str) -> bool {
+    table::LAYER_ENTRIES.contains(&name)
+}
+
+/// True for a parameter of an element that is an angle [rad], besides ox, oy, oz.
+pub(crate) fn turns(name: &str) -> bool {
+    table::ANGLES.contains(&name)
+}
+
 /// Builds one element: checks its node count and its parameter names, then adds it to the drawing. `read` is for expressions in strings.
 pub(crate) fn build(
     instance: &Instance<'_>,

@@ -53,6 +53,12 @@ pub(super) const LAYER_ENTRIES: &[&str] = &[
     "layer",
 ];
 
+/// Parameters that are angles [rad], besides ox, oy, oz. (`qoz` of a prestressedbeam is in degrees everywhere.)
+pub(super) const ANGLES: &[&str] = &[
+    "alpha", "ox1", "oy1", "oz1", "ox2", "oy2", "oz2", "qox1", "qoy1", "qoz1", "qox2", "qoy2", "qoz2", "sliderox",
+    "slideroy", "slideroz",
+];
+
 /// Parameters that SUGAR's netlists carry on elements which do not use them.
 pub(super) const STRAY: &[&str] =
     &["R", "R1", "R2", "Rs", "R_insulator", "G", "G1", "G2", "V", "l", "w", "w1", "w2", "h", "x", "y", "z", "T"];

@@ -1,5 +1,6 @@
 //! What a call of a SUGAR 3 netlist hands over: `{A, B, material; l=100u, oz=90}`.
 
+use super::super::elements;
 use super::super::value::Value;
 use crate::structure::NodeId;
 use mlua::{Table, UserData, UserDataFields, Value as LuaValue};
@@ -113,14 +114,18 @@ impl Call {
     }
 }
 
-/// The numbers of a table by name, in the order of names.
+/// The numbers of a table by name, and strings under names of entries, in the order of names.
 fn numbers(table: &Table) -> mlua::Result<Vec<(String, Value)>> {
     let mut entries = Vec::new();
     for pair in table.pairs::<LuaValue, LuaValue>() {
-        if let (LuaValue::String(key), value) = pair?
-            && let Some(x) = number(&value)
-        {
-            entries.push((key.to_string_lossy(), Value::Number(x)));
+        let (LuaValue::String(key), value) = pair? else { continue };
+        match (number(&value), value) {
+            (Some(x), _) => entries.push((key.to_string_lossy(), Value::Number(x))),
+            // an element that reads it says that it is no number
+            (None, LuaValue::String(text)) if elements::is_entry(&key.to_string_lossy()) => {
+                entries.push((key.to_string_lossy(), Value::Text(text.to_string_lossy().into())));
+            }
+            _ => {}
         }
         if entries.len() > MOST {
             break;

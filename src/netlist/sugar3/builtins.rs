@@ -4,7 +4,7 @@ use super::super::elements::{self, Argument, Arguments, Instance, MODELS};
 use super::super::sink::Reported;
 use super::super::source::Span;
 use super::super::sugar2;
-use super::super::value::Value;
+use super::super::value::{Value, short};
 use super::arguments::{Call, Fault, LuaNode, called, plain};
 use super::drawn::{bounded, told};
 use super::files::use_file;
@@ -14,6 +14,7 @@ use super::state::{Shared, State};
 use crate::budget;
 use crate::structure::{Load, NodeId};
 use mlua::{Function, Lua, Table, Value as LuaValue};
+use std::collections::hash_map::Entry;
 use std::f64::consts::PI;
 use std::rc::Rc;
 use std::sync::Arc;
@@ -85,7 +86,8 @@ fn drawing(lua: &Lua, shared: &Shared, globals: &Table) -> mlua::Result<()> {
     globals.raw_set("node", lua.create_function(move |lua, value: LuaValue| node(lua, &state, &value))?)?;
     let state = Rc::clone(shared);
     globals.raw_set("_n", lua.create_function(move |lua, name: LuaValue| named_node(lua, &state, &name))?)?;
-    globals.raw_set("material", lua.create_function(material)?)?;
+    let state = Rc::clone(shared);
+    globals.raw_set("material", lua.create_function(move |lua, table: Table| material(lua, &state, table))?)?;
     let state = Rc::clone(shared);
     globals.raw_set("element", lua.create_function(move |lua, table: Table| element(lua, &state, None, &table))?)?;
     let state = Rc::clone(shared);
@@ -143,15 +145,32 @@ fn node(lua: &Lua, shared: &Shared, value: &LuaValue) -> mlua::Result<LuaNode> {
         }
     };
     bounded(&mut state)?;
-    let (id, fresh) = state.node(&name, span);
-    if let (Some(at), true) = (at, fresh) {
-        let (first, origin) = *state.first_placed.get_or_insert((id, at));
-        if first != id {
-            let way = [at[0] - origin[0], at[1] - origin[1]];
-            state.drawing.lay(span, &[first, id], &[[0.0; 2], way]);
-        }
+    let id = state.node(&name, span);
+    if let Some(at) = at {
+        lie(&mut state, id, at, span);
     }
     Ok(state.lua_node(id))
+}
+
+/// Notes the coordinates of a node [m]; the first ones hold.
+fn lie(state: &mut State, id: NodeId, at: [f64; 2], span: Span) {
+    match state.coordinates.entry(id) {
+        Entry::Occupied(known) if *known.get() != at => {
+            let name = &state.drawing.structure.nodes[id.0].name;
+            let [x, y] = known.get().map(short);
+            let message = format!("the node `{name}` lies at ({x}, {y}) already: these coordinates are left out");
+            state.sink.warning("W011", span, message, "give it another name, or no coordinates here");
+        }
+        Entry::Occupied(_) => {}
+        Entry::Vacant(place) => {
+            place.insert(at);
+            let (first, origin) = *state.first_placed.get_or_insert((id, at));
+            if first != id {
+                let way = [at[0] - origin[0], at[1] - origin[1]];
+                state.drawing.lay(span, &[first, id], &[[0.0; 2], way]);
+            }
+        }
+    }
 }
 
 /// `_n("c_3")` of converted netlists: what `_currnodes` has under that name, else the node.
@@ -171,7 +190,21 @@ fn named_node(lua: &Lua, shared: &Shared, name: &LuaValue) -> mlua::Result<LuaVa
 }
 
 /// `material {parent=p, h=2u}`: its own entries before those of its parent.
-fn material(_: &Lua, table: Table) -> mlua::Result<Table> {
+fn material(lua: &Lua, shared: &Shared, table: Table) -> mlua::Result<Table> {
+    let mut slips = Vec::new();
+    for pair in table.pairs::<LuaValue, LuaValue>().take(1000) {
+        if let (LuaValue::String(key), LuaValue::Integer(_) | LuaValue::Number(_)) = pair? {
+            let name = key.to_string_lossy();
+            slips.extend(elements::meant_entry(&name).map(|meant| (name, meant)));
+        }
+    }
+    slips.sort();
+    if let Some((name, meant)) = slips.first() {
+        let mut state = shared.borrow_mut();
+        let span = state.here(lua);
+        let message = format!("no element reads `{name}` of this material");
+        state.sink.warning("W004", span, message, format!("did you mean `{meant}`?"));
+    }
     if let LuaValue::Table(parent) = table.raw_get::<LuaValue>("parent")? {
         for (count, pair) in parent.pairs::<LuaValue, LuaValue>().enumerate() {
             let (key, value) = pair?;
@@ -246,7 +279,11 @@ fn build(state: &mut State, model: &str, call: &Call, span: Span) -> Result<(), 
     // SUGAR 3's rigid link between nodes that lie where others place them
     let model = if OWN.contains(&model) { "link2d" } else { model };
     let layer = call.material.iter().map(|(entry, value)| (entry.as_str(), value.clone())).collect();
-    let given = call.given.iter().map(|(name, value)| Argument { name, value: value.clone(), span }).collect();
+    let value = |name: &str, value: &Value| match value {
+        Value::Number(angle) if elements::turns(name) => Value::Number(angle * degree),
+        value => value.clone(),
+    };
+    let given = call.given.iter().map(|(name, given)| Argument { name, value: value(name, given), span }).collect();
     let instance = Instance {
         name,
         anonymous: call.name.is_none(),

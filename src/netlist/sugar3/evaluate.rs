@@ -62,6 +62,7 @@ impl FrontEnd for Sugar3 {
             elements: 0,
             anonymous: 0,
             first_placed: None,
+            coordinates: HashMap::new(),
             radians: false,
             used: HashSet::from([self.bundle.root.clone()]),
             texts: Vec::new(),

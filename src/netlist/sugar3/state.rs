@@ -37,6 +37,8 @@ pub(super) struct State {
     pub(super) anonymous: usize,
     /// The first node with coordinates, and these [m].
     pub(super) first_placed: Option<(NodeId, [f64; 2])>,
+    /// Coordinates that were given to nodes [m].
+    pub(super) coordinates: HashMap<NodeId, [f64; 2]>,
     /// True once `std2cvt.net` is used: angles are in radians.
     pub(super) radians: bool,
     /// Files read so far, by name.
@@ -97,15 +99,15 @@ impl State {
     }
 
     /// The node of that name in the scope at hand, a new one when the name is new.
-    pub(super) fn node(&mut self, name: &str, span: Span) -> (NodeId, bool) {
+    pub(super) fn node(&mut self, name: &str, span: Span) -> NodeId {
         if let Some(&id) = self.scope().nodes.get(name) {
-            return (id, false);
+            return id;
         }
         let full = format!("{}{name}", self.scope().prefix);
         let id = self.drawing.add_node(full, span);
         self.scope().nodes.insert(name.to_owned(), id);
         self.progress.drawn.set(self.progress.drawn.get() + 1);
-        (id, true)
+        id
     }
 
     pub(super) fn lua_node(&self, id: NodeId) -> LuaNode {
