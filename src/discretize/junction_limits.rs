@@ -36,7 +36,7 @@ pub fn beyond(structure: &Structure, ends: &Ends) -> Option<Beyond> {
             why[beams[k]] = why[beams[k]].or(at_node(strip, others));
         }
     }
-    for &beam in &ends.cut {
+    for &beam in ends.cut.iter().filter(|&&beam| !goes_on[beam]) {
         why[beam] = Some("its junctions take more than nine tenths of its length");
     }
     for ((beam, why), goes_on) in structure.beams.iter().zip(&mut why).zip(goes_on) {

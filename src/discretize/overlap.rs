@@ -5,8 +5,9 @@
 //! by (w/2)·tan(turn/2), w the other's width. The difference between the beams' rectangles and their union, with its first
 //! and second moment, is integrated over lines across the junction.
 //!
-//! Where the beams' masses per area differ, the union has at each place the largest of those that cover it: what lies above each
-//! other there is one piece, and the heavier layer goes through. That does not depend on the order in which beams are written.
+//! Where the beams' masses per area differ, the union has at each place the largest of those drawn there, and a filled corner that of the
+//! heavier beam: what lies above each other is one piece, and the heavier layer goes through. That does not depend on the order in
+//! which beams are written.
 
 use super::rigid::Lump;
 use nalgebra::Vector2;
@@ -81,6 +82,8 @@ fn integrated(strips: &[Strip]) -> Lump {
         (0..strips.len()).map(|k| Quad::new(&strips[k], strips[0].angle, past(strips, k), far)).collect();
     let mut levels: Vec<f64> = drawn.iter().chain(&filled).flat_map(|q| q.0.iter().map(|p| p.y)).collect();
     levels.sort_by(f64::total_cmp);
+    // with one weight, what is drawn lies within what is filled
+    let alike = strips.iter().all(|s| s.weight == 1.0);
     let mut excess = Lump::default();
     for band in levels.windows(2) {
         let step = (band[1] - band[0]) / LINES as f64;
@@ -95,8 +98,9 @@ fn integrated(strips: &[Strip]) -> Lump {
                     add(&mut excess, y, low, high, step * strip.weight);
                 }
             }
-            let cut = |(strip, quad): (&Strip, &Quad)| quad.cut(y).map(|(low, high)| (low, high, strip.weight));
-            for (low, high, weight) in highest(strips.iter().zip(&filled).filter_map(cut).collect()) {
+            let mut cuts = heaviest_first(if alike { &[] } else { strips }, &drawn, y);
+            cuts.extend(heaviest_first(strips, &filled, y));
+            for (low, high, weight) in united(&cuts) {
                 add(&mut excess, y, low, high, -step * weight);
             }
         }
@@ -106,11 +110,18 @@ fn integrated(strips: &[Strip]) -> Lump {
     excess
 }
 
-/// The union of weighted intervals as intervals that do not overlap, each with the largest weight there.
-fn highest(mut cuts: Vec<(f64, f64, f64)>) -> Vec<(f64, f64, f64)> {
+/// Where a line at the height `y` runs in some strips, with their weights, the heaviest first.
+fn heaviest_first(strips: &[Strip], quads: &[Quad], y: f64) -> Vec<(f64, f64, f64)> {
+    let cut = |(strip, quad): (&Strip, &Quad)| quad.cut(y).map(|(low, high)| (low, high, strip.weight));
+    let mut cuts: Vec<_> = strips.iter().zip(quads).filter_map(cut).collect();
     cuts.sort_by(|a, b| b.2.total_cmp(&a.2).then(a.0.total_cmp(&b.0)));
+    cuts
+}
+
+/// The union of weighted intervals as intervals that do not overlap, in order, each with the weight of the first that covers it.
+fn united(cuts: &[(f64, f64, f64)]) -> Vec<(f64, f64, f64)> {
     let mut covered: Vec<(f64, f64, f64)> = Vec::with_capacity(cuts.len());
-    for (mut low, high, weight) in cuts {
+    for &(mut low, high, weight) in cuts {
         let heavier = covered.len();
         for k in 0..heavier {
             let (from, to, _) = covered[k];
