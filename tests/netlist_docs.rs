@@ -46,6 +46,7 @@ fn every_message() {
     }
     let mut listed = BTreeSet::new();
     codes(&page(), ' ', &mut listed);
+    codes(&fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/src/compile.rs")).expect("text"), '"', &mut used);
     assert!(used.len() > 40);
     assert_eq!(used, listed);
 }

@@ -290,7 +290,7 @@ fn analyses_take_the_same_options() {
     }
     let proto = fs::read_to_string(place("proto/bimorph/v1/analysis.proto")).expect("the messages");
     assert!(proto.contains(&format!("{}; 0: {}.", TRAN_POINTS.range, TRAN_POINTS.count())));
-    let client = fs::read_to_string(place("clients/python/src/bimorph/client.py")).expect("the client");
+    let client = fs::read_to_string(place("clients/python/src/bimorph/model.py")).expect("the client");
     assert!(client.contains(&format!("points: int = {},", TRAN_POINTS.count())));
     assert!(client.contains(&format!("count: int = {},", MODES_COUNT.count())));
     assert_eq!((TransientOptions::default().points, Integrator::RHO), (TRAN_POINTS.count(), TRAN_RHO.number()));

@@ -12,6 +12,7 @@
 mod in_joints;
 mod on_tree;
 mod report;
+mod rotary;
 
 use super::formulation::{Formulation, coordinate_scales};
 use super::integrator::Integrator;
@@ -26,12 +27,11 @@ use crate::solve::joint_dirk::Rule;
 use in_joints::InJoints;
 use on_tree::on_tree;
 pub use report::JointReport;
+pub use rotary::RIGID;
 use std::f64::consts::TAU;
 
 /// Steps beyond which a run is refused before it begins.
 pub const MOST_STEPS: f64 = 2e7;
-/// Stiffness of locked directions in the equilibrium that a release starts from, over that of the drawn beam.
-pub const RIGID: f64 = 1e4;
 
 /// Integrates the motion in joint coordinates, with one of [`Integrator::IN_JOINTS`]. As [`super::transient::transient`]
 /// otherwise, with a report on the formulation.
@@ -57,11 +57,7 @@ pub fn joint_transient(
     if let (Some(top), None) = (&top, rule) {
         affordable(formulation, &linkage, top, options.stop)?;
     }
-    let start = options.release.map(|start| {
-        let mut start = start.clone();
-        start.parts.system.model = formulation.lock(&start.parts.system.model).stiffened(RIGID);
-        start
-    });
+    let start = options.release.map(|start| rotary::locked(start, formulation));
     let mut carrier = InJoints {
         formulation,
         system,
@@ -84,10 +80,23 @@ pub fn joint_transient(
         linkage,
         scale,
     };
+    let rotary = rotary::told(compiled, formulation, options);
     let options = TransientOptions { release: start.as_ref(), ..options.clone() };
     let mut result = record(compiled, &options, &mut carrier, sample, watch)?;
+    result.warnings.extend(rotary);
+    result.warnings.extend(open(carrier.report.largest_gap_m, options.tol * system.length_scale));
     result.unknowns = carrier.linkage.coordinates.saturating_sub(carrier.linkage.constraints);
     Ok((result, carrier.report))
+}
+
+/// What to say of loops that were open by more than `most` [m].
+fn open(gap: f64, most: f64) -> Option<String> {
+    (gap > most).then(|| {
+        format!(
+            "a loop was open by {gap:.1e} m after a step, more than {most:.1e} m: its joints do not meet there, and this is no motion of the \
+             mechanism; take shorter steps, or --formulation compliant"
+        )
+    })
 }
 
 /// The implicit method asked for; none: explicit steps.

@@ -9,7 +9,7 @@ use crate::multibody::BlockMatrix;
 use crate::multibody::forces::add_inertia;
 use crate::multibody::planar::Pose;
 use crate::refine::axial::axial_forces;
-use crate::refine::order_error::{of_loaded_modes, own_stiffness};
+use crate::refine::order_error::{own_stiffness, relative_of_loaded_modes};
 use crate::solve::eigen::{Modes, RELIABLE, lowest_modes};
 use serde::Serialize;
 
@@ -54,7 +54,9 @@ const ROUNDED: f64 = 1e-4;
 /// # Errors
 /// See [`AnalysisError`]; `NotConverged` rather than a frequency that cannot be trusted.
 pub fn modes(compiled: &Compiled, count: usize, voltages: &PortVoltages) -> Result<ModesResult, AnalysisError> {
-    Ok(modes_with_curves(compiled, count, voltages)?.0)
+    let (mut result, q, shapes) = shapeless(compiled, count, voltages)?;
+    result.shapes = shapes.iter().map(|x| shape(compiled, &q, x, false).0).collect();
+    Ok(result)
 }
 
 /// True where modes are about an equilibrium that is not the drawing. As SUGAR has it, that is where voltages pull across gaps: its beams
@@ -79,6 +81,16 @@ pub fn modes_with_curves(
     count: usize,
     voltages: &PortVoltages,
 ) -> Result<(ModesResult, Vec<BeamMotions>), AnalysisError> {
+    let (mut result, q, shapes) = shapeless(compiled, count, voltages)?;
+    let curves;
+    (result.shapes, curves) = shapes.iter().map(|x| shape(compiled, &q, x, true)).unzip();
+    Ok((result, curves))
+}
+
+/// Modes without the motion of nodes; the equilibrium that they are about, and shapes of the bodies.
+type Shapeless = (ModesResult, Vec<Pose>, Vec<Vec<Pose>>);
+
+fn shapeless(compiled: &Compiled, count: usize, voltages: &PortVoltages) -> Result<Shapeless, AnalysisError> {
     let system = &compiled.parts.system;
     let mut drive = system.electrics.drive();
     let (as_sugar, loaded) = (compiled.options.as_sugar, about_equilibrium(compiled, voltages));
@@ -109,7 +121,7 @@ pub fn modes_with_curves(
     }
     let mut found = lowest_modes(system, (&q, &drive), &tangent, count + GUARDS)?;
     if found.lambda.is_empty() {
-        let detail = "no mode came out: nothing that moves has mass, or the stiffness is not finite".into();
+        let detail = "no mode came out: nothing that moves has mass (give the layer a `density`), or the stiffness is not finite".into();
         return Err(AnalysisError::NotConverged { detail });
     }
     if let Some(k) = found.residuals.iter().take(count).position(|&r| r.is_nan() || r > RELIABLE) {
@@ -137,18 +149,17 @@ pub fn modes_with_curves(
     found.lambda.truncate(count);
     found.shapes.truncate(count);
     found.residuals.truncate(count);
-    let (shapes, curves) = found.shapes.iter().map(|x| shape(compiled, &q, x)).unzip();
     let result = ModesResult {
         estimated_error: None,
         frequencies_hz: found.lambda.iter().map(|&l| l.max(0.0).sqrt() / std::f64::consts::TAU).collect(),
-        shapes,
+        shapes: Vec::new(),
         residuals: found.residuals,
         errors,
         unknowns: system.model.unknowns(),
         deflection_m: deflection(compiled, &q),
         warnings,
     };
-    Ok((result, curves))
+    Ok((result, q, found.shapes))
 }
 
 /// Estimated errors of modes about an equilibrium with this tangent, where the beams carry these axial forces.
@@ -173,9 +184,10 @@ fn estimated(compiled: &Compiled, tangent: &BlockMatrix<f64, 3>, forces: &[f64],
         }
     }
     let modes = (lambda.as_slice(), found.shapes.as_slice());
-    let compared = of_loaded_modes(&compiled.structure, options, &compiled.parts, (&factor, shift), forces, modes);
+    let factor = (&factor, shift);
+    let compared = relative_of_loaded_modes(&compiled.structure, options, &compiled.parts, factor, forces, modes);
     let sure = |(error, like): (f64, f64)| (error.abs() < BELIEVED && like >= ALIKE).then_some(error);
-    compared.map_or(none, |e| e.relative.into_iter().zip(e.likeness).map(sure).collect())
+    compared.map_or(none, |errors| errors.into_iter().map(sure).collect())
 }
 
 /// Largest displacement of a node [m].
@@ -214,8 +226,8 @@ fn told(compiled: &Compiled, count: usize, q: &[Pose], lambda: &[f64]) -> Vec<St
     warnings
 }
 
-/// Displacements of the nodes and along the beams in a mode, the largest translation of a node scaled to 1.
-fn shape(compiled: &Compiled, q: &[Pose], x: &[Pose]) -> (NodeMotions, BeamMotions) {
+/// Displacements of the nodes and, where they are asked for, along the beams in a mode, the largest translation of a node scaled to 1.
+fn shape(compiled: &Compiled, q: &[Pose], x: &[Pose], along: bool) -> (NodeMotions, BeamMotions) {
     let zeros = vec![Pose::zeros(); q.len()];
     let (state, change) =
         (View { q, v: &zeros, rise: &[], volts: &[] }, View { q: x, v: &zeros, rise: &[], volts: &[] });
@@ -227,7 +239,7 @@ fn shape(compiled: &Compiled, q: &[Pose], x: &[Pose]) -> (NodeMotions, BeamMotio
         .filter_map(|(node, point)| Some((node.name.clone(), at((*point)?))))
         .collect();
     let curves: BeamMotions =
-        compiled.parts.beams.iter().map(|points| points.iter().map(|p| at(*p)).collect()).collect();
+        compiled.parts.beams.iter().filter(|_| along).map(|points| points.iter().map(|p| at(*p)).collect()).collect();
     normalized(nodes, curves)
 }
 

@@ -19,6 +19,8 @@ const LOOSER: f64 = 10.0;
 const LOOSEST: f64 = 0.3;
 /// Share of the difference that is told.
 const SHARE: f64 = 0.5;
+/// What is added to what proportion says, where the companion is hardly looser.
+const RESERVE: f64 = 1.2;
 /// Unknowns times steps of a companion, at most.
 const MOST_WORK: f64 = 3e6;
 /// Output times that a companion must have reached to say something.
@@ -55,7 +57,9 @@ pub fn with_step_error<T>(
         sample(t, values);
     };
     let (mut result, more) = run(options, &mut both, watch)?;
-    let Some(companion) = companion.filter(|_| whole || reached >= FEWEST) else {
+    // one that took the same steps proves nothing
+    let other = |c: &TransientResult| c.counters.steps != result.counters.steps;
+    let Some(companion) = companion.filter(|c| (whole || reached >= FEWEST) && other(c)) else {
         result.warnings.extend((!options.signals.is_empty()).then(|| unknown(options)));
         return Ok((result, more));
     };
@@ -63,10 +67,24 @@ pub fn with_step_error<T>(
     let found = TransientResult { signals, ..companion.clone() };
     let apart = relative_error_above(&found, &companion, &|unit| least(unit, options, model));
     let share = ((reached - 1) * stride(options)) as f64 / (options.points - 1) as f64;
-    let error = if share < 1.0 { SHARE * apart / share } else { SHARE * apart };
+    let error = told_of(options) * apart / share.min(1.0);
     result.step_error = Some(error);
     result.warnings.extend(beyond(options, error, "by the end of the run"));
     Ok((result, more))
+}
+
+/// The tolerance of a companion.
+fn loose(options: &TransientOptions<'_>) -> f64 {
+    (LOOSER * options.tol).min(LOOSEST)
+}
+
+/// Share of the difference that is told: of a companion that is hardly looser, more than all of it, since the error is in proportion to
+/// the tolerance at best.
+fn told_of(options: &TransientOptions<'_>) -> f64 {
+    match options.step {
+        Some(_) => SHARE,
+        None => SHARE.max(RESERVE / (loose(options) / options.tol - 1.0)),
+    }
 }
 
 /// The amplitude below which a signal of this unit stands still.
@@ -91,7 +109,7 @@ fn companion<T>(
     run: Run<'_, T>,
     watch: Watch<'_>,
 ) -> Result<(Option<TransientResult>, bool), AnalysisError> {
-    let tol = (LOOSER * options.tol).min(LOOSEST);
+    let tol = loose(options);
     let looser = options.step.is_some() || tol >= 2.0 * options.tol;
     if options.signals.is_empty() || options.points < 2 || !looser {
         return Ok((None, false));
@@ -112,6 +130,7 @@ fn companion<T>(
         !stopped && steps * unknowns as f64 <= MOST_WORK
     };
     let ended = run(&looser, &mut keep, &mut few);
+    let counters = ended.as_ref().map_or_else(|_| Default::default(), |(result, _)| result.counters);
     if stopped {
         return Err(AnalysisError::Cancelled);
     }
@@ -119,7 +138,10 @@ fn companion<T>(
     match ended {
         Ok(_) | Err(AnalysisError::Cancelled) => {
             let names: Vec<_> = options.signals.iter().map(|name| (name.clone(), String::new(), Vec::new())).collect();
-            Ok((Some(TransientResult { signals: picked.signals(&names), ..TransientResult::default() }), whole))
+            Ok((
+                Some(TransientResult { signals: picked.signals(&names), counters, ..TransientResult::default() }),
+                whole,
+            ))
         }
         Err(_) => Ok((None, false)),
     }

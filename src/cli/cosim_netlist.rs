@@ -5,6 +5,7 @@ use super::options::Chosen;
 use super::output::{check_folder, write_page};
 use super::value;
 use bimorph::cosim::around::{Around, around};
+use bimorph::cosim::finer;
 use bimorph::netlist::{self, Bundle, DroppedInclude, Setting};
 use clap::Args;
 use std::io::{self, IsTerminal};
@@ -91,7 +92,11 @@ impl NetlistArgs {
             Bundle::read_telling(file, &[], warn).map_err(|source| Failure::Read { path: file.to_owned(), source })?;
         let mut loaded = netlist::load(&bundle, &self.set)
             .map_err(|errors| Failure::from(bimorph::compile::CompileError::Netlist(errors)))?;
-        loaded.warnings.items.retain(|warning| !OF_THE_CIRCUIT.contains(&warning.code.as_str()));
+        // a switch is left out here, too
+        loaded
+            .warnings
+            .items
+            .retain(|w| !OF_THE_CIRCUIT.contains(&w.code.as_str()) || w.message.starts_with("switches"));
         if !loaded.warnings.items.is_empty() {
             eprint!("{}", loaded.warnings.render(io::stderr().is_terminal()));
         }
@@ -154,19 +159,31 @@ fn analysis(text: &str, form: &str, fit: impl Fn(&[&str]) -> bool) -> Result<Str
 fn times(text: &str) -> Result<String, String> {
     analysis(text, "STEP STOP [START [LONGEST]] [uic]", |words| {
         let uic = words.last().is_some_and(|word| word.eq_ignore_ascii_case("uic"));
-        (2..=4).contains(&(words.len() - usize::from(uic)))
+        let positive = |k: usize| words.get(k).and_then(|word| finer::number(word)).is_none_or(|t| t > 0.0);
+        (2..=4).contains(&(words.len() - usize::from(uic))) && positive(0) && positive(1)
     })
 }
 
 fn frequencies(text: &str) -> Result<String, String> {
     let kinds = ["dec", "oct", "lin"];
     analysis(text, "dec POINTS FROM TO", |words| {
-        words.len() == 4 && kinds.iter().any(|kind| words[0].eq_ignore_ascii_case(kind))
+        let number = |k: usize| finer::number(words[k]);
+        words.len() == 4
+            && kinds.iter().any(|kind| words[0].eq_ignore_ascii_case(kind))
+            && number(1).is_none_or(|points| points >= 1.0)
+            && number(2).is_none_or(|from| from > 0.0)
+            && number(2).zip(number(3)).is_none_or(|(from, to)| to >= from)
     })
 }
 
 fn levels(text: &str) -> Result<String, String> {
-    analysis(text, "v_NAME FROM TO STEP", |words| matches!(words.len(), 4 | 8))
+    analysis(text, "v_NAME FROM TO STEP, STEP towards TO and not 0", |words| {
+        let leads = |words: &[&str]| match [words[1], words[2], words[3]].map(finer::number) {
+            [Some(from), Some(to), Some(step)] => step != 0.0 && (to - from) * step >= 0.0,
+            _ => true,
+        };
+        matches!(words.len(), 4 | 8) && words.chunks(4).all(leads)
+    })
 }
 
 /// Reads `NAME=WAVE`.
@@ -197,6 +214,13 @@ mod tests {
         assert_eq!(times("1u 100u UIC"), Ok("1u 100u UIC".to_owned()));
         assert_eq!(times("100u"), Err("expected 'STEP STOP [START [LONGEST]] [uic]', got \"100u\"".to_owned()));
         assert!(times("").is_err() && times("uic").is_err() && times("1 2 3 4 5").is_err());
+        assert!(
+            frequencies("dec 10 1meg 1k").is_err()
+                && frequencies("dec 0 1k 1meg").is_err()
+                && frequencies("lin 1 0 1k").is_err()
+        );
+        assert!(levels("v_a 0 5 0").is_err() && levels("v_a 0 5 -1").is_err() && levels("v_a 5 0 -1").is_ok());
+        assert!(times("0 1u").is_err() && times("1u {stop}").is_ok());
         assert_eq!(frequencies("DEC 10 1k 1meg"), Ok("DEC 10 1k 1meg".to_owned()));
         assert!(frequencies("1k:1M").is_err() && frequencies("10 1k 1meg 5").is_err());
         assert!(levels("v_v1 0 5 0.1").is_ok() && levels("v_v1 0 5").is_err());

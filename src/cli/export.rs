@@ -145,16 +145,15 @@ impl Export {
 
     /// What the file does not say by its numbers.
     fn warnings(&self, compiled: &Compiled, fitted: &Fitted) -> Vec<String> {
-        let mut warnings: Vec<String> =
-            beyond(compiled.options.tol, compiled.order.estimated_error).into_iter().collect();
+        let mut warnings: Vec<String> = beyond(compiled.options.tol, mesh_error(compiled)).into_iter().collect();
         if fitted.error > self.within {
             let (modes, error, within) = (fitted.model.modes.len(), fitted.error, self.within);
             warnings.push(format!("{modes} modes deviate by {error:.1e}, more than --within {within:.1e}"));
         }
         if fitted.model.modes.is_empty() {
             warnings.push(
-                "at this operating point ports and signals see no motion; give a --port voltage, or name NODE.x with --ports or \
-                 --signals"
+                "the file has no mode, and answers at once at every frequency: none that ports and signals see lies below --to; take a \
+                 higher --to, or where they see no motion at this operating point, a --port voltage or NODE.x with --ports or --signals"
                     .to_owned(),
             );
         }
@@ -250,15 +249,20 @@ fn quality(fitted: &Fitted, mode: usize) -> f64 {
     fitted.model.modes[mode].omega / fitted.model.damping[(mode, mode)]
 }
 
-/// What was written, for a person.
+/// The estimate of the mesh; what has no beams has no mesh.
+fn mesh_error(compiled: &Compiled) -> Option<f64> {
+    if compiled.structure.beams.is_empty() { Some(0.0) } else { compiled.order.estimated_error }
+}
+
 /// How far the full model itself may be off by its mesh.
 fn mesh(compiled: &Compiled) -> String {
-    match compiled.order.estimated_error {
+    match mesh_error(compiled) {
         Some(error) => format!("frequencies of the full model: off by {error:.1e} at most in the band, by its mesh"),
         None => "frequencies of the full model: nothing tells how far its mesh is off; --band HZ does".to_owned(),
     }
 }
 
+/// What was written, for a person.
 fn summary(fitted: &Fitted, pins: &Pins, name: &str) -> String {
     let model = &fitted.model;
     let row = |(j, mode): (usize, &bimorph::export::linear::Mode)| {

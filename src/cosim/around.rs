@@ -63,6 +63,14 @@ pub enum AroundError {
         /// The names there are.
         available: String,
     },
+    /// A port or a drive that is given twice.
+    #[error("--{what}: `{name}` is given twice; leave one of the two out")]
+    Twice {
+        /// Which option.
+        what: &'static str,
+        /// The name.
+        name: String,
+    },
     /// A file name that decks cannot hold.
     #[error("the netlist's name \"{file}\" holds a blank, which ngspice takes for its end; rename the file")]
     Blank {
@@ -156,6 +164,14 @@ pub fn around(structure: &Structure, wanted: &Around) -> Result<String, AroundEr
 
 /// The source that small signals come from; checks the names that were given.
 fn sources(structure: &Structure, wanted: &Around) -> Result<Option<String>, AroundError> {
+    for (what, names) in [
+        ("port", wanted.ports.iter().map(|(name, _)| name).collect::<Vec<_>>()),
+        ("drive", wanted.drives.iter().map(|(name, _)| name).collect()),
+    ] {
+        if let Some((_, name)) = names.iter().enumerate().find(|(k, name)| names[..*k].contains(name)) {
+            return Err(AroundError::Twice { what, name: (*name).clone() });
+        }
+    }
     let listed = |names: &[&str]| if names.is_empty() { "none".to_owned() } else { names.join(", ") };
     let ports: Vec<&str> = structure.ports.iter().map(|p| p.name.as_str()).collect();
     if let Some((name, _)) = wanted.ports.iter().find(|(name, _)| !ports.contains(&name.as_str())) {

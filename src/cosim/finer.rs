@@ -130,16 +130,23 @@ pub fn measuring(deck: &str, raw: &Path) -> Option<String> {
     Some(lines[..end].join("\n") + "\n" + &section)
 }
 
-/// Lines with their continuations (`+`) put behind them.
+/// Lines with their continuations (`+`) put behind them; comments and empty lines between them stand before.
 fn logical_lines(deck: &str) -> Vec<String> {
-    let mut lines: Vec<String> = Vec::new();
-    for line in deck.lines() {
-        match (line.strip_prefix('+'), lines.last_mut()) {
+    let (mut lines, mut last): (Vec<String>, Option<usize>) = (Vec::new(), None);
+    for (number, line) in deck.lines().enumerate() {
+        let text = line.trim_start();
+        match (text.strip_prefix('+'), last) {
             (Some(rest), Some(last)) => {
-                last.push(' ');
-                last.push_str(rest);
+                lines[last].push(' ');
+                lines[last].push_str(rest);
             }
-            _ => lines.push(line.to_owned()),
+            _ => {
+                // the first line is a title, whatever it begins with
+                if number > 0 && !text.is_empty() && !text.starts_with('*') {
+                    last = Some(lines.len());
+                }
+                lines.push(line.to_owned());
+            }
         }
     }
     lines
@@ -171,7 +178,7 @@ fn words(line: &str) -> Vec<String> {
 }
 
 /// A number as decks write it: a suffix of SPICE, and letters behind it that mean nothing.
-pub(super) fn number(word: &str) -> Option<f64> {
+pub fn number(word: &str) -> Option<f64> {
     let end = word
         .char_indices()
         .find(|&(i, c)| {
@@ -313,6 +320,17 @@ mod tests {
         assert!(text.contains("max v(x)\n.control\nrun\n") && text.ends_with("quit\n.endc\n.end\n"), "{text}");
         assert_eq!(measuring("t\n.meas tran a max v(x)\n.control\nrun\n.endc\n", raw), None);
         assert_eq!(measuring("t\n.tran 1 2\n.end\n", raw), None);
+    }
+
+    /// A comment between continuations is none of them, and a continuation may stand behind blanks.
+    #[test]
+    fn comments_between_continuations() {
+        let lines =
+            logical_lines("* title\nV1 a 0 PULSE(0 4 1u\n* rise, fall\n+ 1u 1u 5u 20u)\n.model m x(\n\n  + y=1)\n.end");
+        assert_eq!(
+            lines,
+            ["* title", "V1 a 0 PULSE(0 4 1u  1u 1u 5u 20u)", "* rise, fall", ".model m x(  y=1)", "", ".end"]
+        );
     }
 
     /// Numbers are read as SPICE reads them.

@@ -67,6 +67,10 @@ pub(super) fn judge(heard: &Heard, failure: &Path, deck: &Path, has_control: boo
     }
 }
 
+/// What ngspice says where it did not do what a deck asks for; the first of these lines is the reason that is told.
+const ABORTS: [&str; 4] =
+    ["simulation(s) aborted", "MIF-ERROR", "circuit not parsed", "Simulation interrupted due to error"];
+
 /// Reads ngspice's messages to their end: the line that tells an abort, whether nothing was run, and what was kept.
 fn hear(stderr: impl Read, capture: bool) -> std::io::Result<(Option<String>, bool, Vec<u8>)> {
     let (mut aborted, mut nothing_run, mut messages) = (None, false, Vec::new());
@@ -74,7 +78,7 @@ fn hear(stderr: impl Read, capture: bool) -> std::io::Result<(Option<String>, bo
     let mut line = Vec::new();
     while stderr.read_until(b'\n', &mut line)? > 0 {
         let text = String::from_utf8_lossy(&line);
-        if text.contains("simulation(s) aborted") {
+        if ABORTS.iter().any(|words| text.contains(words)) {
             aborted.get_or_insert_with(|| text.trim().to_owned());
         }
         nothing_run |= text.contains("no simulations run");

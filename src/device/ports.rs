@@ -21,7 +21,7 @@ use crate::equations::Joints;
 use crate::gaps::inputs::Input;
 use crate::gaps::{Point, System};
 use crate::multibody::BodyId;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
 /// How a port answers.
@@ -65,9 +65,16 @@ impl Ports {
             found.answers = vec![Answer::Current; electrics.ports];
             return Ok(found);
         }
-        let mut inputs = Vec::new();
+        let (mut inputs, mut given) = (Vec::new(), HashSet::new());
         for name in names {
             crate::budget::check();
+            if !given.insert(name.as_str()) {
+                return Err(DeviceError::BadRequest {
+                    what: "ports",
+                    expected: "each port once: it has one voltage".into(),
+                    got: format!("\"{name}\" twice"),
+                });
+            }
             let (source, kind, answer) = match known.get(name.as_str()) {
                 Some(&source) => (source, PortKind::Electrical, Answer::Current),
                 None => {

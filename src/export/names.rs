@@ -56,11 +56,81 @@ fn plain(name: &str) -> String {
     out.trim_end_matches('_').to_owned()
 }
 
+/// Words of Verilog-A (LRM 2.4, annex B) that a module of that name could not be told from.
+const RESERVED: [&str; 63] = [
+    "above",
+    "abs",
+    "absdelay",
+    "acos",
+    "ac_stim",
+    "aliasparam",
+    "always",
+    "analog",
+    "analysis",
+    "and",
+    "asin",
+    "atan",
+    "begin",
+    "branch",
+    "case",
+    "ceil",
+    "connect",
+    "cos",
+    "ddt",
+    "ddx",
+    "default",
+    "discipline",
+    "else",
+    "end",
+    "endcase",
+    "endmodule",
+    "exclude",
+    "exp",
+    "floor",
+    "flow",
+    "for",
+    "from",
+    "function",
+    "ground",
+    "hypot",
+    "idt",
+    "if",
+    "inf",
+    "initial",
+    "inout",
+    "input",
+    "integer",
+    "laplace_nd",
+    "limexp",
+    "ln",
+    "log",
+    "module",
+    "nature",
+    "net",
+    "noise_table",
+    "or",
+    "output",
+    "parameter",
+    "potential",
+    "pow",
+    "real",
+    "sin",
+    "slew",
+    "string",
+    "table",
+    "tan",
+    "transition",
+    "white_noise",
+];
+
 /// Checks the name of a subcircuit or module.
 ///
 /// # Errors
 /// [`ExportError::BadName`].
 pub fn checked(name: &str) -> Result<&str, ExportError> {
+    if RESERVED.contains(&name.to_ascii_lowercase().as_str()) {
+        return Err(ExportError::BadName { got: name.to_owned() });
+    }
     let good = name.starts_with(|c: char| c.is_ascii_alphabetic())
         && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
     if good { Ok(name) } else { Err(ExportError::BadName { got: name.to_owned() }) }
@@ -69,7 +139,8 @@ pub fn checked(name: &str) -> Result<&str, ExportError> {
 /// A name made of a file's.
 pub fn from_file(stem: &str) -> String {
     let name = plain(stem);
-    if name.starts_with(|c: char| c.is_ascii_alphabetic()) { name } else { format!("m_{name}") }
+    let own = name.starts_with(|c: char| c.is_ascii_alphabetic()) && !RESERVED.contains(&name.as_str());
+    if own { name } else { format!("m_{name}") }
 }
 
 #[cfg(test)]
@@ -82,7 +153,9 @@ mod tests {
         assert_eq!(plain("x1(2).Y"), "x1_2_y");
         assert_eq!(plain("b1.hot.T"), "b1_hot_t");
         assert_eq!(from_file("3arms"), "m_3arms");
+        assert_eq!((from_file("analog"), from_file("table")), ("m_analog".to_owned(), "m_table".to_owned()));
         assert_eq!(checked("bank_2"), Ok("bank_2"));
+        assert!(checked("module").is_err() && checked("Real").is_err());
         assert!(checked("2bank").is_err() && checked("a b").is_err() && checked("").is_err());
     }
 }

@@ -4,6 +4,7 @@
 //! file of a few lines that stands for billions of polygons. The second copies. The grid is the file's own unit where all falls on
 //! it; else the finest power of ten of it, down to 1 pm, on which the drawing fits.
 
+mod bounds;
 mod copy;
 mod counts;
 mod error;
@@ -12,20 +13,11 @@ mod grid;
 use super::cells::{Library, Transform};
 use super::drawing::Drawing;
 use crate::budget;
+use bounds::MOST_PLACEMENTS;
+pub use bounds::{DEEPEST, MOST_LABELS, MOST_POINTS, MOST_POLYGONS};
 use copy::Flat;
 pub use error::FlattenError;
 use std::collections::{BTreeMap, HashMap};
-
-/// Most polygons of a flat drawing.
-pub const MOST_POLYGONS: u64 = 2_000_000;
-/// Most points of a flat drawing.
-pub const MOST_POINTS: u64 = 20_000_000;
-/// Most labels of a flat drawing.
-pub const MOST_LABELS: u64 = 500_000;
-/// Most placed cells of a drawing whose places are kept; with more, none are.
-const MOST_PLACEMENTS: u64 = 200_000;
-/// Calls may nest this deep.
-pub const DEEPEST: usize = 100;
 
 impl Library {
     /// Makes a drawing of one cell: the named one, or the only one that no other calls.

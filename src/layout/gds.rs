@@ -14,19 +14,15 @@ use crate::budget;
 use record::{Record, Records, kind};
 use std::io::Read;
 
-use element::{Element, Noted};
+use element::{Element, Noted, data};
 pub use error::{GdsError, GdsFault};
 
-/// Most points of one polygon or path.
-const LONGEST: usize = 1 << 20;
 /// Most shapes, labels and calls of a file, before hierarchy is taken out.
 const MOST_PARTS: usize = 4_000_000;
 /// Most cells of a file.
 const MOST_CELLS: usize = 1_000_000;
 /// Sizes of a database unit that can be meant [m].
 const UNITS: std::ops::RangeInclusive<f64> = 1e-15..=1e-3;
-/// Factors of a call that can be meant [1].
-const MAGNIFICATIONS: std::ops::RangeInclusive<f64> = 1e-6..=1e6;
 /// Records between two reports of progress.
 const REPORT: u32 = 1 << 14;
 
@@ -79,10 +75,6 @@ struct Reading {
     parts: usize,
     points: u64,
     noted: Noted,
-}
-
-fn data(record: &Record<'_>, expected: &'static str) -> GdsFault {
-    GdsFault::Data { bytes: record.data.len(), expected }
 }
 
 impl Reading {

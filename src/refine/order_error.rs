@@ -103,26 +103,15 @@ pub fn of_loaded_modes(
     structure: &Structure,
     options: &CompileOptions,
     parts: &Discretized,
-    (factor, shift): (&BlockMatrix<f64, 3>, f64),
+    factor: (&BlockMatrix<f64, 3>, f64),
     axial: &[f64],
     (lambda, shapes): (&[f64], &[Vec<Pose>]),
 ) -> Option<OrderError> {
-    let model = &parts.system.model;
     if !own_stiffness(options, parts) {
-        // a frame of centrelines says nothing about other junctions
-        if parts.offsets.iter().flatten().any(|o| *o != 0.0) {
-            return None;
-        }
         return by_frame(structure, options, parts, lambda, shapes);
     }
-    let mut spans = spans(structure, options, (&parts.beams, &parts.offsets), true);
-    for ((span, beam), force) in spans.iter_mut().zip(&structure.beams).zip(axial) {
-        span.tighten(&bar(beam, options.shear, options.rotary_inertia), *force);
-    }
-    let mass = |x: &[Pose]| x.iter().enumerate().map(|(k, x)| model.mass(k).component_mul(x)).collect();
-    let project = |x: &mut [Pose]| model.project(x);
-    let pencil = Pencil { factor, pattern: &model.pattern, shift, mass: &mass, project: &project };
-    let Compared { reference, likeness, x, norms } = compare(&pencil, &spans, lambda, shapes)?;
+    let (Compared { reference, likeness, x, norms }, spans) =
+        compared(structure, options, parts, factor, axial, (lambda, shapes))?;
     let shares = (shapes.iter().zip(&x).zip(lambda.iter().zip(&norms)))
         .map(|((y, x), (&lambda, norm))| {
             let share = |span: &Span| {
@@ -135,6 +124,46 @@ pub fn of_loaded_modes(
         })
         .collect();
     Some(OrderError { relative: relative(lambda, &reference), reference, likeness, shares })
+}
+
+/// [`OrderError::relative`] and [`OrderError::likeness`] of each mode alone.
+pub fn relative_of_loaded_modes(
+    structure: &Structure,
+    options: &CompileOptions,
+    parts: &Discretized,
+    factor: (&BlockMatrix<f64, 3>, f64),
+    axial: &[f64],
+    (lambda, shapes): (&[f64], &[Vec<Pose>]),
+) -> Option<Vec<(f64, f64)>> {
+    let (reference, likeness) = if own_stiffness(options, parts) {
+        let found = compared(structure, options, parts, factor, axial, (lambda, shapes))?.0;
+        (found.reference, found.likeness)
+    } else {
+        let found = by_frame(structure, options, parts, lambda, shapes)?;
+        (found.reference, found.likeness)
+    };
+    Some(relative(lambda, &reference).into_iter().zip(likeness).collect())
+}
+
+/// Modes and those of the reference, where the tangent is that of the cubic frame.
+fn compared(
+    structure: &Structure,
+    options: &CompileOptions,
+    parts: &Discretized,
+    (factor, shift): (&BlockMatrix<f64, 3>, f64),
+    axial: &[f64],
+    (lambda, shapes): (&[f64], &[Vec<Pose>]),
+) -> Option<(Compared, Vec<Span>)> {
+    let model = &parts.system.model;
+    let mut spans = spans(structure, options, (&parts.beams, &parts.offsets), true);
+    for ((span, beam), force) in spans.iter_mut().zip(&structure.beams).zip(axial) {
+        span.tighten(&bar(beam, options.shear, options.rotary_inertia), *force);
+    }
+    let mass = |x: &[Pose]| x.iter().enumerate().map(|(k, x)| model.mass(k).component_mul(x)).collect();
+    let project = |x: &mut [Pose]| model.project(x);
+    let pencil = Pencil { factor, pattern: &model.pattern, shift, mass: &mass, project: &project };
+    let compared = compare(&pencil, &spans, lambda, shapes)?;
+    Some((compared, spans))
 }
 
 /// Relative errors of frequencies; 0 for rigid motions.
@@ -153,6 +182,10 @@ fn by_frame(
     lambda: &[f64],
     shapes: &[Vec<Pose>],
 ) -> Option<OrderError> {
+    // a frame of centrelines says nothing about other junctions
+    if parts.offsets.iter().flatten().any(|o| *o != 0.0) {
+        return None;
+    }
     let elements = Elements::Beams(parts.beams.iter().map(|b| b.len() - 1).collect());
     let gaps = FrameGaps::LeftOut;
     let frame = assemble(structure, &FrameOptions { elements, shear: options.shear, undamped: true, gaps }).ok()?;

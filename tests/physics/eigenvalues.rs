@@ -160,3 +160,13 @@ fn as_sugar_is_about_the_drawing() {
     assert_eq!(first(20e6, sugar.clone()), first(0.0, plain.clone()));
     assert!(first(20e6, plain.clone()) > 1.05 * first(0.0, plain));
 }
+
+/// What has no mass has no modes, and says so; it has an equilibrium and a motion all the same.
+#[test]
+fn nothing_with_mass() {
+    let text = "process p = [Youngsmodulus=165e9 h=2u]\nanchor p [a] []\nbeam2d p [a b] [l=100u w=2u]\nf2d * [b] [F=1u oz=pi/2]";
+    let compiled = model(text, &CompileOptions { segments: Some(2), ..CompileOptions::default() });
+    let error = modes(&compiled, 3, &[]).unwrap_err().to_string();
+    assert!(error.contains("mass") && error.contains("density"), "{error}");
+    assert!(static_equilibrium(&compiled, &[]).is_ok());
+}

@@ -2,6 +2,7 @@
 
 use crate::{close, model};
 use bimorph::analysis::AnalysisError;
+use bimorph::analysis::step_error::with_step_error;
 use bimorph::analysis::transient::{TransientOptions, transient};
 use bimorph::compile::{CompileOptions, Compiled};
 
@@ -87,4 +88,67 @@ fn dynamic_pull_in() {
     assert!(below < 1.05e-6, "{below:e}");
     let above = reach(4.7527 * 1.001);
     assert!(above > 1.85e-6, "{above:e}");
+}
+
+/// What drag holds back and no mass relaxes as 1 − e^(−t/τ), τ = c/k = 10 µs: its steps follow the tolerance, to 1.0 of it rms. (It begins with a
+/// rate that no mass carries, which the output before the end of the first step does not know: 1.4e-2 there at a tolerance of 1e-3.)
+#[test]
+fn drag_without_mass() {
+    let light = "anchor * [f] [l=1u w=1u h=1u]\nguide2d * [m] []\nspring2d * [f m] [kx=1]\ndamper2d * [f m] [bx=1e-5]\nf2d * [m] [F=1u]";
+    let beside = format!("{light}\nmass2d * [n] [m=1e-10]\nguide2d * [n] []\nspring2d * [f n] [kx=1]");
+    for text in [light, &beside] {
+        let (t, x, _) =
+            run(&model(text, &CompileOptions::default()), &TransientOptions { tol: 1e-3, ..options(1e-4, None) });
+        let off = |(t, x): (&f64, &f64)| (x * 1e6 - 1.0 + (-t / 1e-5).exp()).powi(2);
+        let error = (t.iter().zip(&x).map(off).sum::<f64>() / t.len() as f64).sqrt();
+        assert!(error < 1.5e-3, "{error:e}");
+    }
+}
+
+/// A companion that takes the same steps tells nothing of them: no estimate, and a warning.
+#[test]
+fn one_step_compared_with_itself() {
+    let start = model(&OSCILLATOR.replace("F=0", "F=1u"), &CompileOptions::default());
+    let compiled = model(OSCILLATOR, &CompileOptions::default());
+    let options = TransientOptions { step: Some(1e-3), ..options(6.3e-4, Some(&start)) };
+    let mut run =
+        |options: &TransientOptions<'_>, sample: &mut dyn FnMut(f64, &[f64]), watch: bimorph::analysis::Watch<'_>| {
+            Ok((transient(&compiled, options, sample, watch)?, ()))
+        };
+    let (result, ()) = with_step_error(&options, &compiled, &mut run, &mut |_, _| {}, &mut |_| true).unwrap();
+    assert_eq!(result.step_error, None);
+    assert!(result.warnings.iter().any(|w| w.contains("nothing tells how far the steps")), "{:?}", result.warnings);
+}
+
+/// With a companion that is hardly looser (0.3 beside 0.15), what is told of the steps is no less than they are off.
+#[test]
+fn loose_steps_tell_enough() {
+    let text = OSCILLATOR.replace("damper2d * [f m] [bx=1e-6]", "");
+    let start = model(&text.replace("F=0", "F=1u"), &CompileOptions::default());
+    let compiled = model(&text, &CompileOptions::default());
+    let options = TransientOptions { tol: 0.15, points: 1001, ..options(1e-2, Some(&start)) };
+    let mut samples = Vec::new();
+    let mut run =
+        |options: &TransientOptions<'_>, sample: &mut dyn FnMut(f64, &[f64]), watch: bimorph::analysis::Watch<'_>| {
+            Ok((transient(&compiled, options, sample, watch)?, ()))
+        };
+    let mut see = |t: f64, values: &[f64]| samples.push((t, values[0]));
+    let (result, ()) = with_step_error(&options, &compiled, &mut run, &mut see, &mut |_| true).unwrap();
+    let off = |(t, x): &(f64, f64)| (x - 1e-6 * (1e5 * t).cos()).powi(2);
+    let error = (samples.iter().map(off).sum::<f64>() / samples.len() as f64).sqrt() / 1e-6;
+    assert!(result.step_error.unwrap() >= error, "{:?} told, {error:e}", result.step_error);
+}
+
+/// A parameter that moves drawn nodes is no load to let go.
+#[test]
+fn released_geometry_is_refused() {
+    let text = |l: &str| {
+        format!(
+            "process p = [Youngsmodulus=165e9 density=2300 h=2u]\nanchor p [a] []\nbeam2d p [a m] [l={l} w=2u]\nf2d * [m] [F=1u oz=pi/2]"
+        )
+    };
+    let start = model(&text("150u"), &CompileOptions { segments: Some(4), ..CompileOptions::default() });
+    let compiled = model(&text("100u"), &CompileOptions { segments: Some(4), ..CompileOptions::default() });
+    let error = transient(&compiled, &options(1e-5, Some(&start)), &mut |_, _| {}, &mut |_| true).unwrap_err();
+    assert!(error.to_string().contains("changes the mechanism itself"), "{error}");
 }

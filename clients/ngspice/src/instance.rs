@@ -65,6 +65,16 @@ impl Instance {
         monitors: &[Monitor],
         noise: Option<Agitation>,
     ) -> Result<Self, DeviceError> {
+        if let Some(monitor) = monitors.iter().find(|m| m.scale == 0.0 || !m.scale.is_finite()) {
+            return Err(DeviceError::BadRequest {
+                what: "monitors",
+                expected: format!(
+                    "a finite scale of \"{}\" that is not 0: it would show 0 V for anything",
+                    monitor.signal
+                ),
+                got: monitor.scale.to_string(),
+            });
+        }
         let signals = monitors.iter().map(|m| m.signal.clone()).collect();
         let description =
             device.open(&OpenRequest { ports: names.iter().map(|p| p.name.clone()).collect(), signals, noise })?;

@@ -14,16 +14,47 @@ fn spelled<'a>(wanted: &str, candidates: impl Iterator<Item = &'a str> + Clone) 
     close.next().filter(|first| close.all(|other| other == *first))
 }
 
-/// Puts ports and monitors into the netlist's spelling. Names it does not know stay as they are, for the device to
-/// refuse.
-pub(crate) fn respell(card: &mut ModelCard, structure: &Structure) {
-    let ports = structure.ports.iter().map(|p| p.name.as_str());
-    let owners = (structure.nodes.iter().map(|n| n.name.as_str()))
+/// Two candidates that a lower-cased `wanted` may be, where there are two.
+fn alike<'a>(wanted: &str, candidates: impl Iterator<Item = &'a str>) -> Option<[&'a str; 2]> {
+    if wanted.chars().any(char::is_uppercase) {
+        return None;
+    }
+    let mut close = candidates.filter(|c| c.eq_ignore_ascii_case(wanted));
+    let first = close.next()?;
+    close.find(|other| *other != first).map(|other| [first, other])
+}
+
+/// Names of ports, monitors and settings on a line that cannot be told apart in small letters, as ngspice 39 passes them on: what the line says, and
+/// two of the netlist's names.
+pub(crate) fn ambiguous(card: &ModelCard, structure: &Structure, parameters: &[&str]) -> Option<(String, [String; 2])> {
+    let ports = || structure.ports.iter().map(|p| p.name.as_str());
+    let found = |wanted: &str, pair: [&str; 2]| (wanted.to_owned(), pair.map(str::to_owned));
+    let owner = |name: &str| {
+        let (owner, _) = name.rsplit_once('.')?;
+        alike(owner, owners(structure)).map(|pair| found(owner, pair))
+    };
+    let port = |name: &str| alike(name, ports()).map(|pair| found(name, pair)).or_else(|| owner(name));
+    let set = |name: &str| alike(name, parameters.iter().copied()).map(|pair| found(name, pair));
+    (card.ports.iter().find_map(|p| port(&p.name)))
+        .or_else(|| card.monitors.iter().find_map(|m| owner(&m.signal)))
+        .or_else(|| card.options.set.iter().find_map(|(name, _)| set(name)))
+}
+
+/// Names of what has quantities.
+fn owners(structure: &Structure) -> impl Iterator<Item = &str> + Clone {
+    (structure.nodes.iter().map(|n| n.name.as_str()))
         .chain(structure.beams.iter().map(|b| b.name.as_str()))
         .chain(structure.combs.iter().map(|c| c.name.as_str()))
         .chain(structure.plate_gaps.iter().map(|g| g.name.as_str()))
         .chain(structure.beam_gaps.iter().map(|g| g.name.as_str()))
-        .chain(structure.stops.iter().map(|s| s.name.as_str()));
+        .chain(structure.stops.iter().map(|s| s.name.as_str()))
+}
+
+/// Puts ports and monitors into the netlist's spelling. Names it does not know stay as they are, for the device to
+/// refuse.
+pub(crate) fn respell(card: &mut ModelCard, structure: &Structure) {
+    let ports = structure.ports.iter().map(|p| p.name.as_str());
+    let owners = owners(structure);
     let quantity = |name: &str| {
         let (owner, quantity) = name.rsplit_once('.')?;
         let owner = spelled(owner, owners.clone()).unwrap_or(owner);
@@ -116,6 +147,20 @@ mod tests {
         assert_eq!(signals, ["Yoke.x", "Gap.q", "Yoke.T"]);
         let set: Vec<_> = card.options.set.iter().map(|(n, _)| n.as_str()).collect();
         assert_eq!(set, ["Width", "w"]);
+    }
+
+    /// Names that differ in case alone are told where the line has small letters, which may stand for either.
+    #[test]
+    fn names_that_differ_in_case_alone() {
+        let text = NETLIST
+            .replace("mass2d * [Yoke]", "mass2d * [yoke] [m=1e-10]\nspring2d * [F yoke] [kx=1]\nmass2d * [Yoke]");
+        let loaded = load(&Bundle::from_text("n", &text), &[]).unwrap_or_else(|d| panic!("{d}"));
+        let told = |monitor: &str| {
+            let raw = RawCard { file: Some("n".into()), monitors: vec![monitor.to_owned()], ..RawCard::default() };
+            ambiguous(&ModelCard::new(&raw, None).unwrap(), &loaded.structure, &[])
+        };
+        assert_eq!(told("yoke.x").map(|(name, _)| name), Some("yoke".to_owned()));
+        assert_eq!((told("Yoke.x"), told("f.x")), (None, None));
     }
 
     /// A lower-cased path finds its file, but not where two files differ in case alone.

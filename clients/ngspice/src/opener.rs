@@ -8,7 +8,7 @@ use bimorph::device::{Device, DeviceError};
 use bimorph::front::{self, Asked, FrontError};
 use bimorph::layout::LayoutError;
 use bimorph::layout::convert::ConvertError;
-use bimorph::netlist::{self, Bundle};
+use bimorph::netlist::{self, Bundle, Diagnostic};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use thiserror::Error;
@@ -42,6 +42,16 @@ pub enum OpenError {
         /// Diagnostics with file, line and column.
         source: CompileError,
     },
+    /// A name that may stand for two of the netlist's.
+    #[error("\"{name}\" may be `{}` or `{}` of netlist \"{file}\": ngspice passes lines on in small letters; rename one of the two", .pair[0], .pair[1])]
+    Ambiguous {
+        /// As on the line.
+        name: String,
+        /// Names of the netlist.
+        pair: [String; 2],
+        /// The netlist, as spelled on the line.
+        file: String,
+    },
     /// The device refuses the ports or monitors, or its server cannot be reached.
     #[error(transparent)]
     Device(#[from] DeviceError),
@@ -54,6 +64,9 @@ pub enum OpenError {
 /// Makes a device from a line; `directory` is the deck's, where it is known. Names on the line are put into the spelling
 /// of the netlist.
 pub type Opener = fn(&mut ModelCard, Option<&Path>) -> Result<Box<dyn Device>, OpenError>;
+
+/// Warnings of netlists that a process tells, at most.
+const MOST_TOLD: usize = 200;
 
 static OPENER: OnceLock<Opener> = OnceLock::new();
 
@@ -77,8 +90,15 @@ pub(crate) fn open(card: &mut ModelCard, directory: Option<&Path>) -> Result<Box
 /// [`OpenError`]
 pub fn open_model(card: &mut ModelCard, directory: Option<&Path>) -> Result<Box<dyn Device>, OpenError> {
     let bundle = read(&card.file, directory)?;
+    let plain = netlist::load(&bundle, &[]);
+    if let Ok(plain) = &plain {
+        let parameters: Vec<&str> = plain.parameters.iter().map(|(name, _)| name.as_str()).collect();
+        if let Some((name, pair)) = names::ambiguous(card, &plain.structure, &parameters) {
+            return Err(OpenError::Ambiguous { name, pair, file: card.file.clone() });
+        }
+    }
     if !card.options.set.is_empty()
-        && let Ok(plain) = netlist::load(&bundle, &[])
+        && let Ok(plain) = plain
     {
         names::respell_settings(card, plain.parameters.iter().map(|(name, _)| name.as_str()));
     }
@@ -90,9 +110,25 @@ pub fn open_model(card: &mut ModelCard, directory: Option<&Path>) -> Result<Box<
         false => loaded.structure,
     };
     names::respell(card, &structure);
+    tell(card, &loaded.warnings.items);
     match &card.remote {
         None => Ok(Box::new(LocalDevice::new(compiled(&card.file, bundle, &card.options)?))),
         Some(address) => connect(address, &bundle, card),
+    }
+}
+
+/// Warnings of a netlist on standard error, each once in a process: what a deck's run says of the drawing behind it. Those that a netlist's circuit
+/// is left out are none where the deck has it.
+fn tell(card: &ModelCard, warnings: &[Diagnostic]) {
+    static TOLD: Mutex<Vec<String>> = Mutex::new(Vec::new());
+    let mut told = TOLD.lock().unwrap_or_else(PoisonError::into_inner);
+    let of_circuit = |code: &str| card.options.without_circuit && ["W013", "W021", "W022"].contains(&code);
+    for warning in warnings.iter().filter(|w| !of_circuit(&w.code)) {
+        let line = format!("bimorph: {}: warning[{}]: {}", card.file, warning.code, warning.message);
+        if told.len() < MOST_TOLD && !told.contains(&line) {
+            eprintln!("{line}");
+            told.push(line);
+        }
     }
 }
 

@@ -28,6 +28,10 @@ pub(crate) struct Entry {
     pub(crate) balanced: Option<Token>,
     /// Where the last answer's record stands: an address in the host's state memory, good until the point is accepted.
     pub(crate) record: usize,
+    /// Whether the last equilibrium that was asked for was a point of a sweep.
+    pub(crate) sweeping: bool,
+    /// The record of an analysis before a sweep, while its first point finds that in the host's memory.
+    pub(crate) stale: Option<Token>,
     /// Its share in the noise at the output at the last frequency.
     pub(crate) density: f64,
 }
@@ -79,6 +83,8 @@ pub(crate) fn register(key: usize, instance: Instance) {
         nodes: Vec::new(),
         balanced: None,
         record: 0,
+        sweeping: false,
+        stale: None,
         density: 0.0,
     };
     match registry.find(key) {

@@ -31,11 +31,24 @@ pub(crate) fn respond(call: &Call<'_>, registry: &mut Registry) -> Outcome {
         return Outcome::Stop("ngspice gave no state memory".into());
     };
     history::read(recalled, entry.epoch, &mut entry.previous);
-    match question {
-        Question::Static if !call.sweep() => entry.previous.token = None,
+    if question == Question::Static && call.sweep() {
+        if !entry.sweeping {
+            // the host's memory still holds a point of the analysis before, which is no point of this sweep
+            entry.stale = entry.previous.token;
+        }
+        if entry.stale.is_some() && entry.previous.token == entry.stale {
+            entry.previous.token = None;
+        } else {
+            entry.stale = None;
+        }
+    } else if question == Question::Static {
+        // from rest
+        entry.previous.token = None;
+    }
+    entry.sweeping = question == Question::Static && call.sweep();
+    if matches!(question, Question::SmallSignal { .. }) {
         // A host that takes this for a transient has copied another point's record over this one's.
-        Question::SmallSignal { .. } => entry.previous.token = entry.balanced.or(entry.previous.token),
-        _ => {}
+        entry.previous.token = entry.balanced.or(entry.previous.token);
     }
     if matches!(question, Question::Transient { .. }) && !entry.integrals {
         // SAFETY: this is within a load of a transient, and the charges lie within this point's memory.

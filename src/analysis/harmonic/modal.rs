@@ -45,8 +45,11 @@ pub(crate) fn lowest(
         return linear(system, (q, drive), tangent, count);
     }
     let found = lowest_modes(system, (q, drive), tangent, count).map_err(AnalysisError::from)?;
+    if found.lambda.is_empty() {
+        return Err(massless());
+    }
     let bad = found.residuals.iter().any(|r| r.is_nan() || *r > RELIABLE) || found.missed;
-    if bad || found.lambda.is_empty() {
+    if bad {
         return Err(unsettled(count));
     }
     Ok(found)
@@ -59,6 +62,9 @@ fn linear(
     count: usize,
 ) -> Result<Modes, AnalysisError> {
     let model = &system.model;
+    if model.bodies.iter().all(|b| b.mass == 0.0 && b.inertia == 0.0) {
+        return Err(massless());
+    }
     let mut factor = tangent.clone();
     model.project_matrix(&mut factor);
     if factor.factor(&model.pattern).is_err() {
@@ -78,6 +84,12 @@ fn linear(
         block -= 1;
     }
     Err(unsettled(count))
+}
+
+fn massless() -> AnalysisError {
+    let detail =
+        "nothing that moves has mass, so there are no modes; give the layer a `density`, or the parts masses".into();
+    AnalysisError::NotConverged { detail }
 }
 
 fn unsettled(count: usize) -> AnalysisError {

@@ -117,7 +117,8 @@ fn start(
     let mut told = Vec::new();
     if let Some(start) = options.release {
         let point = operating_point(start, &options.voltages)?;
-        if point.q.len() != motion.q.len() {
+        let places = |model: &Compiled| model.structure.nodes.iter().map(|node| node.position).collect::<Vec<_>>();
+        if point.q.len() != motion.q.len() || places(start) != places(compiled) {
             return Err(AnalysisError::BadRequest {
                 what: "release".into(),
                 detail: "the released parameter changes the mechanism itself; release a load or a voltage".into(),

@@ -1,6 +1,6 @@
 //! The second pass: every shape and label in its place on the grid.
 
-use super::MOST_PLACEMENTS;
+use super::bounds::MOST_PLACEMENTS;
 use super::counts::{Count, placed, shifted};
 use crate::budget;
 use crate::layout::cells::{Call, Library, Shape, Transform};

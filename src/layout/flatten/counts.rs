@@ -1,13 +1,9 @@
 //! The first pass: what every cell comes to with all it calls, bounded before anything is laid out.
 
-use super::{DEEPEST, FlattenError, MOST_LABELS, MOST_POINTS, MOST_POLYGONS};
+use super::bounds::{DEEPEST, FARTHEST, MOST_CALLS, MOST_LABELS, MOST_POINTS, MOST_POLYGONS};
+use super::error::FlattenError;
 use crate::layout::cells::{Call, Library};
 use std::collections::HashMap;
-
-/// Most placed cells at all: a bound on the work, since empty cells can be called too.
-const MOST_CALLS: u64 = 20_000_000;
-/// Half of the largest wafer and some [m].
-pub(super) const FARTHEST: f64 = 0.5;
 
 /// What a cell comes to.
 #[derive(Debug, Clone, Copy, Default)]

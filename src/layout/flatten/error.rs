@@ -1,7 +1,6 @@
 //! Why a hierarchy has no flat drawing.
 
-use super::DEEPEST;
-use super::counts::FARTHEST;
+use super::bounds::{DEEPEST, FARTHEST};
 use crate::layout::crossings::Tangled;
 use thiserror::Error;
 

@@ -1,6 +1,6 @@
 //! The integer grid of a flat drawing: the file's own unit where all falls on it, else a power of ten of it.
 
-use super::DEEPEST;
+use super::bounds::DEEPEST;
 use super::counts::{Count, reach};
 use crate::layout::cells::Library;
 use crate::layout::drawing::LARGEST_COORDINATE;

@@ -1,9 +1,14 @@
 //! One element of a structure while its records come in.
 
+use super::error::GdsFault;
 use super::record::{Record, kind};
-use super::{GdsFault, LONGEST, MAGNIFICATIONS, data};
 use crate::layout::cells::Transform;
 use crate::layout::outline::{self, Style};
+
+/// Most points of one polygon or path.
+pub(super) const LONGEST: usize = 1 << 20;
+/// Factors of a call that can be meant [1].
+pub(super) const MAGNIFICATIONS: std::ops::RangeInclusive<f64> = 1e-6..=1e6;
 
 /// An element that is being read.
 #[derive(Debug, Default)]
@@ -136,4 +141,9 @@ impl Element {
         };
         outline::wire(&self.points, self.width, style)
     }
+}
+
+/// What a record holds, where it is of the kind expected.
+pub(super) fn data(record: &Record<'_>, expected: &'static str) -> GdsFault {
+    GdsFault::Data { bytes: record.data.len(), expected }
 }

@@ -1,6 +1,7 @@
 //! A process as its file has it.
 
-use super::{Anchoring, Fixed, LARGEST_HOLE, Layer, Metal, ProcessError, THICKEST, is_name};
+use super::error::ProcessError;
+use super::stack::{Anchoring, Fixed, LARGEST_HOLE, Layer, Metal, THICKEST, is_name};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 

@@ -22,10 +22,12 @@ use crate::gaps::{Drive, System};
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, Model};
 use crate::solve::SolveError;
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use nalgebra::{DMatrix, SymmetricEigen};
 
 /// Models of at most this many coordinates are solved densely.
 const DENSE: usize = 60;
+/// Modes that are settled beyond those asked for: they keep the last wanted one apart from what follows.
+const BESIDE: usize = 2;
 /// A factor whose solves are off by more than this share is corrected in every solve.
 const ROUGH: f64 = 1e-9;
 /// Residual at which an iteration stops [1].
@@ -57,27 +59,33 @@ struct Operator<'a, 'b> {
     root: &'a [Pose],
     /// Solves correct themselves.
     corrected: bool,
+    /// What was solved for last.
+    x: Vec<Pose>,
 }
 
 impl Operator<'_, '_> {
     /// (K − σM)⁻¹·M^½·y.
-    fn displacement(&mut self, y: &[f64]) -> Vec<Pose> {
+    fn displacement(&mut self, y: &[f64]) -> &[Pose] {
         crate::budget::check();
-        let weigh = |(k, r): (usize, &Pose)| Pose::new(r.x * y[3 * k], r.y * y[3 * k + 1], r.z * y[3 * k + 2]);
-        let mut x: Vec<Pose> = self.root.iter().enumerate().map(weigh).collect();
-        if self.corrected {
-            self.refined.solve(self.factor, self.shift, &mut x, ROUNDING);
-        } else {
-            self.model.project(&mut x);
-            self.factor.solve(&self.model.pattern, &mut x);
-            self.model.project(&mut x);
+        for ((x, r), y) in self.x.iter_mut().zip(self.root).zip(y.chunks_exact(3)) {
+            *x = Pose::new(r.x * y[0], r.y * y[1], r.z * y[2]);
         }
-        x
+        if self.corrected {
+            self.refined.solve(self.factor, self.shift, &mut self.x, ROUNDING);
+        } else {
+            self.model.project(&mut self.x);
+            self.factor.solve(&self.model.pattern, &mut self.x);
+            self.model.project(&mut self.x);
+        }
+        &self.x
     }
 
-    fn apply(&mut self, y: &DVector<f64>) -> DVector<f64> {
-        let x = self.displacement(y.as_slice());
-        DVector::from_iterator(y.len(), x.iter().zip(self.root).flat_map(|(x, r)| [x.x * r.x, x.y * r.y, x.z * r.z]))
+    /// Puts the image of `y` into `to`.
+    fn apply(&mut self, y: &[f64], to: &mut [f64]) {
+        let root = self.root;
+        for ((to, x), r) in to.chunks_exact_mut(3).zip(self.displacement(y)).zip(root) {
+            to.copy_from_slice(&[x.x * r.x, x.y * r.y, x.z * r.z]);
+        }
     }
 }
 
@@ -98,15 +106,24 @@ pub fn lowest_modes(
     let (factor, shift) = factored(system, stiffness)?;
     let massive = massive_directions(model);
     let count = count.min(massive);
+    if count == 0 {
+        return Ok(Modes {
+            lambda: Vec::new(),
+            shapes: Vec::new(),
+            residuals: Vec::new(),
+            missed: false,
+            rounding: 0.0,
+        });
+    }
     let mut refined = Refined::new(system, q, drive);
     let mut force: Vec<Pose> = (0..system.bodies()).map(|j| model.mass(j).map(f64::sqrt)).collect();
     let root = force.clone();
     let first = refined.solve(&factor, shift, &mut force, ROUNDING);
     let rounding = first.first.max(first.left);
+    let x = root.clone();
     let mut operator =
-        Operator { refined: &mut refined, factor: &factor, shift, model, root: &root, corrected: rounding > ROUGH };
-    // a few more than asked for keep the last wanted one well separated
-    let wide = (count + 4).min(massive);
+        Operator { refined: &mut refined, factor: &factor, shift, model, root: &root, corrected: rounding > ROUGH, x };
+    let wide = (count + BESIDE).min(massive);
     let pairs = if 3 * root.len() <= DENSE { dense(&mut operator, wide) } else { sparse(&mut operator, wide, massive) };
     let few = if pairs.settled >= wide && rounding <= ROUGH { count } else { wide };
     let start: Vec<Vec<Pose>> = (0..few.min(pairs.theta.len()))
@@ -117,13 +134,16 @@ pub fn lowest_modes(
         inverse_iteration::settle(model, refined, (&factor, shift), stiffness, start, wanted, GOAL)
     };
     let found = settle(&mut refined, start.clone(), wanted);
-    let complete = |found: &Block| {
-        found.lambda.len() == count
-            && found.residuals.iter().all(|&r| r <= RELIABLE)
-            && !missed(model, stiffness, &found.lambda, rounding)
-    };
+    // only where nothing is known of it yet
+    let lost = |found: &Block| missed(model, stiffness, &found.lambda, rounding);
+    let sound = |found: &Block| found.lambda.len() == count && found.residuals.iter().all(|&r| r <= RELIABLE);
+    let complete = |found: &Block| sound(found) && !lost(found);
+    let mut known = None;
     let found = match found {
-        Some(found) if complete(&found) => Some(found),
+        Some(found) if complete(&found) => {
+            known = Some(false);
+            Some(found)
+        }
         found => {
             let block = (count + (8 + count / 2).min(24)).min(massive);
             let mut start = found.as_ref().map_or(start, |f| f.shapes.clone());
@@ -138,7 +158,7 @@ pub fn lowest_modes(
         return Ok(Modes { lambda: Vec::new(), shapes: Vec::new(), residuals: Vec::new(), missed: true, rounding });
     };
     found.shapes.truncate(found.lambda.len());
-    let missed = missed(model, stiffness, &found.lambda, rounding);
+    let missed = known.unwrap_or_else(|| lost(&found));
     Ok(Modes { lambda: found.lambda, shapes: found.shapes, residuals: found.residuals, missed, rounding })
 }
 
@@ -157,15 +177,20 @@ fn factored(system: &System, stiffness: &BlockMatrix<f64, 3>) -> Result<(BlockMa
     Ok((factor, shift))
 }
 
-/// True when more modes lie below the highest one than were found. The factor that counts has rounding errors itself.
+/// True when more modes lie below the highest one than were found there: of several with the highest frequency, some may be found while
+/// one below is not. The factor that counts has rounding errors itself.
 fn missed(model: &Model, stiffness: &BlockMatrix<f64, 3>, lambda: &[f64], rounding: f64) -> bool {
     let margin = 0.01 + 20.0 * rounding;
     let Some(&highest) = lambda.last() else { return true };
     if margin.is_nan() || margin > 0.5 || highest <= 0.0 {
         return false;
     }
-    let mut counted = shifted(model, stiffness, highest * (1.0 - margin));
-    counted.factor(&model.pattern).is_ok_and(|i| i.negative >= lambda.len())
+    let cut = highest * (1.0 - margin);
+    // what lies that near may be counted or not
+    let near = cut * (1.001 + 20.0 * rounding);
+    let found = lambda.iter().filter(|lambda| **lambda <= near).count();
+    let mut counted = shifted(model, stiffness, cut);
+    counted.factor(&model.pattern).is_ok_and(|inertia| inertia.negative > found)
 }
 
 /// Free directions that carry mass: a model has as many modes. Inner bodies of a beam have no rotary inertia of their own.
@@ -193,9 +218,11 @@ fn typical(model: &Model, k: &BlockMatrix<f64, 3>) -> f64 {
 fn dense(operator: &mut Operator<'_, '_>, wanted: usize) -> Pairs {
     let n = 3 * operator.root.len();
     let mut a = DMatrix::<f64>::zeros(n, n);
+    let mut unit = vec![0.0; n];
     for c in 0..n {
-        let unit = DVector::from_fn(n, |i, _| if i == c { 1.0 } else { 0.0 });
-        a.set_column(c, &operator.apply(&unit));
+        unit[c] = 1.0;
+        operator.apply(&unit, a.column_mut(c).as_mut_slice());
+        unit[c] = 0.0;
     }
     let eigen = SymmetricEigen::new((&a + a.transpose()) * 0.5);
     let mut order: Vec<usize> = (0..n).collect();
@@ -211,7 +238,7 @@ fn dense(operator: &mut Operator<'_, '_>, wanted: usize) -> Pairs {
 /// The same by Lanczos, from fixed directions with components everywhere: the same bits on every run.
 fn sparse(operator: &mut Operator<'_, '_>, wanted: usize, rank: usize) -> Pairs {
     let n = 3 * operator.root.len();
-    let direction = |k: usize| DVector::from_fn(n, |i, _| 1.0 + ((i * (7919 + 104 * k)) % 101) as f64 / 101.0);
-    let mut apply = |y: &DVector<f64>| operator.apply(y);
+    let direction = |k: usize| (0..n).map(|i| 1.0 + ((i * (7919 + 104 * k)) % 101) as f64 / 101.0).collect();
+    let mut apply = |y: &[f64], to: &mut [f64]| operator.apply(y, to);
     lanczos::largest((n, rank), &mut apply, &direction, wanted, 1e-10, 3 * wanted + 100)
 }

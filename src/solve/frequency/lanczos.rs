@@ -8,7 +8,7 @@
 //! Reference: B. N. Parlett, "The symmetric eigenvalue problem" (1998), chapter 13.
 
 use super::tridiagonal::{eigen, last_entries};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 /// Ritz pairs, |θ| descending.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,21 +30,16 @@ const NEXT_LOOK: usize = 3;
 const ROOM: usize = 16;
 
 /// The `wanted` largest eigenvalues in magnitude of `apply`, an operator on vectors of `n` numbers of rank `rank`, each
-/// settled when its residual is below `tolerance` of it. At most `most` vectors are built up. `direction(k)` is the k-th direction to begin with, in the range of the operator.
+/// settled when its residual is below `tolerance` of it. At most `most` vectors are built up. `apply` puts the image of its first vector
+/// into the second; `direction(k)` is the k-th direction to begin with, in the range of the operator.
 pub fn largest(
     (n, rank): (usize, usize),
-    apply: &mut dyn FnMut(&DVector<f64>) -> DVector<f64>,
-    direction: &dyn Fn(usize) -> DVector<f64>,
+    apply: &mut dyn FnMut(&[f64], &mut [f64]),
+    direction: &dyn Fn(usize) -> Vec<f64>,
     wanted: usize,
     tolerance: f64,
     most: usize,
 ) -> Pairs {
-    let direction = &|k: usize| direction(k).as_slice().to_vec();
-    let mut given = DVector::zeros(n);
-    let apply: &mut dyn FnMut(&[f64], &mut [f64]) = &mut |x, y| {
-        given.copy_from_slice(x);
-        y.copy_from_slice(apply(&given).as_slice());
-    };
     let most = most.min(rank).max(1);
     // the basis, then vectors as they are wanted, as shapes of bodies and of nodes
     crate::budget::lay_out_matrix(n, most + 4 * wanted.min(most));
@@ -177,8 +172,8 @@ mod tests {
     fn closed_subspaces_end() {
         let values = |i: usize| [3.0, 2.0, 1.0, 0.0][i % 4];
         let n = 12;
-        let mut apply = |x: &DVector<f64>| DVector::from_fn(n, |i, _| values(i) * x[i]);
-        let direction = |k: usize| DVector::from_fn(n, |i, _| 1.0 + ((i * 7 + k * 5) % 11) as f64);
+        let mut apply = |x: &[f64], y: &mut [f64]| (0..n).for_each(|i| y[i] = values(i) * x[i]);
+        let direction = |k: usize| (0..n).map(|i| 1.0 + ((i * 7 + k * 5) % 11) as f64).collect();
         let found = largest((n, 9), &mut apply, &direction, 9, 1e-12, 100);
         let want = [3.0, 3.0, 3.0, 2.0, 2.0, 2.0, 1.0, 1.0, 1.0];
         for (theta, want) in found.theta.iter().zip(want) {

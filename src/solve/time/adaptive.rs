@@ -12,6 +12,8 @@ use super::method::{Method, Motion, StepFailure, Work};
 use super::rodas4::Rodas4;
 use super::step_size;
 use crate::gaps::{Ramp, System};
+use crate::multibody::Model;
+use crate::multibody::forces::add_damping;
 use crate::multibody::planar::Pose;
 use crate::solve::frequency::eigen::mass_product;
 use crate::solve::{SolveError, WhyFailed};
@@ -55,6 +57,8 @@ pub struct Adaptive<M = Rodas4> {
     error: Motion,
     carried_before: Vec<Motion>,
     mass: f64,
+    /// Translations that have drag and no mass: body, direction and drag [N·s/m].
+    dragged: Vec<(usize, usize, f64)>,
 }
 
 impl<M: Method> Adaptive<M> {
@@ -69,6 +73,7 @@ impl<M: Method> Adaptive<M> {
             before: Motion::zeros(n),
             error: Motion::zeros(n),
             mass: system.model.bodies.iter().map(|b| b.mass).sum(),
+            dragged: dragged(&system.model),
         }
     }
 
@@ -193,12 +198,18 @@ impl<M: Method> Adaptive<M> {
     }
 
     fn relative_error(&self, system: &System, after: &Motion, h: f64, tol: f64) -> f64 {
-        if self.mass == 0.0 {
-            return 0.0; // nothing moves in time without mass
+        if self.mass == 0.0 && self.dragged.is_empty() {
+            return 0.0; // nothing moves in time with neither mass nor drag
         }
-        let norm = |x: &[Pose]| mass_norm(system, x);
+        // what drag holds back and no mass weighs as much as a mass that it would stop in this step
+        let drag = |x: &[Pose]| h * self.dragged.iter().map(|(j, i, c)| c * x[*j][*i] * x[*j][*i]).sum::<f64>();
+        let norm = |x: &[Pose]| match self.dragged.is_empty() {
+            true => mass_norm(system, x),
+            false => mass_norm(system, x).hypot(drag(x).sqrt()),
+        };
+        let mass = self.mass + h * self.dragged.iter().map(|(_, _, c)| c).sum::<f64>();
         let (eq, ev) = (norm(&self.error.q), norm(&self.error.v));
-        let reach = norm(&self.before.q).max(norm(&after.q)) + FLOOR * system.length_scale * self.mass.sqrt();
+        let reach = norm(&self.before.q).max(norm(&after.q)) + FLOOR * system.length_scale * mass.sqrt();
         let error = (eq * eq + h * h * ev * ev).sqrt() / (tol * reach);
         // a sum: the larger of the two would hide what is not a number
         let error = error.hypot(contact_error(system, (&self.before, after), &self.error, tol));
@@ -247,6 +258,25 @@ fn not_finite(motion: &Motion) -> Option<(usize, usize)> {
     let wrong = |p: &Pose| p.iter().position(|x| !x.is_finite());
     let mut pairs = motion.q.iter().zip(&motion.v).enumerate();
     pairs.find_map(|(j, (q, v))| wrong(q).or_else(|| wrong(v)).map(|i| (j, i)))
+}
+
+/// Translations of bodies without mass that drag holds back, with the drag [N·s/m].
+pub(super) fn dragged(model: &Model) -> Vec<(usize, usize, f64)> {
+    if model.bodies.iter().all(|body| body.mass > 0.0) {
+        return Vec::new();
+    }
+    let (n, mut found) = (model.bodies.len(), Vec::new());
+    for (j, _) in model.bodies.iter().enumerate().filter(|(_, body)| body.mass == 0.0) {
+        for i in 0..2 {
+            let (mut rate, mut force) = (vec![Pose::zeros(); n], vec![Pose::zeros(); n]);
+            rate[j][i] = 1.0;
+            add_damping(model, &rate, &mut force);
+            if force[j][i] > 0.0 {
+                found.push((j, i, force[j][i]));
+            }
+        }
+    }
+    found
 }
 
 /// √(xᵀMx).

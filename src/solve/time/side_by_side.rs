@@ -6,7 +6,7 @@
 //! cannot be factored until the end, steps that vanish, an observer that says stop) is left to a run alone, which finds the same
 //! and says why.
 
-use super::adaptive::{FLOOR, MAX_REJECTED, contact_error};
+use super::adaptive::{FLOOR, MAX_REJECTED, contact_error, dragged};
 use super::method::Motion;
 use super::rodas4::lanes::{Lane, LaneRodas4};
 use super::step_size;
@@ -99,7 +99,7 @@ pub fn advance<'a>(
     done: &mut dyn FnMut(usize, Ended),
 ) -> LaneWork {
     let mut work = LaneWork::default();
-    let Some(mut method) = LaneRodas4::new(first) else {
+    let Some(mut method) = LaneRodas4::new(first).filter(|_| dragged(&first.model).is_empty()) else {
         while let Some((number, _)) = next() {
             done(number, Ended::Alone);
         }

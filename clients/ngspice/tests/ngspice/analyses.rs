@@ -156,3 +156,36 @@ fn every_analysis_after_every_other() {
     }
     assert_eq!(table, now, "docs/ngspice.md is of another state; BIMORPH_WRITE=1 writes the table");
 }
+
+/// A sweep begins from rest, whatever the analysis before it left: below pull-in (5.17 V) at 4 V the plate stands where it does without
+/// the operating point at 6 V, or the sweep above pull-in, that came first in the same run.
+#[test]
+fn a_sweep_begins_from_rest() {
+    let at_4_v = |lines: &str, ngspice: &Path| {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::copy(deck("damped_plate.net"), folder.path().join("damped_plate.net")).unwrap();
+        let path = folder.path().join("deck.cir");
+        let text = format!(
+            "* sweeps\nVin a 0 dc 6 ac 1\nA1 %gd [a 0] %v [x] plate\n\
+             .model plate bimorph(file=\"damped_plate.net\" ports=[\"drive\"] monitors=[\"m.x:1e6\"])\n{lines}\n.save all\n.print dc v(x)\n.end\n"
+        );
+        std::fs::write(&path, text).unwrap();
+        let ngspice = Some(ngspice.into());
+        let report =
+            cosim::run(&CosimOptions { deck: path, ngspice, capture: true, ..CosimOptions::default() }, &|| true);
+        let output = report.unwrap_or_else(|e| panic!("{e}")).output;
+        let row = |line: &str| {
+            let words: Vec<f64> = line.split_whitespace().map_while(|w| w.parse().ok()).collect();
+            (words.len() == 3 && (words[1] - 4.0).abs() < 1e-9).then(|| words[2])
+        };
+        output.lines().find_map(row).unwrap_or_else(|| panic!("{output}"))
+    };
+    for (version, ngspice) in &versions() {
+        let alone = at_4_v(".dc Vin 4 4.6 0.2", ngspice);
+        assert!((alone - 0.2247).abs() < 1e-3, "{version}: {alone}");
+        for before in [".ac dec 1 1k 10k", ".op"] {
+            let after = at_4_v(&format!("{before}\n.dc Vin 4 4.6 0.2"), ngspice);
+            assert!((after / alone - 1.0).abs() < 1e-6, "{version} after {before}: {after}, alone {alone}");
+        }
+    }
+}
