@@ -7,12 +7,14 @@ use bimorph::device::{Device, Mode, SmallSignal};
 use bimorph::netlist::Bundle;
 use std::sync::Arc;
 
-/// A mass of 1e-9 kg, drawn 30 µm along x, on springs along x and y and about z.
+/// A mass of 1e-9 kg, drawn 30 µm along x, on springs along x and y and about z that act in its centre.
 const GYROSCOPE: &str = "
+anchor * [o] [l=1u w=1u h=1u]
+pos * [o f] [x=30u]
 anchor * [f] [l=1u w=1u h=1u]
 mass2d * [m] [m=1e-9 J=1e-18]
-spring2d * [f m] [kx=4 ky=4.2 krz=1e-8 l=30u]
-damper2d * [f m] [bx=8e-8 by=8e-8 brz=1e-15 l=30u]
+spring2d * [f m] [kx=4 ky=4.2 krz=1e-8]
+damper2d * [f m] [bx=8e-8 by=8e-8 brz=1e-15]
 ";
 
 const MASS: f64 = 1e-9;
