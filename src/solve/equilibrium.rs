@@ -88,6 +88,8 @@ pub struct Equilibrium {
 enum Corrected {
     Stable,
     No,
+    /// An equilibrium that a gap has gone far to in one step: perhaps not that of this branch.
+    Leaps,
 }
 
 impl Equilibrium {
@@ -139,6 +141,7 @@ impl Equilibrium {
                     s = to;
                     ds = 2.0 * step;
                 }
+                Corrected::Leaps if step > self.options.smallest_step => ds = 0.5 * step,
                 Corrected::No if free.is_some() && !from_the_first => {
                     // what was held at first is so no more: bent or stretched so far that rounding hides what resists
                     return Err(self.too_far(system, s, &done, free));
@@ -148,7 +151,7 @@ impl Equilibrium {
                     return free.map_or(Ok(done), |pivot| Err(SolveError::singular(system, pivot)));
                 }
                 Corrected::No if step > self.options.smallest_step => ds = 0.5 * step,
-                Corrected::No => {
+                Corrected::No | Corrected::Leaps => {
                     done.fold.get_or_insert(s);
                     if self.options.stop_at_fold {
                         done.reached = s;
@@ -218,8 +221,11 @@ impl Equilibrium {
                     return Corrected::No;
                 }
                 let corrected = distance(system, &self.trial, &self.prediction);
-                let tame = corrected <= 0.5 * predicted + 1e-3 * system.length_scale && !self.leaps(system, from);
-                return if tame { Corrected::Stable } else { Corrected::No };
+                return match corrected <= 0.5 * predicted + 1e-3 * system.length_scale {
+                    true if self.leaps(system, from) => Corrected::Leaps,
+                    true => Corrected::Stable,
+                    false => Corrected::No,
+                };
             }
         }
         Corrected::No

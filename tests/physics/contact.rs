@@ -2,6 +2,7 @@
 
 use crate::{balance, close, model, node};
 use bimorph::analysis::pull_in::pull_in;
+use bimorph::analysis::statics::static_equilibrium;
 use bimorph::analysis::transient::{TransientOptions, transient};
 use bimorph::compile::{CompileOptions, Compiled};
 use bimorph::gaps::contact::{DEEPEST, TOUCH};
@@ -253,4 +254,20 @@ fn a_stop_ends_pull_in() {
     let found = pull_in(&stopped_plate("s stop2d * [m] [gap=1u]"), None, 200.0).unwrap();
     close(found.pull_in_v, nathanson(1.0, 1e-8, 2e-6), 1e-6);
     close(found.release_v.unwrap(), (2e-18 / (EPS * 1e-8)).sqrt(), 1e-3);
+}
+
+/// A load that opens a gap is there before the attraction that it holds off: k = 1 N/m, g = 2 µm, 4 µN away from the electrode. Up to pull-in at
+/// 26.89 V the plate stays where the cubic (u + F/k)(g + u)² = −ε₀AV²/2k has its stable root: −3.391 µm at 20 V.
+#[test]
+fn a_load_that_opens_a_gap_comes_first() {
+    let text = format!("{}\nf2d * [m] [F=-4u]", crate::gaps::PLATE);
+    let compiled = model(&text, &CompileOptions::default());
+    for volts in [20.0, 26.0] {
+        let port = [("drive".to_owned(), volts)];
+        let found = static_equilibrium(&compiled, &port).unwrap();
+        assert!(!found.pulled_in && !found.jumped, "{volts}");
+        let u = node(&found, "m").x;
+        let attraction = 0.5 * EPS * 1e-8 * volts * volts / (2e-6 - u).powi(2);
+        assert!((u + 4e-6 - attraction).abs() < 1e-5 * 4e-6, "{volts}: {u:e} {attraction:e}");
+    }
 }

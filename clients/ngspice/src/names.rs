@@ -29,9 +29,13 @@ fn alike<'a>(wanted: &str, candidates: impl Iterator<Item = &'a str>) -> Option<
 pub(crate) fn ambiguous(card: &ModelCard, structure: &Structure, parameters: &[&str]) -> Option<(String, [String; 2])> {
     let ports = || structure.ports.iter().map(|p| p.name.as_str());
     let found = |wanted: &str, pair: [&str; 2]| (wanted.to_owned(), pair.map(str::to_owned));
+    // names of one kind: a beam `T` has no displacement that could be meant for the node's, `t`
     let owner = |name: &str| {
         let (owner, _) = name.rsplit_once('.')?;
-        alike(owner, owners(structure)).map(|pair| found(owner, pair))
+        let nodes = || structure.nodes.iter().map(|n| n.name.as_str());
+        let beams = || structure.beams.iter().map(|b| b.name.as_str());
+        let pair = alike(owner, nodes()).or_else(|| alike(owner, beams())).or_else(|| alike(owner, gaps(structure)));
+        pair.map(|pair| found(owner, pair))
     };
     let port = |name: &str| alike(name, ports()).map(|pair| found(name, pair)).or_else(|| owner(name));
     let set = |name: &str| alike(name, parameters.iter().copied()).map(|pair| found(name, pair));
@@ -44,7 +48,12 @@ pub(crate) fn ambiguous(card: &ModelCard, structure: &Structure, parameters: &[&
 fn owners(structure: &Structure) -> impl Iterator<Item = &str> + Clone {
     (structure.nodes.iter().map(|n| n.name.as_str()))
         .chain(structure.beams.iter().map(|b| b.name.as_str()))
-        .chain(structure.combs.iter().map(|c| c.name.as_str()))
+        .chain(gaps(structure))
+}
+
+/// Names of what has a distance.
+fn gaps(structure: &Structure) -> impl Iterator<Item = &str> + Clone {
+    (structure.combs.iter().map(|c| c.name.as_str()))
         .chain(structure.plate_gaps.iter().map(|g| g.name.as_str()))
         .chain(structure.beam_gaps.iter().map(|g| g.name.as_str()))
         .chain(structure.stops.iter().map(|s| s.name.as_str()))

@@ -90,15 +90,8 @@ pub(crate) fn open(card: &mut ModelCard, directory: Option<&Path>) -> Result<Box
 /// [`OpenError`]
 pub fn open_model(card: &mut ModelCard, directory: Option<&Path>) -> Result<Box<dyn Device>, OpenError> {
     let bundle = read(&card.file, directory)?;
-    let plain = netlist::load(&bundle, &[]);
-    if let Ok(plain) = &plain {
-        let parameters: Vec<&str> = plain.parameters.iter().map(|(name, _)| name.as_str()).collect();
-        if let Some((name, pair)) = names::ambiguous(card, &plain.structure, &parameters) {
-            return Err(OpenError::Ambiguous { name, pair, file: card.file.clone() });
-        }
-    }
     if !card.options.set.is_empty()
-        && let Ok(plain) = plain
+        && let Ok(plain) = netlist::load(&bundle, &[])
     {
         names::respell_settings(card, plain.parameters.iter().map(|(name, _)| name.as_str()));
     }
@@ -109,6 +102,10 @@ pub fn open_model(card: &mut ModelCard, directory: Option<&Path>) -> Result<Box<
         true => loaded.structure.without_circuit(),
         false => loaded.structure,
     };
+    let parameters: Vec<&str> = loaded.parameters.iter().map(|(name, _)| name.as_str()).collect();
+    if let Some((name, pair)) = names::ambiguous(card, &structure, &parameters) {
+        return Err(OpenError::Ambiguous { name, pair, file: card.file.clone() });
+    }
     names::respell(card, &structure);
     tell(card, &loaded.warnings.items);
     match &card.remote {

@@ -11,6 +11,7 @@ use super::result::{Counters, TransientResult};
 use super::samples::Samples;
 use crate::compile::Compiled;
 use crate::gaps::Ramp;
+use crate::multibody::Body;
 use crate::solve::time::adaptive::{Advance, Observer};
 use crate::solve::time::method::{Motion, Work};
 
@@ -112,6 +113,13 @@ fn start(
     options: &TransientOptions<'_>,
 ) -> Result<(Motion, Vec<f64>, Vec<String>), AnalysisError> {
     let system = &compiled.parts.system;
+    let still = |b: &Body| b.mass == 0.0 && b.inertia == 0.0 && b.drag.amount == 0.0;
+    if system.model.dampers.is_empty() && system.model.bodies.iter().all(still) {
+        return Err(AnalysisError::BadRequest {
+            what: "motion in time".into(),
+            detail: "nothing that moves has mass or drag; give the layer a `density`, or ask for statics".into(),
+        });
+    }
     let mut motion = Motion::zeros(system.bodies());
     let mut rise = vec![0.0; system.electrics.heating.heaters.len()];
     let mut told = Vec::new();

@@ -17,7 +17,8 @@ const LEAST: f64 = 1e-30;
 /// Source voltages and dead loads that go from one value to another, heaters at their steady temperature.
 ///
 /// Loads go linearly. Voltages from rest go with the root of the share, so that heat and attraction, which follow their square, grow evenly
-/// with the loads and a tangent tells from the start where they lead; from other voltages they go linearly.
+/// with the loads and a tangent tells from the start where they lead; from other voltages they go linearly. So they do across gaps while loads
+/// come: attraction, the square of them, then lags behind a load that opens a gap, and does not close what such a load holds open.
 #[derive(Debug, Clone)]
 pub struct SourcePath<'a> {
     electrics: &'a Electrics,
@@ -34,9 +35,10 @@ pub struct SourcePath<'a> {
 impl<'a> SourcePath<'a> {
     /// From source voltages `from` to `to` [V], and the share `load` of dead loads and built-in strains at both ends.
     pub fn new(electrics: &'a Electrics, from: &'a [f64], to: &'a [f64], load: [f64; 2]) -> Self {
-        let from_rest = from.iter().all(|v| *v == 0.0);
+        let gap = |g: usize, u: &[f64]| u.iter().enumerate().map(|(i, v)| electrics.gap_rows[(g, i)] * v).sum::<f64>();
+        let attracts = (0..electrics.gap_rows.nrows()).any(|g| gap(g, to) != 0.0);
+        let from_rest = from.iter().all(|v| *v == 0.0) && !(attracts && load[0] != load[1]);
         let heating = &electrics.heating;
-        let gap = |g: usize, u: &[f64]| u.iter().enumerate().map(|(i, v)| electrics.gap_rows[(g, i)] * v).sum();
         let rise = |k: usize| {
             let end = heating.steady(k, to);
             (if from_rest { [0.0, end, 0.0] } else { heating.between(k, from, to) }, end)

@@ -12,11 +12,11 @@ use super::method::{Method, Motion, StepFailure, Work};
 use super::rodas4::Rodas4;
 use super::step_size;
 use crate::gaps::{Ramp, System};
-use crate::multibody::Model;
-use crate::multibody::forces::add_damping;
 use crate::multibody::planar::Pose;
+use crate::multibody::{BodyId, Model};
 use crate::solve::frequency::eigen::mass_product;
 use crate::solve::{SolveError, WhyFailed};
+use nalgebra::Matrix6;
 
 /// Share of the length scale below which a displacement's relative error does not count.
 pub(super) const FLOOR: f64 = 1e-4;
@@ -57,7 +57,7 @@ pub struct Adaptive<M = Rodas4> {
     error: Motion,
     carried_before: Vec<Motion>,
     mass: f64,
-    /// Translations that have drag and no mass: body, direction and drag [N·s/m].
+    /// Directions that have drag and no mass: body, direction and drag [N·s/m, N·m·s].
     dragged: Vec<(usize, usize, f64)>,
 }
 
@@ -260,19 +260,22 @@ fn not_finite(motion: &Motion) -> Option<(usize, usize)> {
     pairs.find_map(|(j, (q, v))| wrong(q).or_else(|| wrong(v)).map(|i| (j, i)))
 }
 
-/// Translations of bodies without mass that drag holds back, with the drag [N·s/m].
+/// Directions of bodies without mass that drag holds back, with the drag [N·s/m, N·m·s].
 pub(super) fn dragged(model: &Model) -> Vec<(usize, usize, f64)> {
     if model.bodies.iter().all(|body| body.mass > 0.0) {
         return Vec::new();
     }
-    let (n, mut found) = (model.bodies.len(), Vec::new());
-    for (j, _) in model.bodies.iter().enumerate().filter(|(_, body)| body.mass == 0.0) {
-        for i in 0..2 {
-            let (mut rate, mut force) = (vec![Pose::zeros(); n], vec![Pose::zeros(); n]);
-            rate[j][i] = 1.0;
-            add_damping(model, &rate, &mut force);
-            if force[j][i] > 0.0 {
-                found.push((j, i, force[j][i]));
+    let mut found = Vec::new();
+    for (j, body) in model.bodies.iter().enumerate().filter(|(_, body)| body.mass == 0.0) {
+        crate::budget::check();
+        let own = body.drag.matrix();
+        for i in (0..3).filter(|i| *i < 2 || body.inertia == 0.0) {
+            let at =
+                |id: BodyId, i: usize, matrix: &Matrix6<f64>| if id == BodyId::Free(j) { matrix[(i, i)] } else { 0.0 };
+            let dampers = model.dampers.iter().zip(&model.damper_matrix);
+            let drag = own[(i, i)] + dampers.map(|(d, m)| at(d.a, i, m) + at(d.b, i + 3, m)).sum::<f64>();
+            if drag > 0.0 {
+                found.push((j, i, drag));
             }
         }
     }
