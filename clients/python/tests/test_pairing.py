@@ -59,17 +59,17 @@ def test_an_interrupted_step_leaves_the_accepted_state(plate: bimorph.Model, mom
         expected = quiet.step({"drive": 2.0}, dt=1e-6)
     with plate.session(signals=["m.x"]) as session:
         session.operating_point({"drive": 1.0})
-        put = session._put
+        ask = session._line.ask
 
-        def interrupt(question: Any) -> None:
+        def interrupt(request: Any) -> Any:
             if moment == "after":
-                put(question)
+                ask(request)
             raise KeyboardInterrupt
 
-        session._put = interrupt  # type: ignore[method-assign]
+        session._line.ask = interrupt  # type: ignore[method-assign]
         with pytest.raises(KeyboardInterrupt):
             session.step({"drive": 2.0}, dt=1e-6)
-        session._put = put  # type: ignore[method-assign]
+        session._line.ask = ask  # type: ignore[method-assign]
         assert session.t == 0.0 and session.accepted is not None and session.accepted.t == 0.0
         assert session.step({"drive": 2.0}, dt=1e-6) == expected
 
