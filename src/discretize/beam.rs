@@ -7,7 +7,7 @@ use super::bar::shear_flexibility;
 pub use super::bar::{SHEAR_COEFFICIENT, bar};
 use super::junction_springs::End;
 use super::rigid::{Assembly, Lump};
-use super::scheme::{Bar, Cut};
+use super::scheme::{Bar, Cut, Pin};
 use crate::gaps::Point;
 use crate::multibody::{BodyName, Coupling, Joint};
 use crate::options::{CompileOptions, Junctions, Scheme};
@@ -71,6 +71,7 @@ pub fn lay(
     let calibrated = options.junctions == Junctions::Calibrated;
     // what is drawn expands, junctions included
     let whole = beam.length / bar.length;
+    let mut springs = Springs::default();
     for (k, (pin, between)) in cut.pins.iter().zip(bodies.windows(2)).enumerate() {
         let (a, b) = (between[0], between[1]);
         if a.body == b.body {
@@ -79,8 +80,8 @@ pub fn lay(
         out.joints.push(Joint {
             a: a.body,
             b: b.body,
-            frame: rigid.frame_at(a, b, place(pin.at), beam.angle),
-            stiffness: if calibrated { with_springs(beam, &bar, &cut, k, ends) } else { pin.stiffness },
+            frame: rigid.frame_at(a, b, place(pin.at), along),
+            stiffness: if calibrated { springs.with(beam, &bar, &cut, k, ends) } else { pin.stiffness },
             second: pin.second,
             expansion: heater.map(|group| (group, whole * pin.length)),
             rest: whole * pin.length * strain,
@@ -99,6 +100,29 @@ pub fn lay(
         .collect();
     (points[0], points[segments]) = (drawn[0], drawn[1]);
     points
+}
+
+/// The last joint away from the ends: those of one beam are mostly alike, and their stiffness is what it was.
+#[derive(Default)]
+struct Springs(Option<(Pin, Matrix3<f64>)>);
+
+impl Springs {
+    /// [`with_springs`] of joint `k`.
+    fn with(&mut self, beam: &Beam, bar: &Bar, cut: &Cut, k: usize, ends: &[End; 2]) -> Matrix3<f64> {
+        let pin = &cut.pins[k];
+        if k == 0 || k == cut.pins.len() - 1 {
+            return with_springs(beam, bar, cut, k, ends);
+        }
+        let alike = |last: &Pin| (last.stiffness, last.length, last.locked) == (pin.stiffness, pin.length, pin.locked);
+        match &self.0 {
+            Some((last, stiffness)) if alike(last) => *stiffness,
+            _ => {
+                let stiffness = with_springs(beam, bar, cut, k, ends);
+                self.0 = Some((*pin, stiffness));
+                stiffness
+            }
+        }
+    }
 }
 
 /// Stiffness of joint `k` of a cut beam with the shear compliance of its segment and the springs of the ends next to it.

@@ -11,8 +11,8 @@
 
 use super::rigid::Lump;
 use nalgebra::Vector2;
+use rustc_hash::FxHashMap;
 use std::cell::RefCell;
-use std::collections::HashMap;
 use std::f64::consts::PI;
 
 /// One beam at a junction.
@@ -45,7 +45,7 @@ const MOST_KNOWN: usize = 512;
 
 thread_local! {
     /// What is known of junctions: a drawing is laid out on many meshes, and has many junctions of one kind.
-    static KNOWN: RefCell<HashMap<Vec<[u64; 3]>, Lump>> = RefCell::default();
+    static KNOWN: RefCell<FxHashMap<Vec<[u64; 3]>, Lump>> = RefCell::default();
 }
 
 /// Area, by its weight, that the strips have in excess of their union, with its moments about the node: [m²], [m³], [m⁴].
@@ -85,6 +85,7 @@ fn integrated(strips: &[Strip]) -> Lump {
     // with one weight, what is drawn lies within what is filled
     let alike = strips.iter().all(|s| s.weight == 1.0);
     let mut excess = Lump::default();
+    let (mut cuts, mut covered) = (Vec::new(), Vec::new());
     for band in levels.windows(2) {
         let step = (band[1] - band[0]) / LINES as f64;
         if step <= 1e-9 * widest {
@@ -98,9 +99,11 @@ fn integrated(strips: &[Strip]) -> Lump {
                     add(&mut excess, y, low, high, step * strip.weight);
                 }
             }
-            let mut cuts = heaviest_first(if alike { &[] } else { strips }, &drawn, y);
-            cuts.extend(heaviest_first(strips, &filled, y));
-            for (low, high, weight) in united(&cuts) {
+            cuts.clear();
+            heaviest_first(if alike { &[] } else { strips }, &drawn, y, &mut cuts);
+            heaviest_first(strips, &filled, y, &mut cuts);
+            unite(&cuts, &mut covered);
+            for &(low, high, weight) in &covered {
                 add(&mut excess, y, low, high, -step * weight);
             }
         }
@@ -110,17 +113,18 @@ fn integrated(strips: &[Strip]) -> Lump {
     excess
 }
 
-/// Where a line at the height `y` runs in some strips, with their weights, the heaviest first.
-fn heaviest_first(strips: &[Strip], quads: &[Quad], y: f64) -> Vec<(f64, f64, f64)> {
+/// Adds where a line at the height `y` runs in some strips, with their weights, the heaviest first.
+fn heaviest_first(strips: &[Strip], quads: &[Quad], y: f64, cuts: &mut Vec<(f64, f64, f64)>) {
+    let before = cuts.len();
     let cut = |(strip, quad): (&Strip, &Quad)| quad.cut(y).map(|(low, high)| (low, high, strip.weight));
-    let mut cuts: Vec<_> = strips.iter().zip(quads).filter_map(cut).collect();
-    cuts.sort_by(|a, b| b.2.total_cmp(&a.2).then(a.0.total_cmp(&b.0)));
-    cuts
+    cuts.extend(strips.iter().zip(quads).filter_map(cut));
+    cuts[before..].sort_by(|a, b| b.2.total_cmp(&a.2).then(a.0.total_cmp(&b.0)));
 }
 
-/// The union of weighted intervals as intervals that do not overlap, in order, each with the weight of the first that covers it.
-fn united(cuts: &[(f64, f64, f64)]) -> Vec<(f64, f64, f64)> {
-    let mut covered: Vec<(f64, f64, f64)> = Vec::with_capacity(cuts.len());
+/// Puts the union of weighted intervals into `covered` as intervals that do not overlap, in order, each with the weight of the first
+/// that covers it.
+fn unite(cuts: &[(f64, f64, f64)], covered: &mut Vec<(f64, f64, f64)>) {
+    covered.clear();
     for &(mut low, high, weight) in cuts {
         let heavier = covered.len();
         for k in 0..heavier {
@@ -138,7 +142,6 @@ fn united(cuts: &[(f64, f64, f64)]) -> Vec<(f64, f64, f64)> {
         }
         covered.sort_by(|a, b| a.0.total_cmp(&b.0));
     }
-    covered
 }
 
 /// How far a strip reaches past the node.

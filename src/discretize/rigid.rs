@@ -156,16 +156,16 @@ impl Assembly {
     /// The frame of a joint half way between two nodes as drawn.
     pub fn frame(&self, a: usize, b: usize, angle: f64) -> JointFrame {
         let middle = (self.position[a] + self.position[b]) * 0.5;
-        self.frame_at(self.point(a), self.point(b), middle, angle)
+        self.frame_at(self.point(a), self.point(b), middle, Vector2::new(angle.cos(), angle.sin()))
     }
 
-    /// The frame of a joint at a drawn position.
-    pub fn frame_at(&self, a: Point, b: Point, position: Vector2<f64>, angle: f64) -> JointFrame {
+    /// The frame of a joint at a drawn position, whose x axis lies along `axis`.
+    pub fn frame_at(&self, a: Point, b: Point, position: Vector2<f64>, axis: Vector2<f64>) -> JointFrame {
         let arm = |p: Point| match p.body {
             BodyId::Ground => Vector2::zeros(),
             BodyId::Free(k) => position - self.bodies[k].reference,
         };
-        JointFrame { arm_a: arm(a), arm_b: arm(b), axis: Vector2::new(angle.cos(), angle.sin()) }
+        JointFrame { arm_a: arm(a), arm_b: arm(b), axis }
     }
 
     /// Supports that hold a translation but let the body turn: a joint to ground a million times stiffer than the stiffest beam
@@ -190,7 +190,7 @@ impl Assembly {
                     Point { body: BodyId::Ground, arm: Vector2::zeros() },
                     point,
                     self.position[support.node.0],
-                    support.angle,
+                    Vector2::new(support.angle.cos(), support.angle.sin()),
                 ),
                 stiffness: Matrix3::from_diagonal(&[at(support.held[0]), at(support.held[1]), 0.0].into()),
                 second: Matrix2::zeros(),

@@ -5,7 +5,8 @@
 use super::joint::{BodyId, Joint};
 use super::planar::{JointFrame, Symmetric};
 use nalgebra::{Matrix2, Matrix3, Vector2};
-use std::collections::HashMap;
+use rustc_hash::{FxBuildHasher, FxHashMap};
+use std::hash::BuildHasher;
 
 /// What the joints that are cut from one beam share.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -106,18 +107,26 @@ impl Place {
 }
 
 /// Sections that room is made for at first.
-const ROOM: usize = 128;
+const ROOM: usize = 64;
 
 /// Lays joints down with one section for all that are alike in everything but place and rest offset.
 pub(crate) struct Sections {
     pub(crate) all: Vec<Section>,
-    known: HashMap<[u64; 16], u32>,
+    /// The last section of each hash.
+    known: FxHashMap<u64, u32>,
+    /// For each section, the one before it with the same hash.
+    before: Vec<u32>,
 }
 
 impl Sections {
     /// For so many joints at most.
     pub(crate) fn new(joints: usize) -> Self {
-        Self { all: Vec::with_capacity(joints.min(ROOM)), known: HashMap::with_capacity(joints.min(ROOM)) }
+        let room = joints.min(ROOM);
+        Self {
+            all: Vec::with_capacity(room),
+            known: FxHashMap::with_capacity_and_hasher(room, FxBuildHasher),
+            before: Vec::with_capacity(room),
+        }
     }
 
     /// The joint as it is stored, between the bodies of `place`.
@@ -139,20 +148,35 @@ impl Sections {
     }
 
     fn find(&mut self, section: Section) -> u32 {
+        let bits = section.bits();
+        let last = self.known.entry(FxBuildHasher.hash_one(bits)).or_insert(NONE);
+        let mut at = *last;
+        while at != NONE {
+            if self.all[at as usize].bits() == bits {
+                return at;
+            }
+            at = self.before[at as usize];
+        }
+        self.before.push(std::mem::replace(last, self.all.len() as u32));
+        self.all.push(section);
+        (self.all.len() - 1) as u32
+    }
+}
+
+impl Section {
+    /// All of its numbers, bit by bit.
+    fn bits(&self) -> [u64; 16] {
         let mut key = [0; 16];
-        let numbers = section.axis.iter().chain(&section.stiffness.0).chain(&section.second);
+        let numbers = self.axis.iter().chain(&self.stiffness.0).chain(&self.second);
         for (key, number) in key.iter_mut().zip(numbers) {
             *key = number.to_bits();
         }
-        let (group, length) = section.expansion.unwrap_or((usize::MAX, 0.0));
+        let (group, length) = self.expansion.unwrap_or((usize::MAX, 0.0));
         (key[11], key[12]) = (group as u64, length.to_bits());
-        for (key, locked) in key[13..].iter_mut().zip(section.locked) {
+        for (key, locked) in key[13..].iter_mut().zip(self.locked) {
             *key = u64::from(locked);
         }
-        *self.known.entry(key).or_insert_with(|| {
-            self.all.push(section);
-            (self.all.len() - 1) as u32
-        })
+        key
     }
 }
 

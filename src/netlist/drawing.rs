@@ -3,7 +3,7 @@
 use super::source::Span;
 use crate::budget;
 use crate::structure::{Beam, Node, NodeId, Structure};
-use std::collections::HashSet;
+use rustc_hash::FxHashSet;
 
 /// Of a node without its name, about [byte].
 const NODE_BYTES: usize = 200;
@@ -112,8 +112,8 @@ pub(crate) struct Drawing {
     /// In order of appearance.
     pub(crate) facts: Vec<Noted>,
     /// Nodes at electrical ground, and names of ports, so far.
-    pub(crate) grounded: HashSet<NodeId>,
-    pub(crate) port_names: HashSet<String>,
+    pub(crate) grounded: FxHashSet<NodeId>,
+    pub(crate) port_names: FxHashSet<String>,
     /// Where each node was first named.
     pub(crate) first_named: Vec<Span>,
 }

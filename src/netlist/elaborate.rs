@@ -8,8 +8,9 @@ use super::sink::{Reported, Sink};
 use super::source::Span;
 use super::value::{LayerValues, Value, short};
 use crate::structure::NodeId;
+use rustc_hash::{FxHashMap, FxHashSet};
+use std::collections::BTreeMap;
 use std::collections::hash_map::Entry;
-use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::Arc;
 
 /// Blocks, conditions, loops and instances together may nest this deep while running: bounds the stack.
@@ -23,14 +24,14 @@ const MOST_ELEMENTS: usize = 300_000;
 pub(super) struct Frame {
     pub(super) values: Vec<Value>,
     /// Nodes by the name they have here.
-    pub(super) nodes: HashMap<Arc<str>, NodeId>,
+    pub(super) nodes: FxHashMap<Arc<str>, NodeId>,
     /// Names of the enclosing instances with a point after each.
     pub(super) prefix: String,
     pub(super) rotation: Rotation,
     /// What `parent` means here.
     pub(super) layer: Option<usize>,
     /// How often each anonymous line was run here.
-    pub(super) anonymous: HashMap<usize, usize>,
+    pub(super) anonymous: FxHashMap<usize, usize>,
 }
 
 /// Walks a program. See [`Elaborator::run`].
@@ -43,11 +44,11 @@ pub(crate) struct Elaborator<'p> {
     pub(super) drawing: Drawing,
     parameters: Vec<(String, Setting)>,
     /// Variables that were set from outside.
-    from_outside: HashSet<usize>,
+    from_outside: FxHashSet<usize>,
     /// Where each stands in `parameters`.
-    parameter_at: HashMap<&'p str, usize>,
+    parameter_at: FxHashMap<&'p str, usize>,
     /// Full names given so far, without the anonymous ones.
-    pub(super) names: HashSet<String>,
+    pub(super) names: FxHashSet<String>,
     /// Statements and expressions run so far.
     pub(super) steps: usize,
     pub(super) elements: usize,
@@ -68,11 +69,11 @@ impl<'p> Elaborator<'p> {
         values[PI_SLOT.index] = Value::Number(std::f64::consts::PI);
         let frame = Frame {
             values,
-            nodes: HashMap::new(),
+            nodes: FxHashMap::default(),
             prefix: String::new(),
             rotation: Rotation::IDENTITY,
             layer: None,
-            anonymous: HashMap::new(),
+            anonymous: FxHashMap::default(),
         };
         let mut elaborator = Self {
             program,
@@ -82,9 +83,9 @@ impl<'p> Elaborator<'p> {
             layers: vec![None; program.layers.len()],
             drawing: Drawing::default(),
             parameters: Vec::new(),
-            from_outside: HashSet::new(),
-            parameter_at: HashMap::new(),
-            names: HashSet::new(),
+            from_outside: FxHashSet::default(),
+            parameter_at: FxHashMap::default(),
+            names: FxHashSet::default(),
             steps: 0,
             elements: 0,
             depth: 0,
@@ -114,6 +115,15 @@ impl<'p> Elaborator<'p> {
 
     pub(super) fn here(&self) -> &Frame {
         &self.frames[self.frames.len() - 1]
+    }
+
+    /// The full name of what has this one in the frame at hand.
+    pub(super) fn full(&self, local: &str) -> String {
+        let prefix = &self.here().prefix;
+        let mut full = String::with_capacity(prefix.len() + local.len());
+        full.push_str(prefix);
+        full.push_str(local);
+        full
     }
 
     // ---- statements ----
@@ -287,7 +297,7 @@ impl<'p> Elaborator<'p> {
         if let Some(&id) = self.here().nodes.get(&local) {
             return Ok(id);
         }
-        let id = self.drawing.add_node(format!("{}{local}", self.here().prefix), name.span);
+        let id = self.drawing.add_node(self.full(&local), name.span);
         let at = self.frames.len() - 1;
         self.frames[at].nodes.insert(local, id);
         Ok(id)

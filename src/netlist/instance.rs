@@ -10,7 +10,7 @@ use super::source::Span;
 use super::value::{LayerValues, Value};
 use crate::budget;
 use crate::structure::NodeId;
-use std::collections::HashMap;
+use rustc_hash::{FxBuildHasher, FxHashMap};
 use std::sync::Arc;
 
 /// Subnet instances may nest this deep.
@@ -36,7 +36,7 @@ impl<'p> Elaborator<'p> {
         let local: Arc<str> = match &element.name {
             Some(name) => {
                 let local = self.name(name)?;
-                let full = format!("{}{local}", self.here().prefix);
+                let full = self.full(&local);
                 budget::lay_out(ELEMENT_BYTES + NAME_COPIES * full.len());
                 if let Some(full) = self.names.replace(full) {
                     let message = format!("there is an element `{full}` already");
@@ -121,7 +121,7 @@ impl<'p> Elaborator<'p> {
             None => {
                 let values = layer.map_or_else(|| Ok(Arc::new(Vec::new())), |layer| self.layer(layer))?;
                 let instance = Instance {
-                    name: format!("{}{local}", self.here().prefix),
+                    name: self.full(&local),
                     anonymous: element.name.is_none(),
                     model: &element.model.name,
                     span: element.model.span,
@@ -212,14 +212,15 @@ impl<'p> Elaborator<'p> {
         }
         elements::stray_actuals(model, given, subnet.formals.iter().map(|f| &*f.name.name), self.sink);
         let layer_values = layer.map_or_else(|| Ok(Arc::new(Vec::new())), |layer| self.layer(layer))?;
-        let prefix = format!("{}{}.", self.here().prefix, call.local);
+        let mut prefix = self.full(call.local);
+        prefix.push('.');
         let frame = Frame {
             values: vec![Value::Undefined; subnet.variables],
-            nodes: HashMap::with_capacity(2 * nodes.len()),
+            nodes: FxHashMap::with_capacity_and_hasher(2 * nodes.len(), FxBuildHasher),
             prefix,
             rotation: call.rotation,
             layer,
-            anonymous: HashMap::new(),
+            anonymous: FxHashMap::default(),
         };
         let instance = frame.prefix.trim_end_matches('.').to_owned();
         self.frames.push(frame);

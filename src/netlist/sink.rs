@@ -3,7 +3,8 @@
 use super::bundle::Bundle;
 use super::diagnostic::{Diagnostic, Diagnostics, Severity};
 use super::source::Span;
-use std::collections::{BTreeMap, HashSet};
+use rustc_hash::FxHashSet;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Marks that an error was already put into the [`Sink`]: nothing more needs to be said about it.
@@ -36,7 +37,7 @@ pub(crate) struct Sink {
     /// Names of the files in reading order; [`Span::file`] is an index here.
     pub(crate) files: Vec<String>,
     items: Vec<(Span, Severity, &'static str, String, String)>,
-    seen: HashSet<(Span, &'static str)>,
+    seen: FxHashSet<(Span, &'static str)>,
     errors: usize,
     /// Errors kept, and by code how many warnings came and how many messages were left out.
     kept_errors: usize,
@@ -51,7 +52,7 @@ impl Sink {
         Self {
             files: vec![root.to_owned()],
             items: Vec::new(),
-            seen: HashSet::new(),
+            seen: FxHashSet::default(),
             errors: 0,
             kept_errors: 0,
             warnings: BTreeMap::new(),

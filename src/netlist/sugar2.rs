@@ -11,7 +11,7 @@ use super::sink::Sink;
 use super::source::Span;
 use super::suggest::MOST_LISTED;
 use super::{parser, resolve, suggest};
-use std::collections::HashSet;
+use rustc_hash::FxHashSet;
 use std::sync::Arc;
 
 /// A SUGAR 2 netlist that has been parsed.
@@ -81,7 +81,7 @@ fn check_settings(program: &Program, set: &[(String, Setting)], sink: &mut Sink)
         .iter()
         .filter_map(|s| if let Statement::Param { name, .. } = s { Some(&*name.name) } else { None });
     let known: Vec<&str> = names.collect();
-    let sorted: HashSet<&str> = known.iter().copied().collect();
+    let sorted: FxHashSet<&str> = known.iter().copied().collect();
     for (name, _) in set {
         if sorted.contains(name.as_str()) {
             continue;

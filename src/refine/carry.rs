@@ -8,7 +8,7 @@ use crate::discretize::Discretized;
 use crate::gaps::Point;
 use crate::multibody::BodyId;
 use crate::multibody::planar::{self, Pose};
-use crate::structure::{Beam, Structure};
+use crate::structure::Structure;
 use nalgebra::Vector2;
 
 /// Displacement and rotation of a point.
@@ -32,11 +32,12 @@ pub fn carried(structure: &Structure, from: &Discretized, to: &Discretized, x: &
     for (beam, (from, to)) in structure.beams.iter().zip(from.beams.iter().zip(&to.beams)) {
         let (last, new) = (from.len() - 1, to.len() - 1);
         let h = beam.length / last as f64;
+        let along = Vector2::new(beam.angle.cos(), beam.angle.sin());
         for (k, point) in to.iter().enumerate() {
             let s = (k * last) as f64 / new as f64;
             let first = (s as usize).min(last - 1);
             let ends = [at(&from[first]), at(&from[first + 1])];
-            put(point, between(beam, h, ends, s - first as f64, linear));
+            put(point, between(along, h, ends, s - first as f64, linear));
         }
     }
     for (from, to) in from.nodes.iter().zip(&to.nodes) {
@@ -48,8 +49,7 @@ pub fn carried(structure: &Structure, from: &Discretized, to: &Discretized, x: &
 }
 
 /// The cubic between the ends of a segment, at its share `s`.
-fn between(beam: &Beam, h: f64, [a, b]: [Moved; 2], s: f64, linear: bool) -> Moved {
-    let along = Vector2::new(beam.angle.cos(), beam.angle.sin());
+fn between(along: Vector2<f64>, h: f64, [a, b]: [Moved; 2], s: f64, linear: bool) -> Moved {
     let slope = |turn: f64| {
         let (y, x) = if linear { (turn, 0.0) } else { (turn.sin(), turn.cos() - 1.0) };
         Vector2::new(along.x * x - along.y * y, along.y * x + along.x * y) * h

@@ -186,22 +186,31 @@ fn values(answer: &Answer, analysis: &SweepAnalysis) -> Result<Vec<Value>, Strin
 }
 
 fn static_values(result: &statics::StaticResult, outputs: &[String]) -> Result<Vec<Value>, String> {
-    let mut all = Vec::with_capacity(3 * result.nodes.len());
-    for (node, motion) in &result.nodes {
-        all.push(value(format!("{node}.x"), "m", Some(motion.x)));
-        all.push(value(format!("{node}.y"), "m", Some(motion.y)));
-        all.push(value(format!("{node}.rz"), "rad", Some(motion.rz)));
-    }
     if outputs.is_empty() {
+        let mut all = Vec::with_capacity(3 * result.nodes.len());
+        for (node, motion) in &result.nodes {
+            all.push(value(format!("{node}.x"), "m", Some(motion.x)));
+            all.push(value(format!("{node}.y"), "m", Some(motion.y)));
+            all.push(value(format!("{node}.rz"), "rad", Some(motion.rz)));
+        }
         return finite(all);
     }
-    all.extend(result.temperatures_k.iter().map(|(name, t)| value(format!("{name}.T"), "K", Some(*t))));
-    all.extend(result.currents_a.iter().map(|(name, i)| value(format!("{name}.i"), "A", Some(*i))));
-    all.extend(result.charges_c.iter().map(|(name, q)| value(format!("{name}.q"), "C", Some(*q))));
+    let of_part = |all: &[(String, f64)], part: &str| all.iter().find(|(name, _)| name == part).map(|(_, x)| *x);
     let pick = |name: &String| {
-        let found = all.iter().find(|v| v.name == *name);
+        let found = name.rsplit_once('.').and_then(|(part, quantity)| {
+            let motion = || result.nodes.iter().find(|(node, _)| node == part).map(|(_, motion)| motion);
+            Some(match quantity {
+                "x" => ("m", motion()?.x),
+                "y" => ("m", motion()?.y),
+                "rz" => ("rad", motion()?.rz),
+                "T" => ("K", of_part(&result.temperatures_k, part)?),
+                "i" => ("A", of_part(&result.currents_a, part)?),
+                "q" => ("C", of_part(&result.charges_c, part)?),
+                _ => return None,
+            })
+        });
         found
-            .map(|v| Value { name: v.name.clone(), unit: v.unit.clone(), value: v.value })
+            .map(|(unit, x)| value(name.clone(), unit, Some(x)))
             .ok_or_else(|| format!("no output named \"{name}\"; expected {OUTPUTS}"))
     };
     finite(outputs.iter().map(pick).collect::<Result<_, _>>()?)
