@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Coroutine
+import threading
+from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any
 
 import pytest
@@ -11,6 +12,8 @@ from conftest import PLATE
 
 import bimorph
 from bimorph import aio
+from bimorph.session import opened_just_now, resumed
+from bimorph.v1 import device_pb2
 
 NET = bimorph.Netlist.text(PLATE.replace("gap=2u", "gap=gap").replace("param V=0", "param gap=2u"))
 DT = 1e-7
@@ -78,8 +81,6 @@ def test_a_sweep_is_iterated_over(both: aio.Client, client: bimorph.Client) -> N
     run(test())
 
 
-
-
 def test_a_task_that_is_cancelled_stops_its_call(both: aio.Client) -> None:
     """A long run and a long static solution end on the other side as well: the server's places are free for what comes next."""
 
@@ -97,6 +98,160 @@ def test_a_task_that_is_cancelled_stops_its_call(both: aio.Client) -> None:
             assert all(isinstance(one, asyncio.CancelledError) for one in done)
         # each of those would have taken minutes
         assert (await model.static({"drive": 3.0})).nodes["m"].x > 0
+
+    run(test())
+
+
+def test_a_run_along_waveforms_stops(both: aio.Client) -> None:
+    """What is computed step by step ends with its task, which would have gone on for minutes, between two steps or in the middle of one; the
+    session of the test itself goes on from where it was."""
+
+    async def test() -> None:
+        model = await both.compile(NET)
+        async with await model.session(["m.x"]) as session:
+            await session.operating_point({"drive": 1.0})
+            for points in (10**6, 2):
+                before = set(threading.enumerate())
+                # a plate that is pulled in asks for short steps
+                wave = {"drive": ([0.0, 1e-6], [0.0, 12.0])}
+                task = asyncio.create_task(model.transient(10.0, ["m.x"], points=points, inputs=wave, estimate=False))
+                await asyncio.sleep(0.2)
+                ours = set(threading.enumerate()) - before
+                assert ours and not task.done()
+                step = asyncio.create_task(session.step({"drive": 12.0}, dt=10.0))
+                await asyncio.sleep(0.1)
+                assert not step.done()
+                for one in (task, step):
+                    one.cancel()
+                done = await asyncio.gather(task, step, return_exceptions=True)
+                assert all(isinstance(one, asyncio.CancelledError) for one in done)
+                await until(lambda: not any(thread.is_alive() for thread in ours))
+                assert session.t == 0.0 and session.sync.snapshot().voltages == {"drive": 1.0}
+
+    run(test())
+
+
+async def until(holds: Callable[[], bool]) -> None:
+    """Waits until something holds; the test has a bound."""
+    while not holds():
+        await asyncio.sleep(0.01)
+
+
+class Gate:
+    """What a call goes through on its way: it tells that somebody came, and waits to be opened."""
+
+    def __init__(self) -> None:
+        self.there, self.open = threading.Event(), threading.Event()
+        self.seen: list[Any] = []
+
+    def through(self, call: Callable[..., Any], *, after: bool) -> Callable[..., Any]:
+        """The call, with a wait before or after it."""
+
+        def gated(*args: Any, **kwargs: Any) -> Any:
+            result = call(*args, **kwargs) if after else None
+            self.seen = [result, *args]
+            self.there.set()
+            assert self.open.wait(30.0)
+            return result if after else call(*args, **kwargs)
+
+        return gated
+
+    async def cancel(self, awaited: Awaitable[Any]) -> None:
+        """Cancels a call that is at the gate, which it then goes through."""
+        task = asyncio.ensure_future(awaited)
+        await until(self.there.is_set)
+        task.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await task
+        self.open.set()
+
+
+def gone(channel: Any, session: str) -> Callable[[], bool]:
+    """Whether a server does not have a session any more."""
+
+    def look() -> bool:
+        try:
+            channel.call("KeepAlive", device_pb2.KeepAliveRequest(session=session))
+        except bimorph.NotFound:
+            return True
+        return False
+
+    return look
+
+
+@pytest.mark.parametrize("after", [False, True])
+@pytest.mark.parametrize("kept", [False, True])
+def test_a_session_that_nobody_waits_for_is_closed(
+    client: bimorph.Client, server: bimorph.Server, monkeypatch: pytest.MonkeyPatch, kept: bool, after: bool
+) -> None:
+    """Its task was cancelled before it was joined, or when it was already open."""
+
+    async def test() -> None:
+        model = await aio.Client(server.address).compile(NET)
+        gate = Gate()
+        name = "bimorph.model.opened_just_now" if kept else "bimorph.model.Session"
+        monkeypatch.setattr(name, gate.through(opened_just_now if kept else bimorph.Session, after=after))
+        opened = Gate()
+        opened.open.set()
+        # what was opened is seen as its id is read
+        ask = bimorph.Session._ask
+        monkeypatch.setattr(bimorph.Session, "_ask", opened.through(ask, after=True))
+        await gate.cancel(model.session(kept=kept))
+        await until(lambda: opened.seen != [] and opened.seen[0].HasField("opened"))
+        await until(gone(client._channel, opened.seen[0].opened.session))
+
+    run(test())
+
+
+def test_a_sweep_that_nobody_waits_for_is_cancelled(client: bimorph.Client, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its task was cancelled when the server had just started it: both of `submit` and `sweep`. One that was attached to goes on."""
+    gaps = {"gap": [1.5e-6 + 1e-8 * k for k in range(20)]}
+    kept = client.submit(NET, gaps, bimorph.PullIn(30.0, "drive"))
+
+    async def test() -> None:
+        there = aio.Client(client.address)
+        for ask in (there.submit, there.sweep):
+            gate = Gate()
+            monkeypatch.setattr("bimorph.client.Sweep", gate.through(bimorph.Sweep, after=True))
+            await gate.cancel(ask(NET, gaps, bimorph.PullIn(30.0, "drive")))
+            started = gate.seen[0]
+
+            def forgotten() -> bool:
+                try:
+                    started.status()
+                except bimorph.NotFound:
+                    return True
+                return False
+
+            await until(forgotten)
+        gate = Gate()
+        monkeypatch.setattr("bimorph.client.Sweep", gate.through(bimorph.Sweep, after=True))
+        await gate.cancel(there.attach(kept.id))
+
+    run(test())
+    assert len(kept.wait().rows) == 20
+    kept.cancel()
+
+
+def test_a_resume_that_nobody_waits_for_takes_nothing_away(server: bimorph.Server, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The kept session is there, from its ticket and from the object that was to be resumed."""
+
+    async def test() -> None:
+        there = aio.Client(server.address)
+        model = await there.compile(NET)
+        session = await model.session(["m.x"], kept=True)
+        first = await session.step({"drive": 1.0}, dt=DT)
+        ticket = session.sync.ticket()
+        for place in ("bimorph.client.resumed", "bimorph.session.resumed"):
+            gate = Gate()
+            with monkeypatch.context() as patch:
+                patch.setattr(place, gate.through(resumed, after=True))
+                await gate.cancel(there.resume(ticket) if "client" in place else session.resume())
+                await until(lambda: gate.seen[0]._line.over is not None)
+            session = await session.resume()
+            assert session.accepted == first
+        assert await session.step({"drive": 2.0}, dt=DT)
+        await session.close()
 
     run(test())
 

@@ -38,9 +38,10 @@ from .results import (
     TrialReply,
 )
 from .server import Server, serve
-from .session import Session, Snapshot, Ticket
+from .session import Session
 from .sweep import LogNormal, Modes, Normal, PullIn, Row, Samples, Static, Table, Transient, Uniform
 from .sweep_handle import Sweep, SweepStatus
+from .ticket import Snapshot, Ticket
 
 __all__ = [
     "BimorphError",

@@ -9,18 +9,20 @@
         reply = await session.step({"drive": 3.0}, dt=1e-7)
 
 Each call has a thread while it lasts, which serves a server and models in process alike. A task that is cancelled stops its call: what
-computes it ends, on the server too. A step is the exception: it is taken as a whole, and ``session.t`` tells whether it was.
+computes it ends, on the server too, and a session or a sweep that it was to give is closed. What a session computes at once (a piece of a
+step, an equilibrium) comes to its end; a step is taken as a whole or not at all, and ``session.t`` tells whether it was.
 """
 
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import contextvars
 import os
 import threading
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from types import TracebackType
-from typing import Any, Concatenate, ParamSpec, TypeVar
+from typing import Any, Concatenate, Generic, ParamSpec, TypeVar
 
 from . import client as _client
 from . import model as _model
@@ -35,6 +37,8 @@ P = ParamSpec("P")
 S = TypeVar("S")
 T = TypeVar("T")
 W = TypeVar("W")
+C = TypeVar("C", bound="contextlib.AbstractContextManager[Any]")
+B = TypeVar("B", bound="_Block[Any]")
 
 _AHEAD = 256
 """Most items that an iteration has ahead of who reads them."""
@@ -46,9 +50,14 @@ def _thread(run: Callable[[], object]) -> None:
     threading.Thread(target=context.run, args=(run,), daemon=True).start()
 
 
-async def _call(call: Callable[[], T]) -> T:
-    """Its result, from a thread; cancelled, it is stopped."""
+def _nothing(result: object) -> None:
+    """Of most results nothing is left elsewhere."""
+
+
+async def _call(call: Callable[[], T], drop: Callable[[T], object] = _nothing) -> T:
+    """Its result, from a thread; cancelled, it is stopped, and a result that comes all the same is dropped."""
     loop, done, stopping = asyncio.get_running_loop(), asyncio.get_running_loop().create_future(), Stopping()
+    lock, left, made = threading.Lock(), threading.Event(), list[T]()
 
     def settle(set: Callable[[Any], None], value: Any) -> None:
         if not done.done():
@@ -63,7 +72,14 @@ async def _call(call: Callable[[], T]) -> T:
     def run() -> None:
         current.set(stopping)
         try:
-            tell(done.set_result, call())
+            result = call()
+            with lock:
+                made.append(result)
+                late = left.is_set()
+            if late:
+                drop(result)
+            else:
+                tell(done.set_result, result)
         except BaseException as error:
             tell(done.set_exception, error)
 
@@ -73,6 +89,12 @@ async def _call(call: Callable[[], T]) -> T:
         return answer
     except asyncio.CancelledError:
         stopping.stop()
+        with lock:
+            left.set()
+            ready = bool(made)
+        if ready:
+            # it was on its way already; one that comes later is dropped where it comes
+            _thread(lambda: drop(made[0]))
         raise
 
 
@@ -127,22 +149,36 @@ def _awaited(method: Callable[Concatenate[S, P], T]) -> Callable[Concatenate[Any
     return call
 
 
-def _awaited_as(wrap: Callable[[T], W], method: Callable[Concatenate[S, P], T]) -> Callable[Concatenate[Any, P], Awaitable[W]]:
-    """The same, of what is wrapped in turn."""
+def _awaited_as(
+    wrap: Callable[[T], W], method: Callable[Concatenate[S, P], T], drop: Callable[[T], object] = _nothing
+) -> Callable[Concatenate[Any, P], Awaitable[W]]:
+    """The same, of what is wrapped in turn; ``drop`` ends one that comes when nobody waits for it any more."""
 
     async def call(self: Any, /, *args: P.args, **kwargs: P.kwargs) -> W:
-        return wrap(await _call(lambda: method(self.sync, *args, **kwargs)))
+        return wrap(await _call(lambda: method(self.sync, *args, **kwargs), drop))
 
     call.__doc__, call.__name__ = method.__doc__, method.__name__
     return call
 
 
-class Session:
-    """:class:`bimorph.Session` for asyncio."""
+class _Block(Generic[C]):
+    """What is used in an ``async with`` block, which ends as the block of what is wrapped does."""
 
-    def __init__(self, sync: _session.Session) -> None:
+    def __init__(self, sync: C) -> None:
         self.sync = sync
-        """What it wraps: ``t``, ``ports``, ``signals`` and the rest of what needs no waiting."""
+        """What it wraps, with the rest of what needs no waiting: ``t``, ``ports``, ``address``, …"""
+
+    async def __aenter__(self: B) -> B:
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        await _call(lambda: self.sync.__exit__(kind, error, trace))
+
+
+class Session(_Block[_session.Session]):
+    """:class:`bimorph.Session` for asyncio."""
 
     trial = _awaited(_session.Session.trial)
     accept = _awaited(_session.Session.accept)
@@ -165,19 +201,16 @@ class Session:
 
     async def fork(self) -> Session:
         """Another session that goes on from here by itself; close it as well."""
-        return Session(await _call(self.sync.fork))
+        return Session(await _call(self.sync.fork, _session.Session.close))
 
     async def resume(self) -> Session:
         """:meth:`bimorph.Session.resume`."""
-        return Session(await _call(self.sync.resume))
 
-    async def __aenter__(self) -> Session:
-        return self
+        def back(other: _session.Session) -> None:
+            other.leave()
+            self.sync._joined = True
 
-    async def __aexit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        await _call(self.sync.close)
+        return Session(await _call(self.sync.resume, back))
 
 
 class Model:
@@ -192,15 +225,15 @@ class Model:
     ac = _awaited(_model.Model.ac)
     pull_in = _awaited(_model.Model.pull_in)
     transient = _awaited(_model.Model.transient)
-    session = _awaited_as(Session, _model.Model.session)
-    restore = _awaited_as(Session, _model.Model.restore)
+    session = _awaited_as(Session, _model.Model.session, _session.Session.close)
+    restore = _awaited_as(Session, _model.Model.restore, _session.Session.close)
 
 
-class Sweep:
+class Sweep(_Block[_sweep_handle.Sweep]):
     """:class:`bimorph.Sweep` for asyncio: iterated over, it gives its rows, once it is done."""
 
     def __init__(self, sync: _sweep_handle.Sweep) -> None:
-        self.sync = sync
+        super().__init__(sync)
         self.id = sync.id
         """Its name on the server."""
 
@@ -216,38 +249,21 @@ class Sweep:
     def __aiter__(self) -> AsyncIterator[Row]:
         return _items(self.sync.rows)
 
-    async def __aenter__(self) -> Sweep:
-        return self
 
-    async def __aexit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        await _call(lambda: self.sync.__exit__(kind, error, trace))
-
-
-class Client:
+class Client(_Block[_client.Client]):
     """:class:`bimorph.Client` for asyncio, with the same arguments."""
 
     def __init__(self, address: str, timeout: float = 120.0, **access: str | os.PathLike[str] | None) -> None:
-        self.sync = _client.Client(address, timeout, **access)  # type: ignore[arg-type]
-        """What it wraps."""
+        super().__init__(_client.Client(address, timeout, **access))  # type: ignore[arg-type]
 
     version = _awaited(_client.Client.version)
     settings = _awaited(_client.Client.settings)
     convert = _awaited(_client.Client.convert)
     compile = _awaited_as(Model, _client.Client.compile)
     sweep = _awaited(_client.Client.sweep)
-    submit = _awaited_as(Sweep, _client.Client.submit)
+    submit = _awaited_as(Sweep, _client.Client.submit, lambda sweep: sweep.__exit__(None, None, None))
     attach = _awaited_as(Sweep, _client.Client.attach)
-    resume = _awaited_as(Session, _client.Client.resume)
-
-    async def __aenter__(self) -> Client:
-        return self
-
-    async def __aexit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.sync.close()
+    resume = _awaited_as(Session, _client.Client.resume, _session.Session.leave)
 
 
 def local() -> Client:

@@ -20,8 +20,10 @@ from .messages import diagnostic, options_to_wire
 from .model import Model
 from .netlist import Netlist
 from .options import Options
-from .session import Session, Ticket, resumed
+from .session import Session, resumed
+from .stopping import apart
 from .sweep_handle import Sweep
+from .ticket import Ticket
 from .v1 import model_pb2, sweep_pb2
 
 if TYPE_CHECKING:
@@ -180,7 +182,8 @@ class Client:
             request_id=uuid.uuid4().hex,
         )
         vary = tuple(samples.vary) if samples else ()
-        submitted = self._channel.persist(lambda heard: self._channel.call("SubmitSweep", request))
+        with apart():
+            submitted = self._channel.persist(lambda heard: self._channel.call("SubmitSweep", request))
         return Sweep(self._channel, submitted.sweep, vary)
 
     def attach(self, sweep: str) -> Sweep:

@@ -101,7 +101,7 @@ _BY_CODE: dict[grpc.StatusCode, type[BimorphError]] = {
 
 def from_rpc(error: grpc.RpcError, address: str) -> BimorphError:
     """The error that a failed call stands for."""
-    details = next((value for key, value in error.trailing_metadata() or () if key == "grpc-status-details-bin"), b"")
+    details = next((datum.value for datum in error.trailing_metadata() or () if datum.key == "grpc-status-details-bin"), b"")
     return _of_code(error.code(), error.details() or "", details, address)
 
 

@@ -12,7 +12,9 @@ from .channel import Channel
 from .errors import Diagnostic, InvalidRequest, NotFound, Unavailable
 from .messages import Voltages, by_name, diagnostic, estimate_of, named, setting_value
 from .results import FrequencyResponse, ModesResult, NodeMotion, PullInResult, Root, StaticResult, TransientResult
-from .session import Session, Snapshot, opened_just_now
+from .session import Session, opened_just_now
+from .stopping import apart
+from .ticket import Snapshot
 from .v1 import analysis_pb2, device_pb2, model_pb2
 from .waveforms import Waveform, drive, told
 
@@ -276,7 +278,8 @@ class Model:
             raise ValueError("noise_band says nothing without a seed")
         noise = None if seed is None else device_pb2.Agitation(seed=seed, band_hz=noise_band)
         if kept:
-            opened = self._call("Open", device_pb2.OpenRequest(model=self.id, ports=ports, signals=signals, noise=noise))
+            with apart():
+                opened = self._call("Open", device_pb2.OpenRequest(model=self.id, ports=ports, signals=signals, noise=noise))
             return opened_just_now(self._channel, self.id, timeout, opened.session)
         return Session(self._channel, self.id, tuple(ports), tuple(signals), timeout, noise=noise)
 
@@ -286,7 +289,8 @@ class Model:
         Raises :class:`NoResult` for a snapshot of another model or another version of the server.
         """
         request = device_pb2.RestoreRequest(model=self.id, snapshot=snapshot.states)
-        opened = self._call("Restore", request)
+        with apart():
+            opened = self._call("Restore", request)
         session = opened_just_now(self._channel, self.id, timeout, opened.session)
         session.accepted, session.t, session._voltages = snapshot.accepted, snapshot.t, dict(snapshot.voltages)
         return session

@@ -276,3 +276,5 @@ class TrialReply:
     """A static trial passed a fold: pulled in, or let go."""
     need_dt: float | None
     """Set when the step was too long: ask again with at most this [s]. Nothing else holds then."""
+    voltages: dict[str, float]
+    """What was given to each port [V, or the unit of its kind]."""

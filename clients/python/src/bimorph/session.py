@@ -7,49 +7,21 @@ import itertools
 import os
 import threading
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from types import TracebackType
 from typing import Any
 
 from .channel import Channel
 from .errors import BimorphError, InvalidRequest, NotFound, StepFailed, from_fault
 from .results import NodeMotion, TrialReply
+from .stopping import apart, check
+from .ticket import Snapshot, Ticket
 from .v1 import device_pb2
 
 _SHORTEST = 1e-9
 """A step that would have to be shorter than this fraction of what was asked for has failed."""
-
-
-@dataclass(frozen=True)
-class Snapshot:
-    """Where a session stands: from here :meth:`Model.restore` goes on with the same bits, also on another server."""
-
-    model: str
-    """Id of the model."""
-    states: bytes = field(repr=False)
-    """The server's bytes."""
-    accepted: TrialReply | None
-    """The accepted state."""
-    t: float
-    """Its time [s]."""
-    voltages: dict[str, float]
-    """Accepted port voltages [V]."""
-
-
-@dataclass(frozen=True)
-class Ticket:
-    """Where a kept session stands on its server: :meth:`Client.resume` goes on there, also when the server was started anew."""
-
-    model: str
-    """Id of the model."""
-    session: str
-    """Id of the session: who has it may use it."""
-    accepted: TrialReply | None
-    """The accepted state."""
-    t: float
-    """Its time [s]."""
-    voltages: dict[str, float]
-    """Accepted port voltages [V]."""
+_PIECES = 4
+"""After so many pieces of a step the server is told that the state before it is in use: of a large model it may hold no more than eight."""
 
 
 class Session:
@@ -58,7 +30,7 @@ class Session:
     A trial is a pure function of its parent state, its step and its voltages: trying leaves no trace, and the same trial
     gives the same bits. ``accept`` makes a state the parent of the next trials; ``step`` does both.
 
-    Threads may share a session: each call is one whole. A call that is interrupted (Ctrl-C, a time-out of a test runner)
+    Threads may share a session: each call is one whole. A call that fails or is interrupted (Ctrl-C, a time-out of a test runner)
     leaves the accepted state as it was, and the next call gets its own answer.
     """
 
@@ -97,8 +69,7 @@ class Session:
             opened = self._ask(first).opened
         except BaseException:
             # the session was there before this object: it stays, to be joined again
-            self._joined = False
-            self.close()
+            self.leave()
             raise
         self._session = opened.session
         self.ports: tuple[str, ...] = tuple(opened.device.ports)
@@ -129,30 +100,39 @@ class Session:
             return self._try(self._vector(voltages), dt, parent or self.accepted)
 
     def _try(self, vector: list[float], dt: float | None, parent: TrialReply | None) -> TrialReply:
+        check()
         if dt is None:
             mode, t = device_pb2.MODE_STATIC, self.t
         else:
             mode, t = device_pb2.MODE_TRANSIENT, (parent.t if parent else 0.0) + dt
         token = parent.token if parent else 0
         trial = device_pb2.TrialRequest(mode=mode, parent=token, t=t, dt=dt or 0.0, voltages=vector)
-        return self._named(self._ask(device_pb2.DeviceRequest(trial=trial)).trial, t)
+        return self._named(self._ask(device_pb2.DeviceRequest(trial=trial)).trial, t, vector)
 
     def accept(self, reply: TrialReply, voltages: Mapping[str, float] | None = None) -> None:
-        """Makes a trial's state the one that later trials start from. In a kept session it has outlived the server when this
-        returns, and if this raises, the state before is still accepted and the same trial gives the same state again."""
+        """Makes a trial's state the one that later trials start from, and its voltages, or those named here, what ports not named keep.
+        In a kept session it has outlived the server when this returns, and if this raises, the state before is still accepted and the
+        same trial gives the same state again."""
         if reply.need_dt is not None:
             raise ValueError("a reply that asks for a shorter step has no state to accept")
         with self._lock:
-            self._accept(reply, self._voltages if voltages is None else dict(zip(self.ports, self._vector(voltages))))
+            held = {**reply.voltages, **(voltages or {})}
+            self._accept(reply, dict(zip(self.ports, self._vector(held))))
 
     def _accept(self, reply: TrialReply, voltages: dict[str, float]) -> None:
         if self.kept:
             # There first, with an answer: the server keeps the state before as well.
-            self._ask(device_pb2.DeviceRequest(accept=device_pb2.Accept(token=reply.token, answer=True)))
+            self._tell_accepted(reply)
             self.accepted, self.t, self._voltages = reply, reply.t, voltages
             return
         # Here first: the server only frees memory, and an interrupted call must not leave half of this done.
         self.accepted, self.t, self._voltages = reply, reply.t, voltages
+        self._tell_accepted(reply)
+
+    def _tell_accepted(self, reply: TrialReply) -> None:
+        if self.kept:
+            self._ask(device_pb2.DeviceRequest(accept=device_pb2.Accept(token=reply.token, answer=True)))
+            return
         self._own()
         self._line.tell(device_pb2.DeviceRequest(accept=device_pb2.Accept(token=reply.token)))
 
@@ -160,31 +140,36 @@ class Session:
         """Static equilibrium at these port voltages [V], accepted, at t = 0."""
         with self._lock:
             reply = replace(self.trial(voltages), t=0.0)
-            self.accept(reply, voltages)
+            self.accept(reply)
             return reply
 
     def step(self, voltages: Mapping[str, float], dt: float) -> TrialReply:
-        """Goes ``dt`` [s] on, the voltages [V] going linearly to these, in as many steps as the device asks for."""
+        """Goes ``dt`` [s] on, the voltages [V] going linearly to these, in as many pieces as the device asks for. It is taken as a
+        whole or, where this raises, not at all."""
         with self._lock:
             return self._step(voltages, dt)
 
     def _step(self, voltages: Mapping[str, float], dt: float) -> TrialReply:
         start, end = [self._voltages[port] for port in self.ports], self._vector(voltages)
         done, h = 0.0, 1.0
+        parent, taken = self.accepted, 0
         while True:
             last = done + h >= 1.0
             h = 1.0 - done if last else h
             mix = end if last else [a + (b - a) * (done + h) for a, b in zip(start, end)]
-            reply = self._try(mix, h * dt, self.accepted)
+            reply = self._try(mix, h * dt, parent)
             if reply.need_dt is None:
-                self._accept(reply, dict(zip(self.ports, mix)))
                 if last:
+                    self._accept(reply, dict(reply.voltages))
                     return reply
-                done += h
+                parent, done, taken = reply, done + h, taken + 1
+                if taken % _PIECES == 0 and self.accepted is not None:
+                    self._tell_accepted(self.accepted)
                 continue
             h = min(reply.need_dt / dt, h / 2)
             if h < _SHORTEST:
-                raise StepFailed(f"the device asks for steps below {h * dt:.3g} s at t = {self.t:.6g} s")
+                at = parent.t if parent else 0.0
+                raise StepFailed(f"the device asks for steps below {h * dt:.3g} s at t = {at:.6g} s")
 
     def linearize(self, omega: float, reply: TrialReply | None = None) -> dict[str, dict[str, complex]]:
         """Port admittances [S] at angular frequency ``omega`` [rad/s] about a state, by default the accepted one."""
@@ -232,7 +217,8 @@ class Session:
     def fork(self) -> Session:
         """Another session that goes on from here by itself; close it as well."""
         with self._lock:
-            opened = self._channel.call("Fork", device_pb2.ForkRequest(session=self._session))
+            with apart():
+                opened = self._channel.call("Fork", device_pb2.ForkRequest(session=self._session))
             other = opened_just_now(self._channel, self._model, self._timeout, opened.session)
             other.accepted, other.t, other._voltages = self.accepted, self.t, dict(self._voltages)
             return other
@@ -251,9 +237,13 @@ class Session:
         with self._lock:
             ticket = self.ticket()
             other = resumed(self._channel, ticket, self._timeout)
-            self._joined = False
-            self.close()
+            self.leave()
             return other
+
+    def leave(self) -> None:
+        """Ends the stream alone: a kept session stays on its server, to be resumed with a :meth:`ticket` taken before."""
+        self._joined = False
+        self.close()
 
     def close(self) -> None:
         """Ends the stream; the server forgets the states. Later calls raise."""
@@ -261,7 +251,7 @@ class Session:
             self._line.close(BimorphError("the session is closed; open another one"))
             if self._joined:
                 self._joined = False
-                with contextlib.suppress(BimorphError):
+                with contextlib.suppress(BimorphError), apart():
                     self._channel.call("Close", device_pb2.CloseRequest(session=self._session))
 
     def __enter__(self) -> Session:
@@ -278,7 +268,7 @@ class Session:
             raise InvalidRequest(f"no port named {unknown[0]!r}; the session has {list(self.ports)}")
         return [float(voltages.get(port, self._voltages[port])) for port in self.ports]
 
-    def _named(self, wire: Any, t: float) -> TrialReply:
+    def _named(self, wire: Any, t: float, vector: list[float]) -> TrialReply:
         if wire.status == device_pb2.TrialReply.STATUS_FAIL:
             raise StepFailed(wire.reason)
         need = wire.need_dt if wire.status == device_pb2.TrialReply.STATUS_NEED_DT else None
@@ -295,6 +285,7 @@ class Session:
             dt_next=wire.dt_next,
             jumped=wire.jumped,
             need_dt=need,
+            voltages=dict(zip(self.ports, vector)),
         )
 
     def _own(self) -> None:
@@ -319,7 +310,7 @@ def opened_just_now(channel: Channel, model: str, timeout: float, session: str) 
     try:
         return Session(channel, model, (), (), timeout, session)
     except BaseException:
-        with contextlib.suppress(BimorphError):
+        with contextlib.suppress(BimorphError), apart():
             channel.call("Close", device_pb2.CloseRequest(session=session))
         raise
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -9,6 +10,7 @@ from types import TracebackType
 
 from .channel import Channel
 from .errors import BimorphError, Unavailable
+from .stopping import apart
 from .sweep import Row, Table
 from .v1 import sweep_pb2
 
@@ -128,10 +130,8 @@ class Sweep:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        try:
+        with contextlib.suppress(BimorphError), apart():
             self.cancel()
-        except BimorphError:
-            pass
 
     def watch(self) -> Iterator[SweepStatus]:
         """How far it has come, until it ends."""
