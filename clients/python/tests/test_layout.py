@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import subprocess
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -133,6 +134,29 @@ def test_a_gdsfactory_component_becomes_subnets(client: bimorph.Client) -> None:
     lines = {line.split()[0]: line for line in text.splitlines() if line.startswith(("drive ", "pad "))}
     node = lines["drive"].split("[")[1].split("]")[0].split()[1]
     assert "fingers=12.0" in lines["drive"] and f"[{node}]" in lines["pad"]
+
+
+def test_two_nodes_never_have_one_name() -> None:
+    """Ports of the whole that a netlist would call alike are refused, both named; a node that nobody named makes way for one that somebody
+    did, and for one that came first."""
+    net: dict[str, Any] = {
+        "instances": {"a": {"component": "comb_drive"}, "b": {"component": "comb_drive"}},
+        "placements": {"b": {"x": 5000.0, "y": 0.0}},
+        "ports": {"o-1": "a,a", "o_1": "b,a"},
+    }
+    with pytest.raises(ValueError, match="'o-1' and 'o_1' are both called 'o_1'"):
+        layout.from_gdsfactory(net)
+
+    def nodes(**changed: Any) -> list[str]:
+        text = layout.from_gdsfactory({**net, **changed}).netlist().files["mechanism.net"]
+        assert "x=0.005 y=0.0" in text
+        return [node for line in text.splitlines() if " comb_drive p1 " in line for node in line.split("[")[1].split("]")[0].split()]
+
+    # the free node b of instance a is not the port of that name
+    assert nodes(ports={"a_b": "b,a"}) == ["a_a", "a_b_2", "a_b", "b_b"]
+    free = {"a": {"component": "comb_drive"}, "a_a": {"component": "plain_beam"}}
+    assert nodes(ports={}, instances=free, placements={"a_a": {"x": 5000.0}}) == ["a_a", "a_b"]
+    assert len(set(nodes(ports={}))) == 4
 
 
 def test_layouts_go_through_the_server(program: str, client: bimorph.Client, tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ placements around it; see :func:`bimorph.layout.from_gdsfactory`.
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
 from collections.abc import Iterator, Mapping
@@ -56,6 +57,8 @@ class _Nodes:
     def __init__(self) -> None:
         self._parent: dict[str, str] = {}
         self._names: dict[str, str] = {}
+        self._roots: dict[str, str] = {}
+        """By name in the netlist."""
 
     def root(self, port: str) -> str:
         while self._parent.setdefault(port, port) != port:
@@ -67,11 +70,22 @@ class _Nodes:
         self._parent[b] = a
 
     def call(self, port: str, name: str) -> None:
-        self._names.setdefault(self.root(port), name)
+        """Names a node by a port of the whole; all are joined and named before any name is asked for."""
+        root, word = self.root(port), _word(name)
+        if root in self._names:
+            return
+        other = self._roots.setdefault(word, root)
+        if other != root:
+            raise ValueError(f"ports {self._names[other]!r} and {name!r} are both called {word!r} in a netlist: rename one")
+        self._names[root] = name
 
     def name(self, port: str) -> str:
         root = self.root(port)
-        return _word(self._names.get(root, root.replace(",", "_")))
+        if root in self._names:
+            return _word(self._names[root])
+        plain = _word(root.replace(",", "_"))
+        words = itertools.chain([plain], (f"{plain}_{k}" for k in itertools.count(2)))
+        return next(word for word in words if self._roots.setdefault(word, root) == root)
 
 
 def mechanism(component: Any, kinds: Mapping[str, Kind], process: str) -> Mechanism:
