@@ -17,6 +17,7 @@ from conftest import PLATE
 
 import bimorph
 from bimorph import ngspice as spice
+from bimorph.waveforms import drive
 
 EPS, AREA, GAP, K = 8.854e-12, 1e-8, 2e-6, 1.0
 
@@ -64,6 +65,28 @@ def test_waveforms_are_checked(plate: bimorph.Model) -> None:
             plate.transient(1e-5, ["m.x"], inputs={"drive": wave})
     with pytest.raises(bimorph.InvalidRequest, match="no port named 'drove'"):
         plate.transient(1e-5, ["m.x"], inputs={"drove": ([0.0], [1.0])})
+    with pytest.raises(ValueError, match="finite stop"):
+        plate.transient(float("inf"), ["m.x"], inputs={"drive": ([0.0], [1.0])})
+
+
+def test_an_edge_is_an_edge(plate: bimorph.Model) -> None:
+    """However short it may be, and wherever it lies: after one of 2e-12 of the run the plate swings as after one of 1e-6 of it, whose corner
+    is an output time or within rounding of one, also beside another port's edge. A shorter one is refused, with how long it must be."""
+    stop = 1e-4
+
+    def after(at: float, edge: float) -> list[float]:
+        waves = {"drive": ([0.0, at, at + edge], [0.0, 0.0, 3.0]), "m.x": ([at - 0.7 * edge, at + 0.3 * edge], [0.0, 1e-8])}
+        with plate.session(["m.x"], ports=["drive", "m.x"]) as session:
+            return drive(session, waves, stop, 6).signals["m.x"].tolist()
+
+    for at in (0.4e-4, 0.4e-4 * (1 - 3e-16), 0.4e-4 - 1e-16, 0.43e-4):
+        slow = after(at, 1e-6 * stop)
+        assert max(slow) > 1e-8
+        # the speed of the plate is that of its resonance, 16 kHz: in a millionth of the run it goes 1e-5 of its way
+        assert after(at, 2e-12 * stop) == pytest.approx(slow, rel=1e-3, abs=1e-4 * max(slow))
+    for times in ([0.4e-4, 0.4e-4 + 5e-17], [-1e-20, 1e-20]):
+        with pytest.raises(ValueError, match="'drive': an edge of .* must last at least 1e-16 s"):
+            plate.transient(stop, ["m.x"], inputs={"drive": (times, [0.0, 3.0])})
 
 
 def test_results_as_tables(plate: bimorph.Model) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
@@ -15,7 +16,10 @@ Waveform = tuple[ArrayLike, ArrayLike]
 """Times [s], ascending, and what is given to the port at them [V, or the unit of its kind]: straight lines between, constant before
 and after."""
 
-
+_SAME = 1e-14
+"""Share of a run below which two times are one."""
+_EDGE = 1e-12
+"""Share of a run that an edge must last: well above :data:`_SAME`, so that no corner of it is taken for another."""
 _STILL = 1e-6
 """Share of a signal's size below which its changes are rounding."""
 
@@ -51,9 +55,11 @@ def drive(
     It begins in the static equilibrium of the inputs at 0. Steps end at every corner of a waveform; within one the device controls
     its own.
     """
-    if not (stop > 0.0 and points >= 2):
-        raise ValueError(f"expected stop > 0 and at least 2 points, got {stop:g} s and {points}")
+    if not (0.0 < stop < math.inf and points >= 2):
+        raise ValueError(f"expected a finite stop > 0 and at least 2 points, got {stop:g} s and {points}")
     waves = checked(inputs)
+    for port, (t, _) in waves.items():
+        _long_enough(port, t, stop)
     output = np.linspace(0.0, stop, points)
     corners = [t[(t > 0.0) & (t < stop)] for t, _ in waves.values()]
     times = _apart(np.concatenate([output, *corners]), stop)
@@ -61,13 +67,13 @@ def drive(
     def at(t: float) -> dict[str, float]:
         return {port: float(np.interp(t, *wave)) for port, wave in waves.items()}
 
-    reply = session.operating_point(at(0.0))
+    reply = session.operating_point(at(times[0]))
     columns: dict[str, list[float]] = {name: [reply.outputs[name]] for name in session.signals}
-    wanted, now = 1, 0.0
+    wanted, now = 1, float(times[0])
     for t in times[1:]:
         reply = session.step(at(t), dt=float(t - now))
         now = float(t)
-        if wanted < points and abs(output[wanted] - t) <= 1e-12 * stop:
+        if wanted < points and output[wanted] <= t:
             for name, column in columns.items():
                 column.append(reply.outputs[name])
             wanted += 1
@@ -100,9 +106,18 @@ def told(found: TransientResult, finer: TransientResult | None, tol: float) -> T
     return replace(found, estimated_error=error, warnings=warnings)
 
 
+def _long_enough(port: str, times: NDArray[np.float64], stop: float) -> None:
+    """Raises :class:`ValueError` for an edge within the run that is too short to be told from a corner."""
+    for start, end in zip(times, times[1:]):
+        if end > 0.0 and start < stop and end - start < _EDGE * stop:
+            raise ValueError(
+                f"input {port!r}: an edge of {end - start:.3g} s at {start:g} s; in a run of {stop:g} s it must last at least {_EDGE * stop:g} s"
+            )
+
+
 def _apart(times: NDArray[np.float64], stop: float) -> NDArray[np.float64]:
-    """Ascending times; those closer than rounding to one before are that one."""
+    """Ascending times; those closer than rounding to the next one are that one."""
     ordered = np.sort(times)
-    keep: NDArray[np.bool_] = np.concatenate([[True], np.diff(ordered) > 1e-12 * stop])
+    keep: NDArray[np.bool_] = np.concatenate([np.diff(ordered) > _SAME * stop, [True]])
     return np.asarray(ordered[keep], dtype=float)
 
