@@ -15,7 +15,7 @@ import pytest
 from conftest import PLATE
 
 import bimorph
-from bimorph import channel
+from bimorph import channel, executors
 
 LONG = 60.0
 """Far longer than anything here takes, on a loaded machine too [s]."""
@@ -160,6 +160,42 @@ def test_clients_of_a_process_share_a_connection(client: bimorph.Client) -> None
     assert {c.version() for c in clients} == {client.version()}
     assert [a for a, _ in channel._connections if a == client.address] == [client.address]
     assert len({id(c._channel.stub) for c in clients}) == 1
+
+
+THREADS = """
+import sys
+from concurrent.futures import ThreadPoolExecutor
+import bimorph
+with ThreadPoolExecutor(int(sys.argv[1])) as pool:
+    netlist = bimorph.Netlist.text(sys.argv[2])
+    table = bimorph.sweep_on(pool, netlist, {"k": [1.0 + 0.01 * i for i in range(64)]}, bimorph.Modes(count=1), shards=8, retries=0)
+print(table)
+"""
+
+
+@pytest.mark.parametrize("threads", [1, 4])
+def test_threads_share_the_server_of_their_process(program: str, monkeypatch: pytest.MonkeyPatch, threads: int) -> None:
+    """A sweep over a pool of threads needs no second attempt, and the process ends as others do, its server with it."""
+    monkeypatch.setenv("BIMORPH_BIN", program)
+    words = [sys.executable, "-c", THREADS, str(threads), PLATE]
+    ended = subprocess.run(words, capture_output=True, text=True, timeout=LONG)
+    assert (ended.returncode, ended.stdout) == (0, "<Table of f1 over k: 64 points>\n"), ended.stderr
+
+
+def test_a_forked_child_has_a_server_of_its_own(program: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Forked where the parent's was in use: the parent's goes on, and that of the child is another one."""
+    monkeypatch.setenv("BIMORPH_BIN", program)
+    parent = executors._own()
+    end, child_end = multiprocessing.Pipe()
+    child = multiprocessing.get_context("fork").Process(target=lambda: child_end.send(executors._own().address))
+    child.start()
+    assert end.poll(LONG) and end.recv() != parent.address
+    child.join(LONG)
+    assert child.exitcode == 0
+    assert executors._own() is parent and parent.client().version()
+    parent.process.kill()
+    parent.process.wait()
+    assert executors._own().client().version()
 
 
 def test_typos_in_sweeps_raise(client: bimorph.Client) -> None:

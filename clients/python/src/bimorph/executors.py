@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import os
+import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -88,17 +90,30 @@ def sweep_on(
 def together(tables: Sequence[Table]) -> Table:
     """The shards of one sweep as the table of the whole.
 
+    A netlist whose nodes depend on a parameter has results in one shard that another has not: columns stand in the order in which rows
+    have them first, as in a sweep in one run.
+
     Raises :class:`BimorphError` for shards of different sweeps, or a point that is there twice.
     """
-    rows = sorted((row for table in tables for row in table.rows), key=lambda row: row.point)
-    first = max(tables, key=lambda table: len(table.results))
+    units: dict[str, str] = {}
     for table in tables:
-        if table.parameters != first.parameters or (table.results and table.results != first.results):
+        first = tables[0]
+        if table.parameters != first.parameters or any(units.get(name, unit) != unit for name, unit in table.units.items()):
             raise BimorphError(f"not the shards of one sweep: {table!r} beside {first!r}")
+        units |= table.units
+    pairs = sorted(((row, table) for table in tables for row in table.rows), key=lambda pair: pair[0].point)
+    rows = [row for row, _ in pairs]
     twice = [row.point for row, after in zip(rows, rows[1:]) if row.point == after.point]
     if twice:
         raise BimorphError(f"point {twice[0]} is in two shards")
-    return Table(first.parameters, first.results, first.units, rows)
+    # what stands before the last result of a row in its table is of this row too, or of one that came before
+    ordered: dict[str, None] = {}
+    for row, table in pairs:
+        last = max((k for k, name in enumerate(table.results) if name in row.results), default=-1)
+        ordered |= dict.fromkeys(table.results[: last + 1])
+    for table in tables:
+        ordered |= dict.fromkeys(table.results)
+    return Table(tables[0].parameters, list(ordered), {name: units[name] for name in ordered}, rows)
 
 
 def part(
@@ -116,15 +131,36 @@ def part(
         return client.sweep(netlist, parameters, analysis, set=set, samples=samples, shard=shard, **options)
 
 
-_servers: dict[int, tuple[Server, contextlib.ExitStack]] = {}
+_lock = threading.Lock()
+_stack = contextlib.ExitStack()
+"""Ends the server of this process."""
+_server: Server | None = None
+_inherited: list[contextlib.ExitStack] = []
 
 
 def _own() -> Server:
-    """The server of this process, started when it is first asked for, and again when it died."""
-    known = _servers.get(os.getpid())
-    if known is not None and known[0].process.poll() is None:
-        return known[0]
-    stack = contextlib.ExitStack()
-    server = stack.enter_context(serve())
-    _servers[os.getpid()] = (server, stack)
-    return server
+    """The server of this process, started when it is first asked for, and again when it died. It ends with the process, while its
+    threads still run."""
+    global _server
+    with _lock:
+        if _server is None or _server.process.poll() is not None:
+            _stack.close()
+            _server = _stack.enter_context(serve())
+        return _server
+
+
+@atexit.register
+def _end() -> None:
+    with _lock:
+        _stack.close()
+
+
+def _forked() -> None:
+    """In a child: the server of the parent is neither used nor ended."""
+    global _lock, _stack, _server
+    _inherited.append(_stack)
+    _lock, _stack, _server = threading.Lock(), contextlib.ExitStack(), None
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_forked)

@@ -162,17 +162,36 @@ class Table:
     rows: list[Row]
 
     def column(self, name: str) -> list[float | str | None]:
-        """One column; None where a point has no such value. Raises :class:`KeyError` for a name that is no column."""
-        if name not in self.parameters and name not in self.results:
+        """One column; None where a point has no such value. A result may be named with its unit, ``f1 [Hz]``, as it must be where a
+        parameter has its name. Raises :class:`KeyError` for a name that is no column, or two."""
+        headings = {self._heading(result): result for result in self.results}
+        if name in headings:
+            return [row.results.get(headings[name]) for row in self.rows]
+        if name in self.parameters and name in self.results:
+            raise KeyError(f"{name!r} is a parameter and a result: the result is {self._heading(name)!r}, the parameter is in `rows`")
+        if name in self.parameters:
+            return [row.parameters[name] for row in self.rows]
+        if name not in self.results:
             raise KeyError(f"no column {name!r}; there are {', '.join([*self.parameters, *self.results])}")
-        return [row.parameters.get(name, row.results.get(name)) for row in self.rows]
+        return [row.results.get(name) for row in self.rows]
+
+    def _heading(self, result: str) -> str:
+        return f"{result} [{self.units[result]}]"
 
     def to_pandas(self) -> pandas.DataFrame:
         """A column for each parameter and each result (NaN where a point has none), by number of the point; with ``estimated_error``,
-        ``warning`` and ``error``."""
+        ``warning`` and ``error``. A result that has the name of a parameter is called with its unit, ``f1 [Hz]``.
+
+        Raises :class:`ValueError` for a parameter with one of the three names."""
+        last = ("estimated_error", "warning", "error")
+        taken = [name for name in self.parameters if name in last]
+        if taken:
+            raise ValueError(f"parameter {taken[0]!r} has the name of another column: rename it, or read `rows`")
         columns: dict[str, list[Any]] = {name: [row.parameters[name] for row in self.rows] for name in self.parameters}
-        columns |= {name: [row.results.get(name, math.nan) for row in self.rows] for name in self.results}
-        columns |= {name: [getattr(row, name) for row in self.rows] for name in ("estimated_error", "warning", "error")}
+        for name in self.results:
+            called = self._heading(name) if name in self.parameters else name
+            columns[called] = [row.results.get(name, math.nan) for row in self.rows]
+        columns |= {name: [getattr(row, name) for row in self.rows] for name in last}
         return showing.frame(columns, ("point", [row.point for row in self.rows]))
 
     def __repr__(self) -> str:
@@ -181,7 +200,7 @@ class Table:
         return f"<Table of {', '.join(self.results)} over {', '.join(self.parameters) or 'nothing'}: {points}>"
 
     def _repr_html_(self) -> str:
-        head = ["point", *self.parameters, *(f"{name} [{self.units[name]}]" for name in self.results), ""]
+        head = ["point", *self.parameters, *map(self._heading, self.results), ""]
         rows = (
             [row.point, *row.parameters.values(), *(row.results.get(name) for name in self.results), row.error or row.warning]
             for row in self.rows
@@ -192,8 +211,7 @@ class Table:
         """CSV with the columns of ``bimorph sweep``: point, parameters, results with units, estimate, warning, error."""
         out = io.StringIO()
         writer = csv.writer(out, lineterminator="\n")
-        results = (f"{name} [{self.units[name]}]" for name in self.results)
-        writer.writerow(["point", *self.parameters, *results, "estimated_error [1]", "warning", "error"])
+        writer.writerow(["point", *self.parameters, *map(self._heading, self.results), "estimated_error [1]", "warning", "error"])
         for row in self.rows:
             values = [row.results.get(name, "") for name in self.results]
             estimate = "" if row.estimated_error is None else row.estimated_error

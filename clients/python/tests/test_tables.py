@@ -1,0 +1,61 @@
+"""Tables of sweeps: shards put together, and what columns are called."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import pytest
+
+import bimorph
+from bimorph.executors import together
+
+CHAIN = """param n=1
+process p = [Youngsmodulus=165e9 density=2300 h=2u]
+anchor p [a(0)] [l=5u w=5u]
+for k=1:n
+[
+  beam2d p [a(k-1) a(k)] [l=50u w=2u]
+]
+"""
+"""A chain of beams whose nodes depend on ``n``."""
+
+
+def test_shards_with_other_columns(client: bimorph.Client) -> None:
+    """Where the nodes depend on a parameter, the shards put together are the sweep in one run, whatever columns each of them has."""
+    netlist = bimorph.Netlist.text(CHAIN)
+    for lengths in ([1.0, 2.0, 3.0, 4.0, 5.0], [3.0, 1.0, 5.0, 2.0, 4.0]):
+        whole = client.sweep(netlist, {"n": lengths}, bimorph.Static())
+        parts = [client.sweep(netlist, {"n": lengths}, bimorph.Static(), shard=(i, 3)) for i in range(3)]
+        assert len({tuple(part.results) for part in parts}) > 1
+        assert together(parts) == together(parts[::-1]) == whole
+
+
+def test_tables_of_different_sweeps_are_refused(client: bimorph.Client) -> None:
+    """Other parameters, another unit of one column, and a point that is there twice."""
+    netlist = bimorph.Netlist.text(CHAIN)
+    part, other = (client.sweep(netlist, {"n": [1.0, 2.0]}, bimorph.Static(), shard=(i, 2)) for i in range(2))
+    for wrong in (
+        dataclasses.replace(other, parameters=["m"]),
+        dataclasses.replace(other, units={**other.units, part.results[0]: "rad" if part.units[part.results[0]] != "rad" else "m"}),
+    ):
+        with pytest.raises(bimorph.BimorphError, match="not the shards of one sweep"):
+            together([part, wrong])
+    with pytest.raises(bimorph.BimorphError, match="point 0 is in two shards"):
+        together([part, other, part])
+
+
+def test_a_parameter_with_the_name_of_a_result(client: bimorph.Client) -> None:
+    """Neither hides the other: the result is called with its unit, as in CSV. A parameter that no table could show is told."""
+    netlist = bimorph.Netlist.text(CHAIN.replace("w=2u", "w=f1").replace("param n=1", "param n=1\nparam f1=2u"))
+    widths = [1e-6, 2e-6]
+    table = client.sweep(netlist, {"f1": widths}, bimorph.Modes(count=1))
+    found = [row.results["f1"] for row in table.rows]
+    assert found == pytest.approx([found[0], 2 * found[0]], rel=1e-3), "a cantilever's frequency goes with its width"
+    assert table.column("f1 [Hz]") == found
+    with pytest.raises(KeyError, match="'f1 \\[Hz\\]'"):
+        table.column("f1")
+    frame = table.to_pandas() if pytest.importorskip("pandas") else None
+    assert frame is not None and list(frame["f1"]) == widths and list(frame["f1 [Hz]"]) == found
+    hidden = dataclasses.replace(table, parameters=["error"])
+    with pytest.raises(ValueError, match="'error'"):
+        hidden.to_pandas()
