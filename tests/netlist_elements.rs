@@ -282,7 +282,7 @@ fn beam2de() {
     same(one(""), 20.0 * 100.0 / 4.0);
 }
 
-/// An electro-thermal beam: resistance, end-to-end conductance, and the time constant of the slowest thermal mode.
+/// An electro-thermal beam: resistance, end-to-end conductance, and the heat capacity that delays it, unless `tau` is given.
 #[test]
 fn beam2det() {
     let one = |extra: &str| {
@@ -295,11 +295,13 @@ fn beam2det() {
     let plain = one("");
     same(plain.resistance, 500.0);
     same(plain.conductance, 30.0 * 4e-6 * 2e-6 / 100e-6);
-    assert_eq!(plain.time_constant, 0.0);
+    assert_eq!((plain.time_constant, plain.capacity), (0.0, 0.0));
     let slow = one("specificheat=700 R=50");
     same(slow.resistance, 50.0);
-    same(slow.time_constant, 2000.0 * 700.0 * 1e-8 / (std::f64::consts::PI.powi(2) * 30.0));
-    assert_eq!(one("tau=1m specificheat=700").time_constant, 1e-3);
+    same(slow.capacity, 2000.0 * 700.0 * 100e-6 * 4e-6 * 2e-6);
+    assert_eq!(slow.time_constant, 0.0);
+    let given = one("tau=1m specificheat=700");
+    assert_eq!((given.time_constant, given.capacity), (1e-3, 0.0));
 }
 
 /// comb2d: constant force, b at 2L − l; comb2de: finite overlap between electrical nodes.

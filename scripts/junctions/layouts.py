@@ -1,4 +1,4 @@
-"""Five layouts, each drawn once: as a netlist, and as quadrilaterals with eight nodes for CalculiX.
+"""Six layouts, each drawn once: as a netlist, and as quadrilaterals with eight nodes for CalculiX.
 
 A layout is a list of straight beams between named points, and the points that are clamped. All of it is drawn along x and
 y; the chevron's legs are then sheared, |x| moving y. Lengths in µm.
@@ -196,4 +196,10 @@ def chevron():
     return Layout("Chevron of three pairs of legs at five degrees", points, beams, clamped, np.tan(np.radians(5)), 6.0)
 
 
-ALL = {f.__name__: f for f in (heatuator, bank, folded_flexure, serpentine, chevron)}
+def paddle():
+    # widths of one to thirty: beyond the table of steps; the block's sections turn with what is between the threads
+    points = {"a": (0, 0), "b": (60, 0), "c": (180, 0), "d": (240, 0)}
+    return Layout("Wide block between two threads", points, [("a", "b", 2), ("b", "c", 60), ("c", "d", 2)], ["a"])
+
+
+ALL = {f.__name__: f for f in (heatuator, bank, folded_flexure, serpentine, chevron, paddle)}

@@ -22,6 +22,16 @@ pub(crate) fn within_contact_range(compiled: &Compiled, q: &[Pose]) -> Result<()
     }
 }
 
+/// What to say of that comb.
+pub(crate) fn comb_beyond_told(compiled: &Compiled, q: &[Pose]) -> Option<String> {
+    let (name, [way, room]) = comb_beyond(compiled, q)?;
+    Some(format!(
+        "the comb `{name}` closes by {:.3} µm, and its fingers have {:.3} µm to the other side: nothing stops them there",
+        1e6 * way,
+        1e6 * room
+    ))
+}
+
 /// The comb whose fingers go furthest through the other side at `q`: its name, and how far its sides have come together of how
 /// much they can [m].
 pub(crate) fn comb_beyond<'a>(compiled: &'a Compiled, q: &[Pose]) -> Option<(&'a str, [f64; 2])> {

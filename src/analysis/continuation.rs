@@ -1,9 +1,9 @@
 //! Equilibrium paths: how a mechanism's equilibria go on while one load, voltage, temperature or stress grows, past folds
 //! and through bifurcations.
-use super::contact_range::within_contact_range;
+use super::contact_range::{comb_beyond_told, within_contact_range};
 use super::gap_pieces;
 use super::signal::{Signal, View};
-use super::statics::{beam_motions, node_motions, operating_point, source_vector};
+use super::statics::{OperatingPoint, beam_motions, node_motions, operating_point, source_vector, told_at, too_hot};
 use super::{AnalysisError, BeamMotions, NodeMotions, Watch};
 use crate::compile::Compiled;
 use crate::multibody::planar::Pose;
@@ -155,6 +155,8 @@ pub fn trace(
         let of_kind = traced.events.iter().filter(|(event, _)| *event == kind);
         of_kind.map(|&(_, point)| CriticalPoint { value: value(traced.points[point].s), point }).collect()
     };
+    let mut warnings = told_on_the_way(compiled, &start, &sources, &traced);
+    warnings.extend(told(&traced, value));
     Ok(ContinuationResult {
         values: traced.points.iter().map(|p| value(p.s)).collect(),
         signals: (request.signals.iter().zip(&signals).zip(columns))
@@ -176,8 +178,33 @@ pub fn trace(
         unknowns: system.model.unknowns(),
         iterations: traced.iterations,
         in_pieces,
-        warnings: told(&traced, value),
+        warnings,
     })
+}
+
+/// What is to be known of the equilibrium where a path starts, the first point at which a comb is beyond its range, and the hottest.
+fn told_on_the_way(
+    compiled: &Compiled,
+    start: &OperatingPoint,
+    [from, to]: &[Vec<f64>; 2],
+    traced: &Traced,
+) -> Vec<String> {
+    let electrics = &compiled.parts.system.electrics;
+    let mut drive = electrics.drive();
+    let mut hot = |s: f64| {
+        let sources: Vec<f64> = from.iter().zip(to).map(|(a, b)| a + s * (b - a)).collect();
+        let mut rise = start.rise.clone();
+        electrics.steady(&sources, &mut rise, &mut drive);
+        too_hot(compiled, &OperatingPoint { rise, sources, ..start.clone() })
+    };
+    let begins = |way: String| format!("the equilibrium that it starts from: {way}");
+    let farthest = traced.points.iter().map(|p| p.s).fold(0.0, f64::max);
+    told_at(compiled, start)
+        .into_iter()
+        .map(begins)
+        .chain(traced.points.iter().find_map(|point| comb_beyond_told(compiled, &point.q)))
+        .chain(hot(0.0).or_else(|| hot(farthest)))
+        .collect()
 }
 
 /// What is to be known of a path whose points have these values.

@@ -7,6 +7,7 @@
 mod motion;
 
 use super::modes::{ModesResult, normalized};
+use super::sensitivity::Sensitivity;
 use super::statics::{NodeMotion, StaticResult, electrical, source_vector};
 use super::{AnalysisError, BeamMotions, NodeMotions, PortVoltages};
 use crate::compile::Compiled;
@@ -104,6 +105,7 @@ pub fn frame_modes(
     let shape = |x: &Vec<Pose>| normalized(node_motions(compiled, frame, x), beam_motions(frame, x));
     let (shapes, curves) = found.shapes.iter().map(shape).unzip();
     let result = ModesResult {
+        sensitivity: Sensitivity::default(),
         estimated_error: None,
         frequencies_hz: found.lambda.iter().map(|&l| l.max(0.0).sqrt() / std::f64::consts::TAU).collect(),
         shapes,
@@ -179,12 +181,19 @@ fn balance(
         tangent.project(&mut change);
         let mut matrix = tangent.combine(1.0, 0.0, 0.0);
         // the recursion's test of pivots finds free motions; the solution itself is the sparse package's
-        matrix.clone().factor(&system.pattern).map_err(|p| singular(frame, p))?;
+        let inertia = matrix.clone().factor(&system.pattern).map_err(|p| singular(frame, p))?;
         solver.factor(&system.pattern, &mut matrix).map_err(|p| singular(frame, p))?;
         solver.solve(&system.pattern, &matrix, &mut change);
         q.iter_mut().zip(&change).for_each(|(q, change)| *q += change);
         let (moved, all) = (amount(&change, size), amount(&q, size));
-        if moved <= SETTLED * all {
+        let settled = moved <= SETTLED * all;
+        if settled && inertia.negative > 0 {
+            let detail = "Newton's method from the drawing came to an equilibrium of the frame that is unstable: the voltages across its gaps are \
+                          beyond pull-in, or a load holds a gap open; take --solver recursion, which follows the branch"
+                .into();
+            return Err(AnalysisError::NotConverged { detail });
+        }
+        if settled {
             return Ok((q, iteration));
         }
         // a correction that does not shrink any more is rounding

@@ -9,8 +9,8 @@ use crate::compile::Compiled;
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
 
-/// How far the deflection `x` of a linear model is off for want of the stiffness that the stress at `point` brings, as a share of its
-/// largest; infinite beyond the buckling load. None where the model is not linear.
+/// How far the deflection `x` of a linear model is off for want of the stiffness that the stress at `point` brings, as a share of the
+/// largest that is told; infinite beyond the buckling load. None where the model is not linear.
 pub(super) fn left_out(compiled: &Compiled, point: &OperatingPoint, x: &[Pose]) -> Option<f64> {
     let system = &compiled.parts.system;
     let model = &system.model;
@@ -42,7 +42,7 @@ pub(super) fn left_out(compiled: &Compiled, point: &OperatingPoint, x: &[Pose]) 
     let Some(with) = solved(&stiffness) else { return Some(f64::INFINITY) };
     for node in compiled.parts.nodes.iter().flatten() {
         let (a, b) = (node.displacement(&without, true), node.displacement(&with, true));
-        largest = a.norm().max(b.norm()).max(largest);
+        largest = a.norm().max(largest);
         apart = (a - b).norm().max(apart);
     }
     (largest > 0.0).then(|| apart / largest)

@@ -14,6 +14,8 @@ mod linear_stress;
 pub mod mesh;
 pub mod modes;
 pub mod pull_in;
+mod rotary_left_out;
+pub mod sensitivity;
 pub mod side_by_side;
 pub mod signal;
 mod stability;

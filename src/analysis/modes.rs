@@ -1,7 +1,10 @@
 //! Natural frequencies and shapes about the operating point.
+use super::contact_range::comb_beyond_told;
 use super::gap_pieces;
+use super::rotary_left_out;
+use super::sensitivity::{self, Sensitivity};
 use super::signal::{Signal, View};
-use super::statics::{NodeMotion, operating_point, told_at};
+use super::statics::{NodeMotion, operating_point, told_at, too_hot};
 use super::{AnalysisError, BeamMotions, NodeMotions, PortVoltages};
 use crate::compile::Compiled;
 use crate::gaps::{Drive, Point};
@@ -31,6 +34,9 @@ pub struct ModesResult {
     pub unknowns: usize,
     /// Largest displacement of a node at the equilibrium that the modes are about [m].
     pub deflection_m: f64,
+    /// How much faster the frequencies move than the equilibrium.
+    #[serde(skip)]
+    pub sensitivity: Sensitivity,
     /// What the numbers do not say by themselves.
     pub warnings: Vec<String>,
     /// Largest estimated relative error by the mesh, of every frequency and of the equilibrium that they are about [1]; none without an
@@ -104,6 +110,8 @@ fn shapeless(compiled: &Compiled, count: usize, voltages: &PortVoltages) -> Resu
         way = told_at(compiled, &point);
         let share = gap_pieces::left_out(compiled, &point.q, &point.volts);
         in_pieces = share.map(|(name, share)| (name.to_owned(), gap_pieces::OF_DEFLECTION * share));
+        way.extend(comb_beyond_told(compiled, &point.q));
+        way.extend(too_hot(compiled, &point));
         let (mut rise, mut driven) = (point.rise.clone(), system.electrics.drive());
         system.electrics.steady(&point.sources, &mut rise, &mut driven);
         // as SUGAR: heat and loads move what the field pulls at, and do nothing to the stiffness of beams
@@ -142,13 +150,17 @@ fn shapeless(compiled: &Compiled, count: usize, voltages: &PortVoltages) -> Resu
     let forces =
         if loaded && !as_sugar { axial_forces(&compiled.structure, &compiled.parts, &q, &drive) } else { Vec::new() };
     let mut errors = estimated(compiled, &tangent, &forces, &found);
-    let mut warnings = told(compiled, count, &q, &found.lambda);
+    let mut warnings = told(compiled, count, &q, (&found.lambda, found.rounding));
+    let about = (found.lambda[..count.min(found.lambda.len())].as_ref(), found.shapes.as_slice());
+    let sensitivity = sensitivity::of_modes(compiled, (&q, &drive), !as_sugar, about);
+    let in_pieces = in_pieces.map(|(name, share)| (name, share * sensitivity.field.max(1.0)));
     warnings.extend(gap_pieces::told(compiled, in_pieces));
     warnings.extend(way.into_iter().map(|way| format!("the equilibrium that these modes are about: {way}")));
     errors.truncate(count);
     found.lambda.truncate(count);
     found.shapes.truncate(count);
     found.residuals.truncate(count);
+    warnings.extend(rotary_left_out::told(compiled, &found.shapes));
     let result = ModesResult {
         estimated_error: None,
         frequencies_hz: found.lambda.iter().map(|&l| l.max(0.0).sqrt() / std::f64::consts::TAU).collect(),
@@ -157,6 +169,7 @@ fn shapeless(compiled: &Compiled, count: usize, voltages: &PortVoltages) -> Resu
         errors,
         unknowns: system.model.unknowns(),
         deflection_m: deflection(compiled, &q),
+        sensitivity,
         warnings,
     };
     Ok((result, q, found.shapes))
@@ -198,7 +211,7 @@ fn deflection(compiled: &Compiled, q: &[Pose]) -> f64 {
 }
 
 /// What modes do not say by themselves: that there are fewer, that the equilibrium is far from the drawing or unstable.
-fn told(compiled: &Compiled, count: usize, q: &[Pose], lambda: &[f64]) -> Vec<String> {
+fn told(compiled: &Compiled, count: usize, q: &[Pose], (lambda, rounding): (&[f64], f64)) -> Vec<String> {
     let mut warnings = Vec::new();
     if lambda.len() < count {
         let found = lambda.len();
@@ -215,8 +228,9 @@ fn told(compiled: &Compiled, count: usize, q: &[Pose], lambda: &[f64]) -> Vec<St
             "these modes are about a largely deflected equilibrium: {moved:.3} µm away from the drawing, {share:.0} % of its size"
         ));
     }
-    let highest = lambda.last().map_or(0.0, |l| l.abs());
-    let unstable = lambda.iter().filter(|l| **l < -1e-9 * highest).count();
+    // about zero as far as rounding in the stiffness tells
+    let least = lambda.iter().find(|l| **l > 0.0).map_or(0.0, |l| rounding * l);
+    let unstable = lambda.iter().filter(|l| **l < -least).count();
     if unstable > 0 {
         warnings.push(format!(
             "the equilibrium is unstable: {unstable} of the modes do not swing but grow, and are shown at 0 Hz (buckled, if \

@@ -7,6 +7,8 @@
 //! peels off piece by piece) it goes on. Voltages are measured in what moves this part, so that no step depends on the
 //! largest voltage asked for.
 
+mod result;
+
 use super::AnalysisError;
 use super::contact_range::within_contact_range;
 use super::statics::source_vector;
@@ -19,7 +21,7 @@ use crate::solve::continuation::{Continuation, ContinuationOptions, PathEnd, Tra
 use crate::solve::equilibrium::{Equilibrium, EquilibriumOptions};
 use crate::solve::family::Blend;
 use crate::solve::path::SourcePath;
-use serde::Serialize;
+pub use result::PullInResult;
 
 /// How far beyond a fold a part is let fall, as a share of its voltage.
 const PAST: f64 = 1e-3;
@@ -29,40 +31,10 @@ const BISECTIONS: usize = 40;
 const SHARP: f64 = 1e-8;
 /// Folds on the way up, or on the way down, after which the search gives up.
 const MOST_FOLDS: usize = 200;
+/// Jumps that are named.
+const MOST_NAMED: usize = 4;
 /// Points of one piece of a branch.
 const MOST_POINTS: usize = 20_000;
-
-/// Where a gap closes and where it opens again.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct PullInResult {
-    /// The port or netlist source whose voltage was swept.
-    pub port: String,
-    /// Voltage at which the open branch loses its stability on the way up, and a gap closes [V].
-    pub pull_in_v: f64,
-    /// Voltage at which the last of the closed gaps lets go on the way down [V]; none when it stays closed at 0 V, or when
-    /// nothing holds the part after pull-in.
-    pub release_v: Option<f64>,
-    /// False when nothing holds the part after pull-in: no gap closes on contact.
-    pub held: bool,
-    /// Largest estimated relative error by the mesh [1]; none without an estimate.
-    #[serde(skip)]
-    pub estimated_error: Option<f64>,
-    /// What the numbers do not say by themselves, as sentences.
-    #[serde(skip)]
-    pub warnings: Vec<String>,
-}
-
-impl PullInResult {
-    /// Why there is no release, and what else the voltages do not say, as sentences.
-    pub fn told(&self) -> Vec<String> {
-        let way = match (self.release_v, self.held) {
-            (Some(_), _) => None,
-            (None, true) => Some("no release: it stays closed".to_owned()),
-            (None, false) => Some("no release: nothing holds the part beyond pull-in".to_owned()),
-        };
-        way.into_iter().chain(self.warnings.iter().cloned()).collect()
-    }
-}
 
 /// Follows the equilibrium up to `max` volts on `port` (none: the first port, else the first source of the netlist), then
 /// down again. The other ports stay at 0 V, the netlist's other sources at their voltage.
@@ -77,11 +49,25 @@ pub fn pull_in(compiled: &Compiled, port: Option<&str>, max: f64) -> Result<Pull
             detail: format!("{max} is not a positive number of volts"),
         });
     }
+    let system = &compiled.parts.system;
+    if system.gaps.is_empty() {
+        return Err(AnalysisError::BadRequest {
+            what: format!("port \"{}\"", system.electrics.names[source]),
+            detail: "the netlist has no gap, so that nothing pulls in; `path --along` raises a voltage without one"
+                .into(),
+        });
+    }
     let mut off = source_vector(compiled, &[])?;
     off[source] = 0.0;
-    let system = &compiled.parts.system;
-    let mut sweep =
-        Sweep { compiled, system, off, source, equilibrium: Equilibrium::new(system, EquilibriumOptions::default()) };
+    let mut sweep = Sweep {
+        compiled,
+        system,
+        off,
+        source,
+        equilibrium: Equilibrium::new(system, EquilibriumOptions::default()),
+        jumped: None,
+        passed: Vec::new(),
+    };
     let name = system.electrics.names[source].clone();
     let estimated_error = compiled.order.estimated_error;
     let q = sweep.at_rest()?;
@@ -93,7 +79,7 @@ pub fn pull_in(compiled: &Compiled, port: Option<&str>, max: f64) -> Result<Pull
             release_v: None,
             held: false,
             estimated_error,
-            warnings: Vec::new(),
+            warnings: sweep.told(),
         }),
         Closed::Rests { fold, volts, q } => {
             let made: Vec<usize> = (0..touching.len()).filter(|&g| !touching[g] && system.touches(g, &q)).collect();
@@ -104,7 +90,7 @@ pub fn pull_in(compiled: &Compiled, port: Option<&str>, max: f64) -> Result<Pull
                 release_v,
                 held: true,
                 estimated_error,
-                warnings: Vec::new(),
+                warnings: sweep.told(),
             })
         }
     }
@@ -142,6 +128,10 @@ struct Sweep<'a> {
     off: Vec<f64>,
     source: usize,
     equilibrium: Equilibrium,
+    /// What the part did before any voltage, where it did not just give way.
+    jumped: Option<&'static str>,
+    /// Voltages at which it jumped without closing a gap [V].
+    passed: Vec<f64>,
 }
 
 impl Sweep<'_> {
@@ -160,7 +150,11 @@ impl Sweep<'_> {
         let mut q = vec![Pose::zeros(); self.system.bodies()];
         let rest = vec![0.0; self.off.len()];
         let path = SourcePath::new(&self.system.electrics, &rest, &self.off, [0.0, 1.0]);
-        self.equilibrium.follow(self.system, &path, &mut q)?;
+        let path = self.equilibrium.follow(self.system, &path, &mut q)?;
+        self.jumped = path.fold.is_some().then_some(
+            "without any voltage the part has snapped through or buckled: these voltages are those of one of its branches; \
+             `bimorph path` shows them, --imperfection chooses",
+        );
         Ok(q)
     }
 
@@ -173,7 +167,7 @@ impl Sweep<'_> {
             let last = last(&traced);
             let fold = from + last.0 * unit;
             if traced.end == PathEnd::Arrived {
-                return Err(self.nothing(max));
+                return Err(self.nothing(max, &q));
             }
             let before = last.1;
             q.copy_from_slice(&before);
@@ -193,8 +187,9 @@ impl Sweep<'_> {
                 let fold = if lost { self.sharpen(&before, fold, beyond, apart) } else { fold };
                 return Ok(Closed::Rests { fold, volts: beyond, q });
             }
+            self.passed.push(fold);
             if beyond >= max {
-                return Err(self.nothing(max));
+                return Err(self.nothing(max, &q));
             }
             from = beyond;
         }
@@ -203,11 +198,31 @@ impl Sweep<'_> {
         Err(AnalysisError::NoEquilibrium { detail })
     }
 
-    fn nothing(&self, max: f64) -> AnalysisError {
+    /// Why there is no pull-in up to `max`, for a part that is at `q` before the last piece of its way.
+    fn nothing(&self, max: f64, q: &[Pose]) -> AnalysisError {
         let name = &self.system.electrics.names[self.source];
-        AnalysisError::NoEquilibrium {
-            detail: format!("{name} pulls nothing in up to {max} V; raise the largest voltage"),
-        }
+        let shut = self.touching(q).iter().position(|touches| *touches);
+        let way_out = match shut {
+            Some(gap) => format!("`{}` is closed already before that", self.compiled.parts.gap_names[gap]),
+            None => "raise the largest voltage".to_owned(),
+        };
+        AnalysisError::NoEquilibrium { detail: format!("{name} pulls nothing in up to {max} V; {way_out}") }
+    }
+
+    /// What the voltages do not say by themselves.
+    fn told(&self) -> Vec<String> {
+        let passed = match self.passed.as_slice() {
+            [] => None,
+            some => {
+                let volts: Vec<String> = some.iter().take(MOST_NAMED).map(|v| format!("{v:.4}")).collect();
+                let more = if some.len() > MOST_NAMED { ", …" } else { "" };
+                Some(format!(
+                    "on the way it jumps at {}{more} V without closing a gap, and goes on from there",
+                    volts.join(", ")
+                ))
+            }
+        };
+        self.jumped.map(str::to_owned).into_iter().chain(passed).collect()
     }
 
     /// From the closed state `q` at `volts` down to where none of the gaps `made` touches any more.

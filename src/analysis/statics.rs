@@ -8,6 +8,7 @@ use crate::multibody::planar::Pose;
 use crate::solve::SolveError;
 use crate::solve::equilibrium::{Equilibrium, EquilibriumOptions, Path};
 use crate::solve::path::SourcePath;
+use crate::structure::MOLTEN;
 use serde::Serialize;
 
 /// A static equilibrium.
@@ -175,16 +176,16 @@ pub(crate) fn operating_point(compiled: &Compiled, voltages: &PortVoltages) -> R
     settle(compiled, q, sources, &rest, [0.0, 1.0])
 }
 
-/// The equilibrium next to `q`; that reached from rest where there is none.
+/// The equilibrium next to `q`; that reached from rest where there is none, and then true.
 pub(crate) fn operating_point_near(
     compiled: &Compiled,
     voltages: &PortVoltages,
     q: Vec<Pose>,
-) -> Result<OperatingPoint, AnalysisError> {
+) -> Result<(OperatingPoint, bool), AnalysisError> {
     let sources = source_vector(compiled, voltages)?;
     match settle(compiled, q, sources.clone(), &sources, [1.0, 1.0]) {
-        Ok(point) if point.path.fold.is_none() => Ok(point),
-        _ => operating_point(compiled, voltages),
+        Ok(point) if point.path.fold.is_none() => Ok((point, false)),
+        _ => Ok((operating_point(compiled, voltages)?, true)),
     }
 }
 
@@ -214,10 +215,24 @@ fn settle(
     Ok(OperatingPoint { q, sources, rise, volts: drive.volts, path, free_motions })
 }
 
+/// Largest voltage of a port [V], as of those that are searched.
+const MOST_VOLTS: f64 = 1e9;
+
+/// What to say of beams that the current makes hotter than any solid bears.
+pub(crate) fn too_hot(compiled: &Compiled, point: &OperatingPoint) -> Option<String> {
+    let (heaters, beams) = (&compiled.parts.heaters, &compiled.structure.beams);
+    let (beam, rise) = (heaters.iter().zip(&point.rise)).max_by(|a, b| a.1.total_cmp(b.1))?;
+    let beam = &beams[*beam];
+    (*rise > MOLTEN).then(|| {
+        let there = beam.material.ambient_temperature + rise;
+        format!("`{}` comes to {there:.0} K: nothing that structures are made of is solid there", beam.name)
+    })
+}
+
 /// The source vector for voltages by port name.
 pub(crate) fn source_vector(compiled: &Compiled, voltages: &PortVoltages) -> Result<Vec<f64>, AnalysisError> {
     let electrics = &compiled.parts.system.electrics;
-    let mut ports = vec![0.0; electrics.ports];
+    let mut ports = vec![None; electrics.ports];
     for (name, volts) in voltages {
         let port = compiled.structure.port(name).ok_or_else(|| AnalysisError::BadRequest {
             what: format!("port \"{name}\""),
@@ -226,14 +241,19 @@ pub(crate) fn source_vector(compiled: &Compiled, voltages: &PortVoltages) -> Res
                 n => format!("the netlist's ports are {}", electrics.names[..n].join(", ")),
             },
         })?;
+        let refused =
+            |detail: String| AnalysisError::BadRequest { what: format!("voltage of port \"{name}\""), detail };
         if !volts.is_finite() {
-            return Err(AnalysisError::BadRequest {
-                what: format!("voltage of port \"{name}\""),
-                detail: format!("{volts} is not a finite number of volts"),
-            });
+            return Err(refused(format!("{volts} is not a finite number of volts")));
         }
-        ports[port] = *volts;
+        if volts.abs() > MOST_VOLTS {
+            return Err(refused(format!("expected at most {MOST_VOLTS:e} V, got {volts:e}")));
+        }
+        if let Some(before) = ports[port].replace(*volts) {
+            return Err(refused(format!("given twice, {before} V and {volts} V")));
+        }
     }
+    let ports: Vec<f64> = ports.into_iter().map(Option::unwrap_or_default).collect();
     let mut sources = vec![0.0; electrics.sources()];
     electrics.fill_sources(&ports, &mut sources);
     Ok(sources)

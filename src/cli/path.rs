@@ -104,6 +104,9 @@ struct Document<'a> {
     context: Context<'a>,
 }
 
+/// What makes a path cheaper.
+const CHEAPER: &str = "a shorter --along, a larger --tol or fewer --points cost less";
+
 impl PathCommand {
     pub(crate) fn run(&self) -> Result<(), Failure> {
         self.output.check()?;
@@ -131,10 +134,10 @@ impl PathCommand {
         };
         let bar = progress::bar("path");
         if request.signals.is_empty() {
-            let found = trace(first, &request, &mut progress::watch(&bar))?;
+            let found = trace(first, &request, &mut progress::watch_with(&bar, CHEAPER))?;
             request.signals = busiest(&found);
         }
-        let result = path_fitted(first, &request, &mut progress::watch(&bar));
+        let result = path_fitted(first, &request, &mut progress::watch_with(&bar, CHEAPER));
         bar.finish_and_clear();
         let (fitted, result) = result?;
         warn_of_mesh(first, &fitted);

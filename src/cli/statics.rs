@@ -37,7 +37,7 @@ pub(crate) struct Static {
     #[arg(long = "port", short = 'p', value_name = "NAME=VOLTS", value_parser = value::volts)]
     ports: Vec<(String, f64)>,
 
-    /// Show these only: NODE.x, NODE.y, NODE.rz, BEAM.T, PORT.i, PORT.q; a,b or repeated
+    /// Show these only, in the text and in CSV and raw files (JSON documents are whole): NODE.x, NODE.y, NODE.rz, BEAM.T, PORT.i, PORT.q; a,b or repeated
     #[arg(long, value_name = "NAMES")]
     signals: Vec<String>,
 
@@ -119,7 +119,7 @@ impl Static {
             }
         };
         self.output.finish(
-            || table(&title, &result),
+            || table(&title, &result, &value::names(&self.signals)),
             || Ok(picture(&compiled, &title, &result, &curves)),
             &document,
             &shown,
@@ -127,18 +127,25 @@ impl Static {
     }
 }
 
-/// One row: every quantity of the operating point in a column of its own.
-fn table(title: &str, result: &StaticResult) -> Result<Table, Failure> {
+/// One row: every quantity of the operating point in a column of its own, or those that are asked for.
+fn table(title: &str, result: &StaticResult, names: &[String]) -> Result<Table, Failure> {
     let mut table = Table::new(title, "Operating Point");
+    let asked = |column: &str| names.is_empty() || names.iter().any(|name| name == column);
     for (name, motion) in &result.nodes {
         for (suffix, unit, value) in [("x", "m", motion.x), ("y", "m", motion.y), ("rz", "rad", motion.rz)] {
-            table.push_real(&format!("{name}.{suffix}"), unit, vec![value])?;
+            let column = format!("{name}.{suffix}");
+            if asked(&column) {
+                table.push_real(&column, unit, vec![value])?;
+            }
         }
     }
     let lists = [(&result.temperatures_k, "T", "K"), (&result.currents_a, "i", "A"), (&result.charges_c, "q", "C")];
     for (list, suffix, unit) in lists {
         for (name, value) in list {
-            table.push_real(&format!("{name}.{suffix}"), unit, vec![*value])?;
+            let column = format!("{name}.{suffix}");
+            if asked(&column) {
+                table.push_real(&column, unit, vec![*value])?;
+            }
         }
     }
     Ok(table)

@@ -64,6 +64,9 @@ pub(super) fn picture(title: &str, result: &TransientResult) -> Picture {
     })
 }
 
+/// Crossings that are listed: a part that bounces has many.
+const MOST_EVENTS: usize = 20;
+
 pub(super) fn text(compiled: &Compiled, result: &TransientResult, joints: Option<&JointReport>) -> String {
     let rows: Vec<Vec<String>> = result
         .signals
@@ -79,15 +82,19 @@ pub(super) fn text(compiled: &Compiled, result: &TransientResult, joints: Option
         })
         .collect();
     let c = result.counters;
-    let events: String = result
+    let mut events: String = result
         .events
         .iter()
+        .take(MOST_EVENTS)
         .map(|e| {
             let what = if e.contact { " (contact)" } else { "" };
             let way = if e.direction == Direction::Up { "up" } else { "down" };
             format!("{} crosses {:e} {way} at {}{what}\n", e.signal, e.level, quantity(e.t, "s"))
         })
         .collect();
+    if let Some(more) = result.events.len().checked_sub(MOST_EVENTS).filter(|more| *more > 0) {
+        events.push_str(&format!("and {more} crossings more: --json has all\n"));
+    }
     let work = match joints {
         None => format!("{} factorizations, {} solves", c.factorizations, c.solves),
         Some(j) => format!(

@@ -4,7 +4,7 @@
 //! ([`Structure::without_circuit`]); the rest of the circuit stands beside it. Ports of the netlist are held at a voltage by a source
 //! each, as they are in every analysis, unless the netlist's circuit touches them and no voltage is given.
 
-use super::spice_names::Names;
+use super::spice_names::{Names, swept};
 use crate::structure::{CircuitElement, CircuitKind, NodeId, Structure};
 use std::collections::{BTreeMap, HashSet};
 use std::fmt::Write;
@@ -114,8 +114,13 @@ pub fn around(structure: &Structure, wanted: &Around) -> Result<String, AroundEr
     let wave = |name: &str| wanted.drives.iter().find(|(driven, _)| driven == name).map(|(_, wave)| wave.as_str());
     let mut elements = Names::new();
     let sources = sources(structure, wanted)?;
+    // what the netlist's sources and ports are called in the deck
+    let mut called: BTreeMap<String, String> = BTreeMap::new();
     for element in &structure.circuit {
         let mut line = line(element, &node, &mut elements, sources.as_deref() == Some(element.name.as_str()))?;
+        if let Some(word) = line.split_whitespace().next() {
+            called.insert(element.name.to_ascii_lowercase(), word.to_owned());
+        }
         if let Some(wave) = wave(&element.name) {
             line += &format!(" {wave}");
         }
@@ -134,6 +139,7 @@ pub fn around(structure: &Structure, wanted: &Around) -> Result<String, AroundEr
         let ac = if sources.as_deref() == Some(port.name.as_str()) { " ac 1" } else { "" };
         let minus = port.minus.map_or_else(|| "0".into(), &node);
         let name = elements.take(&format!("V_{}", port.name));
+        called.insert(port.name.to_ascii_lowercase(), name.clone());
         let _ = writeln!(text, "{name} {} {minus} dc {:e}{ac}{over_time}", node(port.plus), given.unwrap_or(0.0));
     }
     let pairs: Vec<String> = alone.ports.iter().map(|port| format!("{} 0", node(port.plus))).collect();
@@ -156,7 +162,7 @@ pub fn around(structure: &Structure, wanted: &Around) -> Result<String, AroundEr
     }
     text.push_str("+ )\n");
     for analysis in &wanted.analyses {
-        let _ = writeln!(text, "{analysis}");
+        let _ = writeln!(text, "{}", swept(analysis, &called));
     }
     text.push_str(".end\n");
     Ok(text)

@@ -83,6 +83,10 @@ fn hear(stderr: impl Read, capture: bool) -> std::io::Result<(Option<String>, bo
         }
         nothing_run |= text.contains("no simulations run");
         if capture {
+            // an option that is misspelt is left out by ngspice: that is told whatever is not shown
+            if text.contains("unrecognized parameter") {
+                let _ = std::io::stderr().write_all(format!("warning: {}\n", text.trim()).as_bytes());
+            }
             messages.extend_from_slice(&line);
         } else {
             let _ = std::io::stderr().write_all(&line);

@@ -1,5 +1,6 @@
 //! Names as SPICE takes them: no letters apart by case, no brackets, none for two things.
 
+use std::collections::BTreeMap;
 use std::collections::HashMap;
 
 /// Legal, distinct names of SPICE, with the number that the last of a kind got.
@@ -30,6 +31,16 @@ impl Names {
         self.taken.entry(name.clone()).or_insert(1);
         name
     }
+}
+
+/// An analysis with the names that the deck has for the sources that a `.dc` sweeps.
+pub(super) fn swept(analysis: &str, called: &BTreeMap<String, String>) -> String {
+    let words = analysis.split_whitespace().enumerate();
+    let one = |(k, word): (usize, &str)| {
+        let name = matches!(k, 1 | 5).then(|| called.get(&word.to_ascii_lowercase())).flatten();
+        name.map_or_else(|| word.to_owned(), Clone::clone)
+    };
+    if analysis.starts_with(".dc") { words.map(one).collect::<Vec<_>>().join(" ") } else { analysis.to_owned() }
 }
 
 #[cfg(test)]

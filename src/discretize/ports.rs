@@ -34,6 +34,7 @@ pub fn lay(structure: &Structure, heated: &[usize], rigid: &Assembly) -> Result<
                 expansion: beam.material.thermal_expansion,
                 ambient: beam.material.ambient_temperature,
                 time_constant: h.time_constant,
+                capacity: h.capacity,
             });
         }
     }

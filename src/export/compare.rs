@@ -256,7 +256,8 @@ impl Exact {
     fn shares(&mut self, model: &Reduced) -> Result<Vec<f64>, ExportError> {
         let share = |(j, mode): (usize, &super::linear::Mode)| {
             // beside an undamped resonance, which has no answer itself
-            let omega = if model.damping[(j, j)] > 0.0 { mode.omega } else { mode.omega * (1.0 + NARROW) };
+            let omega =
+                if model.damping[(j, j)] > UNDAMPED * mode.omega { mode.omega } else { mode.omega * (1.0 + NARROW) };
             let (exact, reach) = (self.response(omega)?, model.reach(omega));
             let mut most = 0.0f64;
             for row in 0..model.rows() {

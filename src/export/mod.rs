@@ -121,7 +121,7 @@ pub enum ExportError {
         name: String,
     },
     /// A name that files cannot have.
-    #[error("--name: expected a letter, then letters, digits and _, got \"{got}\"")]
+    #[error("--name: expected a letter, then letters, digits and _, and no word of Verilog-A, got \"{got}\"")]
     BadName {
         /// What was given.
         got: String,

@@ -30,6 +30,7 @@
 pub mod approach;
 pub mod backbending;
 pub mod capacitor;
+mod conduction;
 pub mod contact;
 pub mod drive;
 pub mod energy;

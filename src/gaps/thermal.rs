@@ -11,33 +11,14 @@
 //! a quadratic form T̄ = uᵀ·Q·u. Heat W that comes from elsewhere, spread evenly along a beam, acts as P does and adds Z·W with
 //! the same thermal resistances Z. Resistance and conductivity do not depend on temperature here.
 //!
-//! With a time constant the rise follows its steady value: [`super::lag`].
+//! With a time constant the rise follows its steady value: [`super::lag`]. Where a beam has a heat capacity instead, that comes from
+//! [`super::conduction`].
 
+use super::conduction::Conduction;
+pub use super::conduction::{Heater, NoHeatSink};
 use super::input::Input;
-use super::laplacian::Laplacian;
 use super::network::Potentials;
-use crate::sets::Sets;
 use nalgebra::DVector;
-use thiserror::Error;
-
-/// A conductor of heat and current between two nodes.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Heater {
-    /// First node.
-    pub a: usize,
-    /// Second node.
-    pub b: usize,
-    /// Electrical resistance [Ω].
-    pub resistance: f64,
-    /// Thermal conductance from end to end [W/K].
-    pub conductance: f64,
-    /// Thermal expansion coefficient [1/K].
-    pub expansion: f64,
-    /// Temperature at which it is as drawn [K].
-    pub ambient: f64,
-    /// Time constant [s]; 0: at once.
-    pub time_constant: f64,
-}
 
 /// Heaters with their quadratic forms.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -55,14 +36,6 @@ pub struct Heating {
     heat: Vec<f64>,
 }
 
-/// A heated beam whose heat cannot leave: nothing conducts from it to an anchor.
-#[derive(Debug, Clone, PartialEq, Eq, Error)]
-#[error("heater {heater} is not connected to any anchor through heat conductors")]
-pub struct NoHeatSink {
-    /// Index of a heater in that part.
-    pub heater: usize,
-}
-
 impl Heating {
     /// Finds the forms over `sources` source voltages, of which the first drive the network. `sink[node]` tells which nodes
     /// stay at ambient.
@@ -70,7 +43,7 @@ impl Heating {
     /// # Errors
     /// [`NoHeatSink`].
     pub fn new(
-        heaters: Vec<Heater>,
+        mut heaters: Vec<Heater>,
         potentials: &Potentials,
         sources: usize,
         sink: &[bool],
@@ -93,6 +66,14 @@ impl Heating {
                     form[(k * sources + j) * sources + i] = rise;
                 }
             }
+        }
+        if heaters.iter().any(|h| h.capacity > 0.0) {
+            // that of one volt of each source in turn, all together
+            for (k, watts) in watts.iter_mut().enumerate() {
+                *watts = heaters[k].resistance * currents[k].norm_squared();
+            }
+            let delays = conduction.delays(&heaters, &watts);
+            heaters.iter_mut().zip(delays).filter(|(h, _)| h.capacity > 0.0).for_each(|(h, tau)| h.time_constant = tau);
         }
         Ok(Self { heaters, sources, form, currents, sink: sink.to_vec(), heat: Vec::new() })
     }
@@ -176,68 +157,12 @@ impl Heating {
     }
 }
 
-/// Conduction of heat between nodes and to those at ambient.
-struct Conduction {
-    /// Row of each node; none for one at ambient.
-    row: Vec<Option<usize>>,
-    free: usize,
-    laplacian: Laplacian,
-}
-
-impl Conduction {
-    /// # Errors
-    /// [`NoHeatSink`].
-    fn new(heaters: &[Heater], sink: &[bool]) -> Result<Self, NoHeatSink> {
-        let mut row = vec![None; sink.len()];
-        let mut free = 0;
-        for h in heaters {
-            for node in [h.a, h.b] {
-                if !sink[node] && row[node].is_none() {
-                    row[node] = Some(free);
-                    free += 1;
-                }
-            }
-        }
-        if let Some(heater) = without_sink(heaters, sink) {
-            return Err(NoHeatSink { heater });
-        }
-        let conductors = heaters.iter().map(|h| (row[h.a], row[h.b], h.conductance));
-        let laplacian = Laplacian::new(free, conductors).ok_or(NoHeatSink { heater: 0 })?;
-        Ok(Self { row, free, laplacian })
-    }
-
-    /// Mean rise of each heater for the heat into each [K, W].
-    fn rises(&self, heaters: &[Heater], watts: &[f64]) -> Vec<f64> {
-        let mut rise = vec![0.0; self.free];
-        for (h, watts) in heaters.iter().zip(watts) {
-            for row in [self.row[h.a], self.row[h.b]].into_iter().flatten() {
-                rise[row] += 0.5 * watts;
-            }
-        }
-        self.laplacian.solve(&mut rise);
-        let at = |node: usize| self.row[node].map_or(0.0, |row| rise[row]);
-        let one = |(h, watts): (&Heater, &f64)| 0.5 * (at(h.a) + at(h.b)) + watts / (12.0 * h.conductance);
-        heaters.iter().zip(watts).map(one).collect()
-    }
-}
-
-/// A heater of a part that holds no sink.
-fn without_sink(heaters: &[Heater], sink: &[bool]) -> Option<usize> {
-    let mut parts = Sets::new(sink.len());
-    for h in heaters {
-        parts.join(h.a, h.b);
-    }
-    let mut cooled = vec![false; sink.len()];
-    (0..sink.len()).filter(|node| sink[*node]).for_each(|node| cooled[parts.first(node)] = true);
-    heaters.iter().position(|h| !cooled[parts.first(h.a)])
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::network::Circuit;
     use super::*;
 
-    fn bar(pieces: usize, volts_across: f64) -> f64 {
+    fn bar(pieces: usize) -> Heating {
         // 200 µm × 2 µm × 2 µm, ρ = 2e-5 Ω·m, k = 41 W/(m·K), cut into equal pieces
         let (rho, k, length, area) = (2e-5, 41.0, 200e-6, 4e-12);
         let l = length / pieces as f64;
@@ -249,6 +174,7 @@ mod tests {
             expansion: 0.0,
             ambient: 0.0,
             time_constant: 0.0,
+            capacity: 1600e3 * l * area,
         };
         let heaters: Vec<_> = (0..pieces).map(heater).collect();
         let circuit = Circuit {
@@ -259,8 +185,21 @@ mod tests {
         };
         let mut sink = vec![false; pieces + 1];
         (sink[0], sink[pieces]) = (true, true);
-        let heating = Heating::new(heaters, &circuit.solve().unwrap(), 1, &sink).unwrap();
-        (0..pieces).map(|p| heating.steady(p, &[volts_across])).sum::<f64>() / pieces as f64
+        Heating::new(heaters, &circuit.solve().unwrap(), 1, &sink).unwrap()
+    }
+
+    /// However a bar is cut, its mean rise lags by ρ·c·l²/(10·k) (heat capacity 1.6 MJ/(m³·K)): the delays of its pieces, weighed with
+    /// their rises. A half of it lags as the whole does, not as a bar of half the length.
+    #[test]
+    fn a_bar_of_pieces_is_as_slow_as_the_bar() {
+        let exact = 1600e3 * 200e-6f64.powi(2) / (10.0 * 41.0);
+        for pieces in [1, 2, 3, 7] {
+            let bar = bar(pieces);
+            let rise: Vec<f64> = (0..pieces).map(|p| bar.steady(p, &[1.0])).collect();
+            let late = bar.heaters.iter().zip(&rise).map(|(h, rise)| h.time_constant * rise).sum::<f64>();
+            assert!((late / rise.iter().sum::<f64>() / exact - 1.0).abs() < 1e-12, "{pieces}");
+        }
+        assert!((bar(2).heaters[0].time_constant / exact - 1.0).abs() < 1e-12);
     }
 
     /// A uniform clamped heater rises by V²/(12ρk) = 914.63 K at 3 V on average (ρ 2e-5 Ω·m, k 41 W/(m·K)), to 1e-12
@@ -270,15 +209,25 @@ mod tests {
         let exact: f64 = 9.0 / (12.0 * 2e-5 * 41.0);
         assert!((exact - 914.63).abs() < 0.01);
         for pieces in [1, 2, 7] {
-            assert!((bar(pieces, 3.0) / exact - 1.0).abs() < 1e-12, "{pieces}");
+            let bar = bar(pieces);
+            let mean = (0..pieces).map(|p| bar.steady(p, &[3.0])).sum::<f64>() / pieces as f64;
+            assert!((mean / exact - 1.0).abs() < 1e-12, "{pieces}");
         }
     }
 
     /// A heater without a path for its heat is refused.
     #[test]
     fn no_sink() {
-        let h =
-            Heater { a: 0, b: 1, resistance: 1.0, conductance: 1.0, expansion: 0.0, ambient: 0.0, time_constant: 0.0 };
+        let h = Heater {
+            a: 0,
+            b: 1,
+            resistance: 1.0,
+            conductance: 1.0,
+            expansion: 0.0,
+            ambient: 0.0,
+            time_constant: 0.0,
+            capacity: 0.0,
+        };
         let circuit = Circuit { nodes: 2, resistors: vec![(0, 1, 1.0)], sources: vec![(0, Some(1))], grounds: vec![1] };
         let refused = Heating::new(vec![h], &circuit.solve().unwrap(), 1, &[false, false]);
         assert_eq!(refused, Err(NoHeatSink { heater: 0 }));

@@ -10,6 +10,7 @@ use super::guard::{Guard, Voice};
 use super::limits::Limits;
 use super::presence::{Presence, Who};
 use socket2::{SockRef, TcpKeepalive};
+use std::cmp::Reverse;
 use std::future::Future;
 use std::io;
 use std::pin::Pin;
@@ -76,8 +77,8 @@ impl Connections {
         open.retain(|presence| presence.strong_count() > 0);
         let idle = open.iter().filter_map(Weak::upgrade).filter(|presence| !presence.cut.is_cancelled());
         idle.filter_map(|presence| presence.idle().map(|time| (time, presence)))
-            // among those that never greeted, the one that is there for longest
-            .max_by_key(|(time, presence)| (*time, presence.opened.elapsed()))
+            // among those that never greeted, the one that came first
+            .max_by_key(|(time, presence)| (*time, Reverse(presence.opened)))
             .map(|(_, p)| p)
     }
 

@@ -24,6 +24,9 @@ pub struct Material {
     pub stress: f64,
 }
 
+/// Temperature at which all structural solids have melted; tungsten does at 3695 K [K].
+pub const MOLTEN: f64 = 4000.0;
+
 /// A straight beam of constant rectangular section between two nodes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Beam {
@@ -56,8 +59,10 @@ pub struct Heater {
     pub resistance: f64,
     /// Thermal conductance from end to end k·A/l [W/K].
     pub conductance: f64,
-    /// Time constant with which the mean temperature rise follows its steady value [s]; 0: at once.
+    /// Time constant with which the mean temperature rise follows its steady value [s]; 0: at once, or as the heat capacities say.
     pub time_constant: f64,
+    /// Heat capacity ρ·c·w·h·l, where the time constant is to come of those of all that conducts [J/K]; else 0.
+    pub capacity: f64,
 }
 
 /// A rigid body's mass at a node: a plate, or a lumped mass.

@@ -17,7 +17,7 @@ mod without_circuit;
 pub use circuit::{CircuitElement, CircuitKind};
 pub use gap::{BeamGap, Comb, GapVoltage, PlateGap, Stop};
 pub use index::NodeIndex;
-pub use mechanical::{Beam, Heater, Link, Load, Mass, Material, Pad, SpringDamper, Support, Yield};
+pub use mechanical::{Beam, Heater, Link, Load, MOLTEN, Mass, Material, Pad, SpringDamper, Support, Yield};
 pub use network::{Port, Resistor, VoltageSource, Wire};
 pub use node::{Node, NodeId};
 

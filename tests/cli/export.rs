@@ -117,9 +117,9 @@ fn the_nonlinear_form() {
         "{}",
         spice.stdout
     );
-    let module = bench.run("export plate.net --verilog-a --nonlinear --signals m.x:1M --name cell");
+    let module = bench.run("export plate.net --verilog-a --nonlinear --signals m.x:1M --name plate_cell");
     assert_eq!(module.status, 0, "{}", module.stderr);
-    assert!(module.stdout.contains("module cell(p_drive, n_drive, s_m_x);"), "{}", module.stdout);
+    assert!(module.stdout.contains("module plate_cell(p_drive, n_drive, s_m_x);"), "{}", module.stdout);
     for word in ["@", "$", "idt", "bound_step", "real ", "integer", " if"] {
         assert!(!module.stdout.contains(word), "\"{word}\" stands in the module");
     }

@@ -225,3 +225,16 @@ fn differences_of_a_nanometre() {
     let whole = lower.solve_lower_triangular(&half.transpose()).unwrap();
     close(whole.symmetric_eigenvalues().min().sqrt() / TAU, 22793.5560464522, 1e-9);
 }
+
+/// The frame tells no unstable equilibrium: at 20 V, and a load of 4 µN that holds the gap open, Newton's method from the drawing goes to the
+/// one between the stable branch (−3.391 µm) and the electrode.
+#[test]
+fn a_frame_tells_no_unstable_equilibrium() {
+    let text = format!("{PLATE}\nf2d * [m] [F=-4u]");
+    let compiled = model(&text, &CompileOptions { as_sugar: true, ..CompileOptions::default() });
+    let frame = frame(&compiled).unwrap();
+    let port = [("drive".to_owned(), 20.0)];
+    let error = frame_statics(&compiled, &frame, &port).unwrap_err().to_string();
+    assert!(error.contains("unstable") && error.contains("recursion"), "{error}");
+    assert!(frame_modes(&compiled, &frame, 1, &port).is_err());
+}

@@ -15,23 +15,67 @@ fn with(text: &str, junctions: Junctions) -> Compiled {
     compile(&bundle, &CompileOptions { junctions, ..linear() }).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// Calibrated junctions are the default; on five layouts that the calibration never saw, mode 1 is within 2 % and modes 1–7
+/// Calibrated junctions are the default; on six layouts that the calibration never saw, mode 1 is within 2 % and modes 1–7
 /// within 4 % of plane stress (CalculiX 2.20 CPS8, thin, six elements across the narrowest beam: scripts/junctions/validate),
-/// and within the 0.7 % that is reached today.
+/// and within the 0.7 % that is reached today. The paddle's block is thirty times as wide as its threads, which is beyond the table of
+/// steps: bending holds 0.1 % there, with the rotary inertia that its command says is missing, and stretching 1.4 %.
 #[test]
-fn five_layouts_in_plane_stress() {
+fn six_layouts_in_plane_stress() {
     for (name, reference) in LAYOUTS {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("tests/netlists/junctions/{name}.net"));
-        let options = CompileOptions { band: Some(5e6), tol: 1e-4, undamped: true, ..CompileOptions::default() };
+        let wide = name == "paddle";
+        let options = CompileOptions {
+            band: Some(5e6),
+            tol: 1e-4,
+            undamped: true,
+            rotary_inertia: wide,
+            ..CompileOptions::default()
+        };
         let compiled = compile(&Bundle::read(&path, &[]).unwrap(), &options).unwrap();
         assert_eq!(compiled.options.junctions, Junctions::Calibrated);
         let found = modes(&compiled, reference.len(), &[]).unwrap().frequencies_hz;
         assert_eq!(found.len(), reference.len());
         for (k, (found, wanted)) in found.iter().zip(reference).enumerate() {
             println!("{name} mode {}: {:+.2} %", k + 1, 100.0 * (found / wanted - 1.0));
-            close(*found, wanted, 7e-3);
+            let bound = if !wide {
+                7e-3
+            } else if k < 3 {
+                1e-3
+            } else {
+                1.4e-2
+            };
+            close(*found, wanted, bound);
         }
     }
+}
+
+/// A model without rotary inertia says by how much that is missed, from its modes alone: the paddle's mode 2 comes out 8.7 % too high
+/// (`six_layouts_in_plane_stress` has the other), which is told within a tenth. Of narrow beams nothing is told, nor with the option.
+#[test]
+fn rotary_inertia_left_out_is_told() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/netlists/junctions/paddle.net");
+    let found = |rotary_inertia: bool| {
+        let options = CompileOptions { rotary_inertia, ..CompileOptions::default() };
+        let found = modes(&compile(&Bundle::read(&path, &[]).unwrap(), &options).unwrap(), 3, &[]).unwrap();
+        let said = found.warnings.iter().find(|w| w.contains("--rotary-inertia")).cloned();
+        (found.frequencies_hz[1], said)
+    };
+    let ((without, said), (with, silent)) = (found(false), found(true));
+    let said = said.expect("a warning");
+    assert!(said.contains("mode 2"), "{said}");
+    let told: f64 = said.split("about ").nth(1).and_then(|s| s.split(' ').next()).unwrap().parse().unwrap();
+    close(1e-2 * told, without / with - 1.0, 0.1);
+    assert_eq!(silent, None);
+    let narrow = with_text_modes(
+        "anchor p1 [a] []
+beam2d p1 [a b] [l=100u w=2u]",
+    );
+    assert!(narrow.iter().all(|w| !w.contains("inertia")), "{narrow:?}");
+}
+
+/// What modes of a text warn of.
+fn with_text_modes(text: &str) -> Vec<String> {
+    modes(&with(text, Junctions::Calibrated), 3, &[]).unwrap().warnings
 }
 
 /// A junction is the same beside any segment: a T of three 4 µm wide beams under 1 µN along its bar gives way by the same with 4

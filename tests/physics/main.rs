@@ -15,6 +15,7 @@ mod joint_integrators;
 mod junctions;
 mod mesh;
 mod motion;
+mod near_folds;
 mod paths;
 mod relative;
 mod relative_motion;

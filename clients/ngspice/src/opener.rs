@@ -2,6 +2,7 @@
 
 use crate::model_card::ModelCard;
 use crate::names;
+use bimorph::analysis::mesh;
 use bimorph::compile::{CompileError, CompileOptions, Compiled, compile};
 use bimorph::device::local::LocalDevice;
 use bimorph::device::{Device, DeviceError};
@@ -108,10 +109,29 @@ pub fn open_model(card: &mut ModelCard, directory: Option<&Path>) -> Result<Box<
     }
     names::respell(card, &structure);
     tell(card, &loaded.warnings.items);
+    if card.finer {
+        refine(card, &bundle)?;
+    }
     match &card.remote {
-        None => Ok(Box::new(LocalDevice::new(compiled(&card.file, bundle, &card.options)?))),
+        None => {
+            let model = compiled(&card.file, bundle, &card.options)?;
+            tell(card, &model.warnings.items);
+            if !card.finer {
+                tell(card, mesh::unasked(&model).as_slice());
+            }
+            Ok(Box::new(LocalDevice::new(model)))
+        }
         Some(address) => connect(address, &bundle, card),
     }
+}
+
+/// Gives the model twice the segments that it would have, every beam as many as the finest; a band is refined by its tolerance.
+fn refine(card: &mut ModelCard, bundle: &Bundle) -> Result<(), OpenError> {
+    if card.options.band.is_none() {
+        let model = compiled(&card.file, bundle.clone(), &card.options)?;
+        card.options.segments = model.order.segments.iter().max().filter(|most| **most > 0).map(|most| 2 * most);
+    }
+    Ok(())
 }
 
 /// Warnings of a netlist on standard error, each once in a process: what a deck's run says of the drawing behind it. Those that a netlist's circuit

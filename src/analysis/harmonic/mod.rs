@@ -19,7 +19,7 @@ mod options;
 mod root;
 mod roots;
 
-use super::{AnalysisError, Watch};
+use super::{AnalysisError, Watch, rotary_left_out};
 use crate::compile::Compiled;
 use exact::Exact;
 use modal::Sum;
@@ -118,6 +118,7 @@ pub fn harmonic(
                 &exact.tangent,
                 count.max(if many { 0 } else { inside + 1 }),
             )?;
+            warnings.extend(rotary_left_out::told(compiled, &found.shapes[..inside.min(found.shapes.len())]));
             let shown = if options.by_modes { found.lambda.len().min(count.max(1)) } else { found.lambda.len() };
             let mut kept = found;
             kept.lambda.truncate(shown);

@@ -11,7 +11,7 @@ use super::super::statics::{
 };
 use super::super::{AnalysisError, BeamMotions, PortVoltages};
 use super::meshed::{chosen, meshed, on};
-use super::warnings::{of_fingers, of_pieces, of_stress};
+use super::warnings::{of_fingers, of_heat, of_pieces, of_stress};
 use crate::compile::Compiled;
 use crate::netlist::Diagnostic;
 use crate::refine::carry::carried;
@@ -21,6 +21,8 @@ use std::borrow::Cow;
 
 /// Share of the largest displacement below which errors are relative to that.
 pub(super) const SMALL: f64 = 1.0 / 30.0;
+/// Share of the mechanism's size below which a displacement is rounding.
+pub(super) const ROUNDING: f64 = 1e-12;
 
 /// The mesh for the equilibrium at these voltages, from `segments` upwards, and the equilibrium on it.
 pub(super) fn order(
@@ -75,17 +77,17 @@ impl Search<'_> {
     fn follow(&mut self, segments: &[usize]) -> Result<Vec<Output>, AnalysisError> {
         let model = meshed(self.compiled, segments)?;
         let linear = model.parts.system.model.linear;
-        let mut point = match (&self.last, self.points.last()) {
+        let (mut point, from_rest) = match (&self.last, self.points.last()) {
             (Some(before), Some((_, point))) => {
                 let start = carried(&model.structure, &before.parts, &model.parts, &point.q, linear);
                 operating_point_near(&model, self.voltages, start)?
             }
-            _ => operating_point(&model, self.voltages)?,
+            _ => (operating_point(&model, self.voltages)?, true),
         };
-        if let Some((_, first)) = self.points.first() {
-            // the way from rest is that of the first mesh
-            point.path.fold = point.path.fold.or(first.path.fold);
-            point.path.iterations += first.path.iterations;
+        if let (false, Some((_, before))) = (from_rest, self.points.last()) {
+            // the way from rest is that of the mesh before
+            point.path.fold = point.path.fold.or(before.path.fold);
+            point.path.iterations += before.path.iterations;
         }
         let outputs = outputs(&model, &point);
         self.last = Some(model);
@@ -112,9 +114,9 @@ fn outputs(model: &Compiled, point: &OperatingPoint) -> Vec<Output> {
     let q = &point.q;
     let nodes = || model.parts.nodes.iter().flatten();
     let shifts = || nodes().map(|p| p.displacement(q, system.model.linear));
-    let largest = shifts().map(|u| u.norm()).fold(0.0, f64::max);
-    let turned = nodes().map(|p| p.rotation(q).abs()).fold(0.0, f64::max);
     let size = size(model);
+    let largest = shifts().map(|u| u.norm()).fold(ROUNDING * size / SMALL, f64::max);
+    let turned = nodes().map(|p| p.rotation(q).abs()).fold(0.0, f64::max);
     let mut outputs = Vec::new();
     for (point, u) in nodes().zip(shifts()) {
         let scale = u.norm().max(SMALL * largest).max(f64::MIN_POSITIVE);
@@ -164,7 +166,7 @@ pub(super) fn told_of_static(fitted: &Compiled, point: OperatingPoint) -> (Opera
     let share = if fitted.options.linear { left_out(fitted, &point, &point.q) } else { None };
     let points = [(point, OF_DEFLECTION)];
     let told = of_stress(fitted, share).into_iter().chain(of_pieces(fitted, &points));
-    let told = told.chain(of_fingers(fitted, &points[0].0)).collect();
+    let told = told.chain(of_fingers(fitted, &points[0].0)).chain(of_heat(fitted, &points[0].0)).collect();
     let [(point, _)] = points;
     (point, told)
 }

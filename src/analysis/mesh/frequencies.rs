@@ -75,13 +75,19 @@ pub(super) fn for_modes(
     let (still, _) = equilibrium::order(compiled, voltages, order.segments)?;
     let (own, found) = own_estimate(compiled, still.clone(), count, voltages)?;
     let worst = |a: Option<f64>, b: Option<f64>| Some(a?.max(b?));
-    let enough = own.estimated_error.is_some_and(|error| error <= counted::SAFETY * compiled.options.tol);
+    let carried = found.as_ref().is_some_and(|(_, (modes, _))| is_carried(compiled, modes, still.estimated_error));
+    let enough = carried && own.estimated_error.is_some_and(|error| error <= counted::SAFETY * compiled.options.tol);
     if enough || count > MOST_COMPARED {
         let estimated_error = worst(still.estimated_error, own.estimated_error);
         return Ok((ModelOrder { estimated_error, ..own }, found));
     }
     let moving = doubling::fit(&compiled.structure, &compiled.options, still.segments, &mut analyse)?;
     Ok((ModelOrder { estimated_error: worst(still.estimated_error, moving.estimated_error), ..moving }, found))
+}
+
+/// Whether what the mesh leaves uncertain of the equilibrium moves no frequency beyond the tolerance: next to a fold it does.
+pub(super) fn is_carried(compiled: &Compiled, found: &ModesResult, still: Option<f64>) -> bool {
+    still.is_some_and(|error| error * found.sensitivity.all.max(1.0) <= doubling::SAFETY * compiled.options.tol)
 }
 
 /// Largest of the errors; none where one of them is not known.

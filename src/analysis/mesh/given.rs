@@ -10,7 +10,7 @@ use super::super::pull_in::{PullInResult, pull_in};
 use super::super::statics::{StaticResult, operating_point, result_at};
 use super::super::{AnalysisError, PortVoltages};
 use super::equilibrium::{self, told_of_static};
-use super::frequencies::{frequency_outputs, worst};
+use super::frequencies::{frequency_outputs, is_carried, worst};
 use super::meshed::meshed;
 use super::pull_in::{pull_in_outputs, told_of_pull_in};
 use super::{Request, fitted};
@@ -108,11 +108,11 @@ fn swinging(compiled: &Compiled, count: usize, voltages: &PortVoltages) -> Resul
     let own = worst(found.errors.iter().copied());
     let sure = own.is_some_and(|error| error <= counted::SAFETY * compiled.options.tol);
     let loaded = about_equilibrium(compiled, voltages);
+    let moved = if loaded { equilibrium::judged(compiled, voltages)?.1 } else { Some(0.0) };
     let (own, sure) = match own {
-        Some(_) if sure || !loaded => (own, sure),
+        Some(_) if !loaded || (sure && is_carried(compiled, &found, moved)) => (own, sure),
         _ => doubled(compiled, &found, count, voltages)?,
     };
-    let moved = if loaded { equilibrium::judged(compiled, voltages)?.1 } else { Some(0.0) };
     let estimated_error = moved.zip(own).map(|(a, b)| a.max(b));
     let holds = all && sure && within(compiled, moved);
     let warnings = found.warnings.clone();

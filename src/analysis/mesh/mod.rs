@@ -22,6 +22,7 @@ mod in_band;
 mod meshed;
 mod path;
 mod pull_in;
+mod unasked;
 mod warnings;
 mod yielded;
 
@@ -44,6 +45,7 @@ use pull_in::for_pull_in;
 pub use pull_in::pull_in_fitted;
 use warnings::{of_pieces, of_stress};
 
+pub use unasked::unasked;
 pub(crate) use warnings::WARNING;
 pub use warnings::{beyond, warnings};
 pub use yielded::static_backbent;

@@ -8,7 +8,7 @@ use super::super::gap_pieces::OF_DEFLECTION;
 use super::super::linear_stress::left_out;
 use super::super::statics::operating_point;
 use super::super::{AnalysisError, PortVoltages, Watch};
-use super::equilibrium::{SMALL, size};
+use super::equilibrium::{ROUNDING, SMALL, size};
 use super::meshed::{chosen, meshed, on};
 use super::warnings::{of_share_in_pieces, of_stress};
 use crate::compile::Compiled;
@@ -111,9 +111,11 @@ impl Search<'_, '_> {
         let output =
             |value: f64, largest: f64| Output { value, scale: value.abs().max(SMALL * largest).max(f64::MIN_POSITIVE) };
         let none = Output { value: f64::NAN, scale: 1.0 };
-        let moved = found.last.iter().map(|(_, m)| m.x.hypot(m.y)).fold(0.0, f64::max);
+        // no less than what rounding leaves of the mechanism: a path may end at rest
+        let size = size(self.compiled);
+        let moved = found.last.iter().map(|(_, m)| m.x.hypot(m.y)).fold(ROUNDING * size, f64::max);
         // what turns the size of the mechanism by what it moves
-        let turned = found.last.iter().map(|(_, m)| m.rz.abs()).fold(moved / size(self.compiled), f64::max);
+        let turned = found.last.iter().map(|(_, m)| m.rz.abs()).fold(moved / size, f64::max);
         let of_unit = |unit: &str| {
             let of = found.signals.iter().filter(|s| s.1 == unit).flat_map(|s| &s.2);
             let least = match unit {
@@ -169,7 +171,14 @@ fn left_out_at_end(fitted: &Compiled, request: &ContinuationRequest<'_>) -> Opti
             share(fitted, &volts)
         }
         Growing::Parameter(last) => share(meshed(last, &fitted.order.segments).ok()?.as_ref(), &volts),
-        // in proportion to the loads
-        Growing::Loads => share(fitted, &volts).map(|share| share * request.to.abs().max(request.from.abs())),
+        Growing::Loads => {
+            let most = if request.to.abs() > request.from.abs() { request.to } else { request.from };
+            let mut at_end = fitted.clone();
+            for load in &mut at_end.parts.system.loads {
+                load.force *= most;
+                load.moment *= most;
+            }
+            share(&at_end, &volts)
+        }
     }
 }

@@ -1,8 +1,8 @@
 //! What fitting a model to a request warns of.
 
-use super::super::contact_range::comb_beyond;
+use super::super::contact_range::comb_beyond_told;
 use super::super::gap_pieces;
-use super::super::statics::OperatingPoint;
+use super::super::statics::{OperatingPoint, too_hot};
 use crate::compile::Compiled;
 use crate::netlist::Diagnostic;
 
@@ -14,6 +14,8 @@ const PIECES: &str = "W042";
 const STRESS: &str = "W041";
 /// Code of the warning that the fingers of a comb go through its other side.
 const FINGERS: &str = "W024";
+/// Code of the warning that nothing is solid at a temperature.
+const HEAT: &str = "W037";
 
 /// What fitting a model to a request warns of, as sentences for who has no other way to see them.
 pub fn warnings(fitted: &Compiled) -> impl Iterator<Item = String> {
@@ -21,7 +23,7 @@ pub fn warnings(fitted: &Compiled) -> impl Iterator<Item = String> {
         .warnings
         .items
         .iter()
-        .filter(|d| [WARNING, STRESS, PIECES, FINGERS].contains(&d.code.as_str()))
+        .filter(|d| [WARNING, STRESS, PIECES, FINGERS, HEAT].contains(&d.code.as_str()))
         .map(|d| d.message.clone())
 }
 
@@ -62,13 +64,14 @@ pub(super) fn of_pieces(compiled: &Compiled, points: &[(OperatingPoint, f64)]) -
 
 /// Where the fingers of a comb go through its other side at an equilibrium.
 pub(super) fn of_fingers(compiled: &Compiled, point: &OperatingPoint) -> Option<Diagnostic> {
-    let (name, [way, room]) = comb_beyond(compiled, &point.q)?;
-    let message = format!(
-        "the comb `{name}` closes by {:.3} µm, and its fingers have {:.3} µm to the other side: nothing stops them there",
-        1e6 * way,
-        1e6 * room
-    );
+    let message = comb_beyond_told(compiled, &point.q)?;
     Some(Diagnostic::warning(FINGERS, message, "draw the `stop2d` that holds the part, or longer fingers"))
+}
+
+/// Where current makes a beam hotter than any solid bears.
+pub(super) fn of_heat(compiled: &Compiled, point: &OperatingPoint) -> Option<Diagnostic> {
+    let message = too_hot(compiled, point)?;
+    Some(Diagnostic::warning(HEAT, message, "volts, not millivolts; `thermcond` in W/m/K, `sheetresistance` in Ω"))
 }
 
 /// The same where the gap that leaves out most is known, and how far it may be off.

@@ -5,8 +5,9 @@ mod fields;
 
 use super::{Line, Lines, ProcessLine};
 use crate::sets::Sets;
-use crate::structure::{Beam, BeamGap, NodeId, Structure};
+use crate::structure::{Beam, BeamGap, Mass, NodeId, Structure};
 use std::collections::{HashMap, HashSet};
+use std::f64::consts::TAU;
 
 /// Parts that no line stands for.
 pub(crate) type Left = Vec<String>;
@@ -149,7 +150,13 @@ impl<'a> OfStructure<'a> {
         if let Some(heater) = &beam.heater {
             model = "beam2det";
             let conductivity = heater.conductance * beam.length / (beam.width * beam.thickness);
-            parameters.extend([("R", heater.resistance), ("thermcond", conductivity), ("tau", heater.time_constant)]);
+            parameters.extend([("R", heater.resistance), ("thermcond", conductivity)]);
+            let mass = beam.material.density * beam.length * beam.width * beam.thickness;
+            parameters.push(if heater.capacity > 0.0 && mass > 0.0 {
+                ("specificheat", heater.capacity / mass)
+            } else {
+                ("tau", heater.time_constant)
+            });
             if let Some(strength) = self.structure.yields.iter().find(|y| y.beam == index) {
                 parameters.extend([("yieldstress", strength.stress), ("softening", strength.softening)]);
             }
@@ -164,26 +171,7 @@ impl<'a> OfStructure<'a> {
     /// Plates whose mass is that of a layer, else lumped masses with the drag beside them.
     fn plates(&mut self) {
         for mass in &self.structure.masses {
-            let [l, w, angle] = mass.outline;
-            if l > 0.0 && w > 0.0 && mass.mass > 0.0 {
-                let film = mass.drag[0] / (l * w);
-                let thickness = self.structure.beams.first().map_or(2e-6, |b| b.thickness);
-                let known = self.structure.beams.iter().find(|b| {
-                    let m = &b.material;
-                    let own = (m.density * b.thickness * l * w - mass.mass).abs() <= 1e-12 * mass.mass;
-                    own && (m.viscosity / m.fluid - film).abs() <= 1e-12 * film
-                });
-                let process = match known {
-                    Some(beam) => self.process_of(beam),
-                    None => {
-                        let mut entries = vec![("density", mass.mass / (l * w * thickness)), ("h", thickness)];
-                        if film > 0.0 {
-                            entries.extend([("viscosity", film * thickness), ("fluid", thickness)]);
-                        }
-                        self.process(&entries)
-                    }
-                };
-                self.push(&mass.name, "plate2d", &process, &[mass.node], &[("l", l), ("w", w), ("oz", angle)]);
+            if self.outlined(mass) {
                 continue;
             }
             let mut parameters = vec![("m", mass.mass)];
@@ -193,6 +181,57 @@ impl<'a> OfStructure<'a> {
             let drag = ["b", "brz"].into_iter().zip(mass.drag);
             parameters.extend(drag.filter(|(_, value)| *value != 0.0));
             self.push(&mass.name, "mass2d", "*", &[mass.node], &parameters);
+        }
+    }
+
+    /// A rigid body as it is drawn: a plate, or one of another outline with the same sides; false where neither is what it is.
+    fn outlined(&mut self, mass: &Mass) -> bool {
+        let [l, w, angle] = mass.outline;
+        if !(l > 0.0 && w > 0.0 && mass.mass > 0.0) {
+            return false;
+        }
+        let sides = [("l", l), ("w", w), ("oz", angle)];
+        let own = mass.inertia / mass.mass;
+        let turned = |own: f64| (mass.drag[1] - own * mass.drag[0]).abs() <= 1e-9 * own * mass.drag[0];
+        let polar = (l * l + w * w) / 12.0;
+        if (own - polar).abs() <= 1e-9 * polar && turned(polar) {
+            let process = self.process_of_body(mass, l * w);
+            self.push(&mass.name, "plate2d", &process, &[mass.node], &sides);
+            return true;
+        }
+        if !(own > 0.0 && turned(own)) {
+            return false;
+        }
+        // no body of an area has a smaller moment than a disc: its own area, where a layer tells it
+        let disc = TAU * own;
+        let of_layer = |b: &Beam| mass.mass / (b.material.density * b.thickness);
+        let areas = self.structure.beams.iter().filter(|b| b.material.density > 0.0).map(of_layer);
+        let known = areas.filter(|area| *area <= disc * (1.0 + 1e-12)).max_by(f64::total_cmp);
+        let area = known.unwrap_or_else(|| (l * w).min(disc * (1.0 - 1e-9)));
+        let process = self.process_of_body(mass, area);
+        let outline = [("A", area), ("Ip", own * area)].into_iter().chain(sides).collect::<Vec<_>>();
+        self.push(&mass.name, "body2d", &process, &[mass.node], &outline);
+        true
+    }
+
+    /// The layer of a body of this area: that of a beam, or one that makes it as heavy and as damped as it is.
+    fn process_of_body(&mut self, mass: &Mass, area: f64) -> String {
+        let film = mass.drag[0] / area;
+        let thickness = self.structure.beams.first().map_or(2e-6, |b| b.thickness);
+        let known = self.structure.beams.iter().find(|b| {
+            let m = &b.material;
+            let own = (m.density * b.thickness * area - mass.mass).abs() <= 1e-12 * mass.mass;
+            own && (m.viscosity / m.fluid - film).abs() <= 1e-12 * film
+        });
+        match known {
+            Some(beam) => self.process_of(beam),
+            None => {
+                let mut entries = vec![("density", mass.mass / (area * thickness)), ("h", thickness)];
+                if film > 0.0 {
+                    entries.extend([("viscosity", film * thickness), ("fluid", thickness)]);
+                }
+                self.process(&entries)
+            }
         }
     }
 
@@ -237,7 +276,9 @@ impl<'a> OfStructure<'a> {
                 [false, false, true] => "slider",
                 [false, true, true] => "guide2d",
                 _ => {
-                    self.left.push(format!("the support `{}`, which holds {:?}", support.name, support.held));
+                    let names = ["x", "y", "rotation"].into_iter().zip(support.held);
+                    let held: Vec<&str> = names.filter(|(_, held)| *held).map(|(name, _)| name).collect();
+                    self.left.push(format!("the support `{}`, which holds {} alone", support.name, held.join(" and ")));
                     continue;
                 }
             };

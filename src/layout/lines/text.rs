@@ -67,15 +67,34 @@ fn unclashed(lines: &Lines) -> Lines {
         // From the first dot on that follows an element's name, dots are no dots.
         let dots: Vec<usize> = name.match_indices('.').map(|(k, _)| k).collect();
         if let Some(at) = dots.into_iter().find(|at| names.contains(&name[..*at])) {
-            *name = format!("{}{}", &name[..at], name[at..].replace('.', "_"));
+            // what comes before that name stays a group
+            let own = name[..at].rfind('.').map_or(0, |k| k + 1);
+            *name = format!("{}{}", &name[..own], flat(&name[own..]));
         }
     }
     for line in &mut lines.elements {
         if line.name.matches('.').count() > DEEPEST {
-            line.name = line.name.replace('.', "_");
+            line.name = flat(&line.name);
         }
     }
     lines
+}
+
+/// A name without dots: `a.b` is `a_b`, and indices come together at the end, as `z(1).upper(2)` is `z_upper(1,2)`.
+fn flat(name: &str) -> String {
+    let (mut word, mut indices) = (String::new(), Vec::new());
+    for part in name.split('.') {
+        let (own, index) = match part.split_once('(') {
+            Some((own, index)) => (own, index.strip_suffix(')')),
+            None => (part, None),
+        };
+        if !word.is_empty() {
+            word.push('_');
+        }
+        word.push_str(own);
+        indices.extend(index);
+    }
+    if indices.is_empty() { word } else { format!("{word}({})", indices.join(",")) }
 }
 
 /// Nodes of instances that something outside the instance touches.

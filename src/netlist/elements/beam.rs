@@ -172,16 +172,13 @@ pub(super) fn beam2det(site: &mut Site<'_, '_>) -> Result<(), Reported> {
         return Err(site.missing("thermalexpansion"));
     }
     let mut beam = site.beam(site.name(), [a, b], width, Some(length))?;
-    let time_constant = match (site.number("tau")?, site.positive_if_any("specificheat")?) {
-        (Some(_), _) => site.non_negative_or("tau", 0.0)?,
-        // The slowest mode of a bar between two sinks: ρ c l² / (π² k).
-        (None, Some(heat)) => {
-            beam.material.density * heat * length * length / (std::f64::consts::PI.powi(2) * conductivity)
-        }
-        (None, None) => 0.0,
+    let (time_constant, capacity) = match (site.number("tau")?, site.positive_if_any("specificheat")?) {
+        (Some(_), _) => (site.non_negative_or("tau", 0.0)?, 0.0),
+        (None, heat) => (0.0, beam.material.density * heat.unwrap_or(0.0) * length * width * height),
     };
     beam.temperature = None;
-    beam.heater = Some(Heater { resistance, conductance: conductivity * width * height / length, time_constant });
+    beam.heater =
+        Some(Heater { resistance, conductance: conductivity * width * height / length, time_constant, capacity });
     site.drawing.electrical(&[a, b]);
     let ambient = beam.material.ambient_temperature;
     if let (Some(stress), Some(softening)) = (site.positive_if_any("yieldstress")?, site.positive_if_any("softening")?)

@@ -3,7 +3,7 @@
 use super::super::drawing::Fact;
 use super::super::sink::Reported;
 use super::arguments::Site;
-use crate::structure::Material;
+use crate::structure::{MOLTEN, Material};
 
 /// Poisson's ratio where a layer gives none [1]. Planar beams do not depend on it.
 const POISSON: f64 = 0.3;
@@ -15,8 +15,6 @@ const SOLID: std::ops::Range<f64> = 1e6..2e12;
 const DENSE: std::ops::Range<f64> = 10.0..25e3;
 /// Strain of a residual stress beyond which any solid has failed: that of whiskers and defect-free crystals [1].
 const STRONGEST: f64 = 0.1;
-/// Temperature at which all structural solids have melted; tungsten does at 3695 K [K].
-const MOLTEN: f64 = 4000.0;
 /// Permittivity of vacuum, as SUGAR's process files round it [F/m].
 pub(super) const VACUUM: f64 = 8.854e-12;
 

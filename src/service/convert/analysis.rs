@@ -3,6 +3,7 @@
 use super::{named, pairs};
 use crate::analysis::modes::ModesResult;
 use crate::analysis::pull_in::PullInResult;
+use crate::analysis::sensitivity::Sensitivity;
 use crate::analysis::statics::{NodeMotion, StaticResult};
 use crate::analysis::transient::{Counters, Event, TransientResult};
 use crate::service::proto;
@@ -91,7 +92,18 @@ pub fn modes_from_wire(wire: proto::ModesResponse) -> ModesResult {
     let mut errors: Vec<_> = errors.into_iter().map(|e| e.is_finite().then_some(e)).collect();
     errors.resize(frequencies_hz.len(), None);
     let unknowns = size(unknowns);
-    ModesResult { frequencies_hz, shapes, residuals, errors, estimated_error, unknowns, deflection_m, warnings }
+    let sensitivity = Sensitivity::default();
+    ModesResult {
+        frequencies_hz,
+        shapes,
+        residuals,
+        errors,
+        estimated_error,
+        unknowns,
+        deflection_m,
+        sensitivity,
+        warnings,
+    }
 }
 
 /// Pull-in as it travels.

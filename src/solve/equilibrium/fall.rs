@@ -48,8 +48,12 @@ impl Equilibrium {
             done.iterations += 1;
             system.tangent(q, &self.drive, &mut self.tangent, &mut self.residual);
             let least = LEAST_DAMPING * mean_ratio(system, &self.tangent);
+            if !least.is_finite() {
+                return Err(self.lost(system, s, done.iterations, q));
+            }
             let mut tried = 0;
             loop {
+                crate::budget::check();
                 self.add_damping(system, damping);
                 system.model.project_matrix(&mut self.tangent);
                 let stable = matches!(self.tangent.factor(&system.model.pattern), Ok(i) if i.negative == 0);
@@ -62,7 +66,8 @@ impl Equilibrium {
                         break;
                     }
                 }
-                if damping > 1e6 / LEAST_DAMPING * least.max(1e-300) {
+                // also where it is no number
+                if damping.is_nan() || damping > 1e6 / LEAST_DAMPING * least.max(1e-300) {
                     return Err(self.lost(system, s, done.iterations, q));
                 }
                 tried += 1;

@@ -98,6 +98,9 @@ fn measure(
 ) -> (Vec<f64>, Vec<f64>) {
     let mut rest = vec![Pose::zeros(); model.bodies.len()];
     let mut known: Option<(f64, BlockMatrix<f64, 3>)> = None;
+    // K + sM is positive for s beyond the most negative of them
+    let lowest = x.iter().map(|x| refined.quotient(x, &mut rest)).fold(0.0, f64::min);
+    let least = least.max(-2.0 * lowest);
     let one = |x: &Vec<Pose>| {
         let lambda = refined.quotient(x, &mut rest);
         let size = lambda.abs().max(least);

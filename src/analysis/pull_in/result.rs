@@ -1,0 +1,35 @@
+//! What a search for pull-in finds.
+
+use serde::Serialize;
+
+/// Where a gap closes and where it opens again.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PullInResult {
+    /// The port or netlist source whose voltage was swept.
+    pub port: String,
+    /// Voltage at which the open branch loses its stability on the way up, and a gap closes [V].
+    pub pull_in_v: f64,
+    /// Voltage at which the last of the closed gaps lets go on the way down [V]; none when it stays closed at 0 V, or when
+    /// nothing holds the part after pull-in.
+    pub release_v: Option<f64>,
+    /// False when nothing holds the part after pull-in: no gap closes on contact.
+    pub held: bool,
+    /// Largest estimated relative error by the mesh [1]; none without an estimate.
+    #[serde(skip)]
+    pub estimated_error: Option<f64>,
+    /// What the numbers do not say by themselves, as sentences.
+    #[serde(skip)]
+    pub warnings: Vec<String>,
+}
+
+impl PullInResult {
+    /// Why there is no release, and what else the voltages do not say, as sentences.
+    pub fn told(&self) -> Vec<String> {
+        let way = match (self.release_v, self.held) {
+            (Some(_), _) => None,
+            (None, true) => Some("no release: it stays closed".to_owned()),
+            (None, false) => Some("no release: nothing holds the part beyond pull-in".to_owned()),
+        };
+        way.into_iter().chain(self.warnings.iter().cloned()).collect()
+    }
+}

@@ -1,0 +1,145 @@
+//! Next to folds, past them, and where nothing moves: what is told beside the numbers.
+
+use super::{close, model, node};
+use bimorph::analysis::AnalysisError;
+use bimorph::analysis::continuation::{ContinuationRequest, Growing};
+use bimorph::analysis::mesh::{modes_fitted, path_fitted, pull_in_fitted, static_fitted, warnings};
+use bimorph::analysis::modes::modes;
+use bimorph::compile::{CompileOptions, Compiled, compile};
+use bimorph::netlist::{Bundle, Setting};
+use bimorph::solve::continuation::Branch;
+use std::path::Path;
+
+/// A beam of 200 × 2 µm between anchors, under the stress `s`, in two pieces that meet in [m].
+const BEAM: &str = "param s = 0\nparam F = 0\nanchor p1 [a] []\nbeam2d p1 [a m] [l=100u w=2u stress=s]\n\
+    beam2d p1 [m b] [l=100u w=2u stress=s]\nanchor p1 [b] []\n";
+
+fn stressed(more: &str, s: f64, options: &CompileOptions) -> Compiled {
+    let options = CompileOptions { set: vec![("s".into(), Setting::Number(s))], ..options.clone() };
+    model(&format!("{BEAM}{more}"), &options)
+}
+
+/// The frequency goes to zero as the fourth root of what is left of the voltage: the estimate beside it, or the tolerance, holds 2e-5 below
+/// pull-in too (17.8401 V; reference 48 segments a beam), where the deflection alone said 3.6e-4 of a frequency that was 4.6 % off.
+#[test]
+fn modes_next_to_pull_in() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/switch/switch.net");
+    let bundle = Bundle::read(&path, &[]).unwrap();
+    let at = |options: &CompileOptions| {
+        let compiled = compile(&bundle, options).unwrap();
+        let (fitted, found, _) = modes_fitted(&compiled, 1, &[("drive".into(), 17.8398)]).unwrap();
+        (found.frequencies_hz[0], fitted.order.estimated_error)
+    };
+    let (exact, _) = at(&CompileOptions { segments: Some(48), ..CompileOptions::default() });
+    for tol in [1e-2, 1e-3] {
+        let (found, told) = at(&CompileOptions { tol, ..CompileOptions::default() });
+        let off = (found / exact - 1.0).abs();
+        assert!(off <= told.unwrap().max(tol), "{tol}: {found} against {exact}, told {told:?}");
+    }
+}
+
+/// A part that is stressed and still by symmetry needs no finer mesh for what rounding makes of its displacements (1e-27 m), and nothing is
+/// off; its modes hold the tolerance against 48 segments a beam.
+#[test]
+fn rounding_needs_no_mesh() {
+    for s in [50e6, -3e6] {
+        let compiled = stressed("", s, &CompileOptions::default());
+        let (fitted, result, _) = static_fitted(&compiled, &[]).unwrap();
+        assert!(fitted.order.estimated_error.is_some_and(|e| e <= 1e-3), "{:?}", fitted.order.estimated_error);
+        assert!(result.unknowns < 60, "{}", result.unknowns);
+        assert_eq!(warnings(&fitted).count(), 0);
+        let (fitted, found, _) = modes_fitted(&compiled, 2, &[]).unwrap();
+        assert!(found.unknowns < 120 && warnings(&fitted).count() == 0, "{} {:?}", found.unknowns, fitted.order);
+        let fine = stressed("", s, &CompileOptions { segments: Some(48), ..CompileOptions::default() });
+        close(found.frequencies_hz[0], modes(&fine, 1, &[]).unwrap().frequencies_hz[0], 1e-3);
+    }
+}
+
+/// A path that ends where nothing moves any more is compared by what moves on its way: no mesh is refined for its end.
+#[test]
+fn a_path_that_ends_at_rest() {
+    let loaded = {
+        let options = CompileOptions { set: vec![("F".into(), Setting::Number(1e-6))], ..CompileOptions::default() };
+        model(&format!("{BEAM}f2d * [m] [F=F oz=pi/2]\n"), &options)
+    };
+    let request = ContinuationRequest {
+        growing: Growing::Loads,
+        from: 1.0,
+        to: 0.0,
+        voltages: Vec::new(),
+        signals: vec!["m.y".into()],
+        branch: Branch::Plus,
+        points: 500,
+    };
+    let (fitted, found) = path_fitted(&loaded, &request, &mut |_| true).unwrap();
+    assert!(fitted.order.estimated_error.is_some_and(|e| e <= 1e-3), "{:?}", fitted.order);
+    assert!(found.unknowns < 120, "{}", found.unknowns);
+}
+
+/// What a part has done before any voltage is told beside its pull-in: compressed by 80 MPa (critical: 54) it has buckled to one of two sides.
+#[test]
+fn pull_in_of_a_buckled_part_is_told() {
+    let plate =
+        "anchor * [e] []\nplategap2d * [m e] [A=2e-9 gap=3u oz=-pi/2]\neground * [e] []\ndrive port * [m e] []\n";
+    let told = |s: f64| {
+        let (_, found) = pull_in_fitted(&stressed(plate, s, &CompileOptions::default()), None, 200.0).unwrap();
+        found.told().join("; ")
+    };
+    assert!(told(-80e6).contains("snapped through or buckled"), "{}", told(-80e6));
+    assert!(!told(0.0).contains("buckled"), "{}", told(0.0));
+}
+
+/// A jump on a finer mesh is told although the first mesh did not make it: a column under 1.0012 of Euler's load (217.13 µN by
+/// π²EI/(4·L²) of its guided end).
+#[test]
+fn a_jump_on_a_finer_mesh_is_told() {
+    let text = "anchor p1 [a] []\nbeam2d p1 [a m] [l=100u w=2u]\nbeam2d p1 [m b] [l=100u w=2u]\nguide2d * [b] []\n\
+        f2d * [b] [F=217.4u oz=pi]\n";
+    let (_, result, _) = static_fitted(&model(text, &CompileOptions::default()), &[]).unwrap();
+    if node(&result, "m").y.abs() > 0.1e-6 {
+        assert!(result.jumped, "{:?}", node(&result, "m"));
+    }
+}
+
+/// Modes about an unstable equilibrium are those that grow, at 0 Hz, and the others: on any mesh, one or many.
+#[test]
+fn modes_of_a_buckled_part_as_drawn() {
+    for count in [1, 3, 6] {
+        let options = CompileOptions { linear: true, ..CompileOptions::default() };
+        let found = modes(&stressed("", -60e6, &options), count, &[]).unwrap();
+        assert_eq!(found.frequencies_hz[0], 0.0);
+        assert!(found.warnings.iter().any(|w| w.contains("unstable")), "{:?}", found.warnings);
+    }
+}
+
+/// A linear model's share is that of the number it prints: a column under 40 µN and a thousandth of it from the side moves by 60.6 nm
+/// without the stress and by (S/F)·(tan kL/k − L) = 227.95 nm with it, 2.76 times as far off as what is printed.
+#[test]
+fn a_linear_model_tells_what_it_leaves_out() {
+    let text = "anchor p1 [a] []\nbeam2d p1 [a b] [l=100u w=2u]\nf2d * [b] [F=40u oz=pi]\nf2d * [b] [F=40n oz=pi/2]\n";
+    let options = CompileOptions { linear: true, ..CompileOptions::default() };
+    let (fitted, result, _) = static_fitted(&model(text, &options), &[]).unwrap();
+    let (l, f, s): (f64, f64, f64) = (100e-6, 40e-6, 40e-9);
+    let k = (f / (165e9 * 2e-6 * 8e-18 / 12.0)).sqrt();
+    let exact = s / f * ((k * l).tan() / k - l);
+    let share = exact / node(&result, "b").y - 1.0;
+    let told = warnings(&fitted).find(|w| w.contains("stress")).expect("a warning");
+    let told: f64 = told.rsplit(' ').next().unwrap().parse().unwrap();
+    close(told, share, 0.05);
+}
+
+/// A voltage that no circuit has, and one that is given twice, are refused by name; the largest that is taken ends too.
+#[test]
+fn voltages_are_bounded_and_given_once() {
+    let plate = "anchor p1 [e] []\nguide2d * [m] []\nplategap2d * [m e] [A=2e-9 gap=3u oz=-pi/2]\neground * [e] []\ndrive port * [m e] []\n";
+    let compiled = stressed(plate, 0.0, &CompileOptions::default());
+    let refused = |voltages: &[(&str, f64)]| {
+        let voltages: Vec<(String, f64)> = voltages.iter().map(|(n, v)| ((*n).to_owned(), *v)).collect();
+        static_fitted(&compiled, &voltages).map(|_| ()).unwrap_err()
+    };
+    for voltages in [&[("drive", 1e200)][..], &[("drive", 1.0), ("drive", 2.0)][..]] {
+        let error = refused(voltages);
+        assert!(matches!(&error, AnalysisError::BadRequest { what, .. } if what.contains("drive")), "{error}");
+    }
+    let _ = static_fitted(&compiled, &[("drive".into(), 1e9)]);
+}
