@@ -3,6 +3,7 @@
 use super::failure::Failure;
 use super::merge_error::{LAST, MergeError};
 use super::output::{check_folder, print};
+use super::part::{COLUMN, NoPart, Part};
 use bimorph::results::{atomic, csv::field};
 use clap::Args;
 use std::collections::BTreeMap;
@@ -11,8 +12,8 @@ use std::path::PathBuf;
 
 /// Put the tables of a sweep's shards together: the bytes of the sweep in one run.
 ///
-/// Rows come in grid order. A point that is in two tables, or in none of them up to the last that is there, is an error, and so are
-/// tables of different sweeps.
+/// Rows come in grid order. A point that is in two tables or in none is an error, and so are tables of different sweeps, which the
+/// column "part" of their rows tells: it is left out of the whole.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     bimorph sweep switch.net --param gap=1u:3u:201 --analysis pullin --shard 0/2 --out part0.csv\n  \
@@ -34,6 +35,14 @@ struct Row {
     fields: csv::StringRecord,
 }
 
+/// What tables have in common, as far as it is known.
+#[derive(Default)]
+struct Whole {
+    parameters: Vec<String>,
+    /// Of the first row, and the table it is in.
+    part: Option<(Part, usize)>,
+}
+
 impl Merge {
     pub(crate) fn run(&self) -> Result<(), Failure> {
         if let Some(out) = &self.out {
@@ -53,20 +62,31 @@ impl Merge {
 
 fn merged(parts: &[PathBuf]) -> Result<String, MergeError> {
     let mut heads: Vec<csv::StringRecord> = Vec::new();
-    let mut parameters = Vec::new();
+    let mut whole = Whole::default();
     let mut rows: BTreeMap<usize, Row> = BTreeMap::new();
     for (table, path) in parts.iter().enumerate() {
         let failed = |source| MergeError::Csv { path: path.clone(), source };
         let mut reader = csv::Reader::from_path(path).map_err(failed)?;
-        let head = reader.headers().map_err(failed)?.clone();
+        let mut head = reader.headers().map_err(failed)?.clone();
+        let of_part = head.iter().next_back() == Some(COLUMN);
+        if of_part {
+            head.truncate(head.len() - 1);
+        } else if parts.len() > 1 && parameters_of(&head).is_some() {
+            return Err(MergeError::NoPart { path: path.clone() });
+        }
         let own = parameters_of(&head).ok_or_else(|| MergeError::NoTable { path: path.clone() })?;
         if table == 0 {
-            parameters = own;
-        } else if own != parameters {
+            whole.parameters = own;
+        } else if own != whole.parameters {
             return Err(MergeError::Other { path: path.clone(), first: parts[0].clone() });
         }
         for record in reader.into_records() {
-            let fields = record.map_err(failed)?;
+            let mut fields = record.map_err(failed)?;
+            if of_part {
+                let part = fields.iter().next_back().unwrap_or_default().parse();
+                whole.take(part.map_err(|NoPart| MergeError::NoPart { path: path.clone() })?, table, parts)?;
+                fields.truncate(head.len());
+            }
             let number = fields.get(0).unwrap_or_default();
             let point =
                 number.parse().map_err(|_| MergeError::NoNumber { path: path.clone(), got: number.to_owned() })?;
@@ -76,12 +96,24 @@ fn merged(parts: &[PathBuf]) -> Result<String, MergeError> {
         }
         heads.push(head);
     }
-    let count = rows.last_key_value().map_or(0, |(last, _)| last.saturating_add(1));
+    let last = rows.last_key_value().map_or(0, |(last, _)| last.saturating_add(1));
+    let count = whole.part.map_or(last, |(part, _)| part.points.max(last));
     if rows.len() < count {
         let first = (0..count).find(|point| !rows.contains_key(point)).unwrap_or_default();
         return Err(MergeError::Missing { missing: count - rows.len(), first });
     }
-    Ok(written(&heads, parameters.len(), &rows))
+    Ok(written(&heads, whole.parameters.len(), &rows))
+}
+
+impl Whole {
+    /// A row of a table says of what it is a part.
+    fn take(&mut self, part: Part, table: usize, paths: &[PathBuf]) -> Result<(), MergeError> {
+        let (known, first) = self.part.get_or_insert_with(|| (part.clone(), table));
+        if part.is_with(known) {
+            return Ok(());
+        }
+        Err(MergeError::Other { path: paths[table].clone(), first: paths[*first].clone() })
+    }
 }
 
 /// Names of the parameters: the columns between "point" and the first with a unit.

@@ -1,5 +1,6 @@
 //! Why tables are not the shards of one sweep.
 
+use super::part::COLUMN;
 use std::path::PathBuf;
 use thiserror::Error;
 
@@ -17,7 +18,17 @@ pub(crate) enum MergeError {
         LAST.join(",")
     )]
     NoTable { path: PathBuf },
-    #[error("{} is of another sweep than {}: their parameters differ", path.display(), first.display())]
+    #[error(
+        "{} does not say of which sweep it is a part: `bimorph sweep --shard I/N` writes tables that do, in the column \"{}\"",
+        path.display(),
+        COLUMN
+    )]
+    NoPart { path: PathBuf },
+    #[error(
+        "{} is of another sweep than {}: the netlist or its name, the options, the parameters or the version of bimorph differ",
+        path.display(),
+        first.display()
+    )]
     Other { path: PathBuf, first: PathBuf },
     #[error("{}: \"{got}\" is no number of a point", path.display())]
     NoNumber { path: PathBuf, got: String },

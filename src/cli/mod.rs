@@ -26,6 +26,7 @@ mod model;
 mod modes;
 mod options;
 mod output;
+mod part;
 mod path;
 mod plot;
 mod progress;

@@ -5,6 +5,7 @@ use super::chance::Chance;
 use super::failure::Failure;
 use super::model::ModelArgs;
 use super::output::{check_folder, print};
+use super::part::Part;
 use super::{interrupt, progress, value};
 use bimorph::compile::CompileOptions;
 use bimorph::jobs::sweep::journal::{self, Journal, Kept};
@@ -13,7 +14,7 @@ use bimorph::jobs::sweep::{
 };
 use bimorph::netlist::Bundle;
 use bimorph::options::Value;
-use bimorph::options::analysis::{MODES_COUNT, PULL_IN_MAX};
+use bimorph::options::analysis::{MODES_COUNT, PULL_IN_MAX, TRAN_STOP};
 use bimorph::results::atomic;
 use bimorph::service::client::Client;
 use clap::{Args, ValueEnum};
@@ -25,7 +26,8 @@ use std::time::Duration;
 /// Run one analysis over a grid of parameter values, or over samples of parameters that vary, on all cores, here or on a server.
 ///
 /// The table is CSV with one row for each point, in grid order whatever the number of cores; a point without a result
-/// has its reason in the column "error". The shards of a sweep put together (`bimorph merge`) are the whole sweep.
+/// has its reason in the column "error". The shards of a sweep put together (`bimorph merge`) are the whole sweep; each of their rows says
+/// in a last column "part" of which sweep it is.
 ///
 /// With --out FILE.csv every point is kept in FILE.csv.journal as soon as it is done, until the table is written: after Ctrl-C, a kill or a
 /// full disk the same command with --resume goes on where it stopped, and the table has the bytes that one run would have.
@@ -140,8 +142,10 @@ impl Sweep {
         };
         bar.finish_and_clear();
         let (table, journal) = table?;
-        self.deliver(&table)?;
-        if let Some(journal) = journal {
+        let part = (spec.shard.count > 1).then(|| Part::of(&spec, &bundle, &options)).transpose()?;
+        let written = self.deliver(&table, part.as_ref())?;
+        // points that are in no table stay where they are
+        if let Some(journal) = journal.filter(|_| written) {
             journal.finish()?;
         }
         eprintln!("{}", summary(&table, spec.shard));
@@ -205,9 +209,7 @@ impl Sweep {
             Analysis::Pullin => SweepAnalysis::PullIn { port: self.source.clone(), max },
             Analysis::Tran => {
                 let stop = self.stop.unwrap_or_default();
-                if !(stop.is_finite() && stop > 0.0) {
-                    return Err(Failure::bad("--stop", "a positive time in seconds", stop.to_string()));
-                }
+                TRAN_STOP.check(&Value::Number(stop))?;
                 let outputs = value::names(&self.signals);
                 if outputs.is_empty() {
                     return Err(Failure::bad("--signals", "at least one signal, such as yoke.y", "none".to_owned()));
@@ -253,17 +255,19 @@ impl Sweep {
         Ok(())
     }
 
-    fn deliver(&self, table: &SweepTable) -> Result<(), Failure> {
-        let text = table.to_csv();
-        // A table in which no point has a result is no result: nothing is written.
-        if !table.rows.is_empty() && table.failed() == table.rows.len() {
-            return Ok(());
+    /// Writes the table, where it is one; whether it is.
+    fn deliver(&self, table: &SweepTable, part: Option<&Part>) -> Result<bool, Failure> {
+        // A table in which no point has a result is no result. One of a shard is: its reasons are rows of the whole.
+        if part.is_none() && !table.rows.is_empty() && table.failed() == table.rows.len() {
+            return Ok(false);
         }
+        let text = part.map_or_else(|| table.to_csv(), |part| table.to_csv_of_part(&part.to_string()));
         match &self.out {
             Some(path) => atomic::write(path, |out| out.write_all(text.as_bytes()))
-                .map_err(|source| Failure::Write { path: path.clone(), source }),
-            None => print(&text),
+                .map_err(|source| Failure::Write { path: path.clone(), source })?,
+            None => print(&text)?,
         }
+        Ok(true)
     }
 }
 

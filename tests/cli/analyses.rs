@@ -154,7 +154,11 @@ fn sweep() {
     let mut merged: Vec<String> = Vec::new();
     for shard in ["0/2", "1/2"] {
         let ran = bench.run(&format!("{words} --threads 1 --shard {shard}"));
-        merged.extend(ran.stdout.lines().skip(1).map(str::to_owned));
+        // the last column says of which sweep the row is a part
+        let row = |line: &str| line.rsplit_once(',').map(|(row, part)| (row.to_owned(), part.to_owned()));
+        let rows: Vec<_> = ran.stdout.lines().skip(1).filter_map(row).collect();
+        assert!(rows.iter().all(|(_, part)| part.starts_with(&format!("{shard} of 5 points of "))), "{rows:?}");
+        merged.extend(rows.into_iter().map(|(row, _)| row));
     }
     merged.sort();
     assert_eq!(merged, lines[1..]);

@@ -60,7 +60,12 @@ fn slips() {
         ("sweep c.net --vary w=normal:1u:1u --param w=1u,2u --samples 3", "twice"),
         ("sweep c.net --vary w=normal:1u:1u --samples 3 --correlate w,l=0.5", "vary"),
         ("sweep c.net --vary nosuch=normal:1u:1u --samples 3", "nosuch"),
+        (
+            "sweep c.net --vary w=normal:1u:1n --vary l=normal:1u:1n --samples 3 --correlate w,l=0.5 --correlate l,w=0.2",
+            "each pair once",
+        ),
         ("sweep c.net --param w=1u,2u --seed 3", "--vary"),
+        ("sweep c.net --param w=1u,2u --analysis tran --stop 1e300 --signals b.y", "1e9"),
         ("sweep c.net --param w=1u,2u --design sobol", "--vary"),
         ("merge x.csv", "no table of `bimorph sweep`"),
         ("merge cut.csv", "no table of `bimorph sweep`"),
@@ -81,16 +86,52 @@ fn shards_that_do_not_fit() {
         assert_eq!(bench.run(&format!("{words} --shard {k}/3 --out part{k}.csv")).status, 0);
     }
     assert_eq!(bench.run("sweep c.net --segments 1 --param w=1u,2u --signals b.y --out w.csv").status, 0);
+    for (name, other) in [
+        ("w1", words.replace("F=1u:2u:6", "w=1u:2u:6")),
+        ("tol1", format!("{words} --tol 1e-4")),
+        ("l1", format!("{words} --set l=101u")),
+        ("seven1", words.replace(":6", ":7")),
+    ] {
+        assert_eq!(bench.run(&format!("{other} --shard 1/3 --out {name}.csv")).status, 0);
+    }
     for (parts, said) in [
         ("part0.csv part2.csv", "2 points are in none of the tables, the first of them point 1"),
+        // the last points
+        ("part0.csv part1.csv", "2 points are in none of the tables, the first of them point 2"),
+        ("part0.csv", "4 points are in none"),
         ("part0.csv part1.csv part1.csv part2.csv", "point 1 is in part1.csv and in part1.csv"),
-        ("part0.csv w.csv", "another sweep"),
+        ("part0.csv w.csv part1.csv part2.csv", "w.csv does not say of which sweep it is a part"),
+        ("part0.csv w1.csv part2.csv", "w1.csv is of another sweep than part0.csv"),
+        ("part0.csv tol1.csv part2.csv", "tol1.csv is of another sweep than part0.csv"),
+        ("part0.csv l1.csv part2.csv", "l1.csv is of another sweep than part0.csv"),
+        ("part0.csv seven1.csv part2.csv", "seven1.csv is of another sweep than part0.csv"),
     ] {
         let ran = bench.run(&format!("merge {parts} --out whole.csv"));
         assert_eq!(ran.status, 1, "{parts}");
         assert!(ran.stderr.contains(said), "{parts}: {}", ran.stderr);
         assert!(!bench.path("whole.csv").exists());
     }
+}
+
+/// A shard in which no point has a result has a table all the same, in the place of an older one, and the status of a failure; put together
+/// it gives the reasons. A whole sweep without a result has none, and its points stay in the journal.
+#[test]
+fn a_shard_without_a_result() {
+    let bench = Bench::new(&[("c.net", CANTILEVER)]);
+    let words = "sweep c.net --segments 1 --param w=1u,-1u,2u,-2u --signals b.y";
+    let whole = bench.run(words);
+    assert_eq!(whole.status, 0, "{}", whole.stderr);
+    std::fs::write(bench.path("part1.csv"), "older").expect("written");
+    for (k, status) in [0, 1].into_iter().enumerate() {
+        let ran = bench.run(&format!("{words} --shard {k}/2 --out part{k}.csv"));
+        assert_eq!(ran.status, status, "{}", ran.stderr);
+        assert!(!bench.path(&format!("part{k}.csv.journal")).exists());
+    }
+    let merged = bench.run("merge part1.csv part0.csv");
+    assert_eq!((merged.status, merged.stdout.as_str()), (0, whole.stdout.as_str()), "{}", merged.stderr);
+    let none = bench.run("sweep c.net --segments 1 --param w=-1u,-2u --signals b.y --out none.csv");
+    assert_eq!(none.status, 1);
+    assert!(!bench.path("none.csv").exists() && bench.path("none.csv.journal").exists(), "{}", none.stderr);
 }
 
 /// A sweep that is killed in the middle, or interrupted, keeps what is done: the same command with --resume goes on, computes at most the

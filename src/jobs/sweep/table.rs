@@ -73,6 +73,15 @@ impl SweepTable {
     /// CSV (RFC 4180, LF): `point`, the parameters, the results as `name [unit]`, `estimated_error [1]`, `warning`, `error`.
     /// Numbers are the shortest text that reads back to the same bits.
     pub fn to_csv(&self) -> String {
+        self.csv(None)
+    }
+
+    /// The same with one more column at the end, `part`, which says in every row of which part of which sweep it is.
+    pub fn to_csv_of_part(&self, part: &str) -> String {
+        self.csv(Some(part))
+    }
+
+    fn csv(&self, part: Option<&str>) -> String {
         let mut out = String::from("point");
         for name in &self.parameters {
             field(&mut out, name);
@@ -80,7 +89,8 @@ impl SweepTable {
         for (name, unit) in self.results.iter().zip(&self.units) {
             field(&mut out, &format!("{name} [{unit}]"));
         }
-        out.push_str(",estimated_error [1],warning,error\n");
+        out.push_str(",estimated_error [1],warning,error");
+        out.push_str(if part.is_some() { ",part\n" } else { "\n" });
         for row in &self.rows {
             let _ = write!(out, "{}", row.point);
             for setting in &row.parameters {
@@ -102,6 +112,9 @@ impl SweepTable {
                     out.extend(std::iter::repeat_n(',', self.results.len() + 2));
                     field(&mut out, error.trim_end());
                 }
+            }
+            if let Some(part) = part {
+                field(&mut out, part);
             }
             out.push('\n');
         }
@@ -151,6 +164,9 @@ mod tests {
         let expected = "point,w,b.x [m],release [V],estimated_error [1],warning,error\n\
                         0,2e-6,1.5e-9,,2e-3,W040: off,\n3,\"a,b\",,,,,\"say \"\"no\"\"\"\n";
         assert_eq!(table.to_csv(), expected);
+        let of_part = "point,w,b.x [m],release [V],estimated_error [1],warning,error,part\n\
+                       0,2e-6,1.5e-9,,2e-3,W040: off,,0/3 of it\n3,\"a,b\",,,,,\"say \"\"no\"\"\",0/3 of it\n";
+        assert_eq!(table.to_csv_of_part("0/3 of it"), of_part);
         assert_eq!(table.failed(), 1);
     }
 }

@@ -1,0 +1,61 @@
+//! What the rows of a shard say of themselves, so that only the shards of one sweep are put together, and all of them.
+
+use bimorph::jobs::sweep::{Shard, SweepError, SweepSpec, journal};
+use bimorph::netlist::Bundle;
+use bimorph::options::CompileOptions;
+use std::fmt;
+use std::str::FromStr;
+
+/// The column that says it.
+pub(super) const COLUMN: &str = "part";
+
+/// A part of a sweep: `1/3 of 201 points of 0123456789abcdef0123456789abcdef`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Part {
+    shard: String,
+    /// Points of the whole.
+    pub(super) points: usize,
+    /// The name of the whole: the same for the same points and the same program.
+    sweep: String,
+}
+
+impl Part {
+    /// The part of a sweep that a specification asks for.
+    ///
+    /// # Errors
+    /// [`SweepError::BadSpec`] for a grid that is none.
+    pub(super) fn of(spec: &SweepSpec, bundle: &Bundle, options: &CompileOptions) -> Result<Self, SweepError> {
+        let whole = SweepSpec { shard: Shard::default(), ..spec.clone() };
+        let shard = format!("{}/{}", spec.shard.index, spec.shard.count);
+        Ok(Self { shard, points: whole.grid_points()?, sweep: journal::name(&whole, bundle, options) })
+    }
+
+    /// Whether both are of one sweep.
+    pub(super) fn is_with(&self, other: &Self) -> bool {
+        (self.points, &self.sweep) == (other.points, &other.sweep)
+    }
+}
+
+impl fmt::Display for Part {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} of {} points of {}", self.shard, self.points, self.sweep)
+    }
+}
+
+/// It is not written as a part is.
+pub(super) struct NoPart;
+
+impl FromStr for Part {
+    type Err = NoPart;
+
+    fn from_str(text: &str) -> Result<Self, NoPart> {
+        let mut words = text.split(' ');
+        let mut word = || words.next().ok_or(NoPart);
+        let (shard, of, points, name, of_sweep, sweep) = (word()?, word()?, word()?, word()?, word()?, word()?);
+        if (of, name, of_sweep, words.next()) != ("of", "points", "of", None) {
+            return Err(NoPart);
+        }
+        let points = points.parse().map_err(|_| NoPart)?;
+        Ok(Self { shard: shard.to_owned(), points, sweep: sweep.to_owned() })
+    }
+}
