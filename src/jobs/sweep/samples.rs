@@ -5,6 +5,7 @@ use super::distribution::{Distribution, Vary, normal_score};
 use super::error::{SweepError, bad};
 use crate::netlist::Setting;
 use nalgebra::DMatrix;
+use std::collections::HashSet;
 
 /// Parameters whose correlations are asked for.
 const CORRELATED_MOST: usize = 200;
@@ -77,6 +78,7 @@ fn factor(asked: &Sampling) -> Result<DMatrix<f64>, SweepError> {
         return Err(bad("correlations".into(), &expected, &n.to_string()));
     }
     let mut matrix = DMatrix::identity(n, n);
+    let mut seen = HashSet::with_capacity(asked.correlations.len());
     for (a, b, rho) in &asked.correlations {
         let what = || format!("correlation of \"{a}\" and \"{b}\"");
         let find = |name: &String| {
@@ -91,6 +93,9 @@ fn factor(asked: &Sampling) -> Result<DMatrix<f64>, SweepError> {
         }
         if i == j || rho.is_nan() || rho.abs() >= 1.0 {
             return Err(bad(what(), "two different parameters and a number between -1 and 1", &rho.to_string()));
+        }
+        if !seen.insert((i.min(j), i.max(j))) {
+            return Err(bad(what(), "each pair once", "it twice"));
         }
         (matrix[(i, j)], matrix[(j, i)]) = (*rho, *rho);
     }
@@ -153,6 +158,8 @@ mod tests {
             &[("a", "c", 0.5)],
             &[("a", "b", 1.0)],
             &[("a", "b", f64::NAN)],
+            &[("a", "b", 0.5), ("a", "b", 0.25)],
+            &[("a", "b", 0.5), ("b", "a", 0.5)],
             &[("a", "b", 0.9), ("b", "d", 0.9), ("a", "d", -0.9)],
         ] {
             assert!(with(pairs).is_err(), "{pairs:?}");
