@@ -196,6 +196,14 @@ pub fn unknowns(got: usize) {
     }
 }
 
+/// Stops here if so many modes of a model are beyond the budget. Its `unknowns` are asked for only where it could be.
+pub fn modes(count: usize, unknowns: impl FnOnce() -> usize) {
+    let allowance = HELD.with(|held| held.borrow().as_ref().map(|held| held.budget.0.allowance.clone()));
+    if let Some(Err(why)) = allowance.map(|allowance| allowance.modes(count, unknowns)) {
+        unwind(why);
+    }
+}
+
 fn unwind(why: Stopped) -> ! {
     resume_unwind(Box::new(Stop(why)))
 }
@@ -282,6 +290,9 @@ mod tests {
         let small = allowed(|a| a.unknowns = 9);
         assert_eq!(within(&small, || unknowns(9)), Ok(()));
         assert_eq!(within(&small, || unknowns(10)), Err(Stopped::Unknowns { most: 9, got: 10 }));
+        let few = allowed(|a| a.mode_work = 100);
+        assert_eq!(within(&few, || modes(5, || 4)), Ok(()));
+        assert_eq!(within(&few, || modes(5, || 5)), Err(Stopped::ModeWork { most: 100, got: 125 }));
         let late = allowed(|a| a.deadline = Some(Instant::now()));
         assert_eq!(within(&late, || ()), Err(Stopped::Late));
     }

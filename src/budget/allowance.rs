@@ -1,6 +1,6 @@
 //! What a computation may use.
 
-use super::Purse;
+use super::{Purse, Stopped};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -11,6 +11,8 @@ pub struct Allowance {
     pub bytes: usize,
     /// Mechanical unknowns of a model that it makes.
     pub unknowns: usize,
+    /// Unknowns times the square of the modes that are sought of a model.
+    pub mode_work: usize,
     /// Processor time of each of its threads; none: any.
     pub cpu: Option<Duration>,
     /// When it must have ended; none: any time.
@@ -21,11 +23,22 @@ pub struct Allowance {
 
 impl Default for Allowance {
     fn default() -> Self {
-        Self { bytes: usize::MAX, unknowns: usize::MAX, cpu: None, deadline: None, purse: None }
+        Self { bytes: usize::MAX, unknowns: usize::MAX, mode_work: usize::MAX, cpu: None, deadline: None, purse: None }
     }
 }
 
 impl Allowance {
+    /// Whether so many modes of a model may be sought. Its `unknowns` are asked for only where those of the largest would be too many.
+    pub(super) fn modes(&self, count: usize, unknowns: impl FnOnce() -> usize) -> Result<(), Stopped> {
+        let most = self.mode_work;
+        let work = |unknowns: usize| unknowns.saturating_mul(count.saturating_mul(count));
+        if most == usize::MAX || work(self.unknowns) <= most {
+            return Ok(());
+        }
+        let got = work(unknowns());
+        if got > most { Err(Stopped::ModeWork { most, got }) } else { Ok(()) }
+    }
+
     /// Whether processor time is looked at.
     pub(super) fn counts_cpu(&self) -> bool {
         self.cpu.is_some() || self.purse.is_some()

@@ -51,6 +51,14 @@ pub enum Stopped {
         /// What they have used.
         used: Duration,
     },
+    /// More modes of more unknowns than may be sought.
+    #[error("mode_work: at most {most} unknowns times modes squared, got {got}")]
+    ModeWork {
+        /// What it may be.
+        most: usize,
+        /// What it would be.
+        got: usize,
+    },
     /// A model with more unknowns than it may have.
     #[error("unknowns: at most {most}, got at least {got}")]
     Unknowns {

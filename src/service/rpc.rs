@@ -201,6 +201,10 @@ impl proto::bimorph_server::Bimorph for Calls {
             return Err(status::limit("sweep_points", limits.sweep_points, points));
         }
         count("outputs", request.spec.as_ref().map_or(0, sweeps_wire::outputs), limits)?;
+        let modes = request.spec.as_ref().map_or(0, sweeps_wire::modes);
+        if modes > limits.modes {
+            return Err(status::limit("modes", limits.modes, modes));
+        }
         let asked = Asked::by(&request.request_id).map_err(status::violation)?;
         let shared = Arc::clone(&self.0);
         let job = move || {

@@ -106,7 +106,13 @@ pub(super) fn of_client(allowance: Allowance) -> Allowance {
 
 /// What one computation may use.
 pub(super) fn allowance(limits: &Limits) -> Allowance {
-    Allowance { bytes: limits.memory, unknowns: limits.unknowns, cpu: Some(limits.cpu), deadline: None, purse: None }
+    Allowance {
+        bytes: limits.memory,
+        unknowns: limits.unknowns,
+        mode_work: limits.mode_work,
+        cpu: Some(limits.cpu),
+        ..Allowance::default()
+    }
 }
 
 /// Stops a computation that nobody waits for any more.

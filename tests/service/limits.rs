@@ -1,8 +1,11 @@
 //! Each limit is answered with RESOURCE_EXHAUSTED and its name; what was idle too long is forgotten.
 
-use super::running::{block_on, compiled, start, start_with, wire_bundle};
+use super::running::{DEADLINE, block_on, bundle, compiled, start, start_with, wire_bundle};
+use bimorph::compile::CompileOptions;
 use bimorph::device::local::LocalDevice;
 use bimorph::device::{Device, Mode, OpenRequest, Trial, TrialReply};
+use bimorph::jobs::sweep::{Shard, SweepAnalysis, SweepSpec};
+use bimorph::service::client::Client;
 use bimorph::service::limits::Limits;
 use bimorph::service::proto;
 use std::time::Duration;
@@ -57,8 +60,33 @@ fn limits_are_named() {
         let spec = wide.spec.as_mut().expect("a sweep");
         spec.analysis = Some(proto::sweep_spec::Analysis::Transient(asked));
         exhausted(&client.submit_sweep(wide).await.expect_err("too many"), "outputs");
+        let mut many = sweep(2);
+        let asked = proto::SweepModes { count: 4, ..Default::default() };
+        many.spec.as_mut().expect("a sweep").analysis = Some(proto::sweep_spec::Analysis::Modes(asked));
+        exhausted(&client.submit_sweep(many).await.expect_err("too many"), "modes");
         exhausted(&client.submit_sweep(sweep(2)).await.expect_err("too many"), "sweeps");
     });
+}
+
+/// A point of a sweep whose modes are more work than a single call may be has that for its error; one that is not has its frequencies.
+#[test]
+fn modes_of_sweeps_are_bounded_work() {
+    let spec = SweepSpec {
+        parameters: vec!["V=0,1".parse().expect("an axis")],
+        samples: None,
+        analysis: SweepAnalysis::Modes { count: 1, voltages: vec![] },
+        shard: Shard::default(),
+        threads: None,
+    };
+    let errors = |count, mode_work| {
+        let server = start("127.0.0.1:0", Limits { mode_work, ..Limits::default() });
+        let spec = SweepSpec { analysis: SweepAnalysis::Modes { count, voltages: vec![] }, ..spec.clone() };
+        let mut client = Client::connect(&server.address.uri(), DEADLINE).expect("connects");
+        let table = client.sweep(&spec, &bundle(), &CompileOptions::default(), &mut |_| true).expect("a table");
+        table.rows.iter().map(|row| row.values.as_ref().err().cloned().unwrap_or_default()).collect::<Vec<_>>()
+    };
+    assert_eq!(errors(1, 1), ["", ""], "the plate has one unknown");
+    assert_eq!(errors(2, 3), ["mode_work: at most 3 unknowns times modes squared, got 4"; 2]);
 }
 
 /// A SUGAR 3 netlist is a program: it is run only where the server was started with room for such.

@@ -136,7 +136,11 @@ fn solve(
     let said = |error: AnalysisError| error.to_string();
     let request = match &spec.analysis {
         SweepAnalysis::Static { voltages, .. } => Request::Static { voltages },
-        SweepAnalysis::Modes { count, voltages } => Request::Modes { count: *count, voltages },
+        SweepAnalysis::Modes { count, voltages } => {
+            // where it does not compile the point says so below
+            budget::modes(*count, || drawn.clone().compile().map_or(0, |compiled| compiled.unknowns()));
+            Request::Modes { count: *count, voltages }
+        }
         SweepAnalysis::PullIn { port, max } => Request::PullIn { port: port.as_deref(), max: *max },
         SweepAnalysis::Transient { .. } => return Err("a transient is no request for a mesh".to_owned()),
     };

@@ -1,10 +1,11 @@
 //! Sweeps: what to run, and the table.
 
 use super::model::{setting_from_wire, setting_to_wire};
-use super::{Violation, named, number, required, samples, voltages};
+use super::{Violation, named, number, options, required, samples, voltages};
 use crate::jobs::sweep::parse::linear;
 use crate::jobs::sweep::{Shard, SweepAnalysis, SweepParameter, SweepRow, SweepSpec, SweepTable};
-use crate::options::analysis::MODES_COUNT;
+use crate::options::analysis::{MODES_COUNT, PULL_IN_MAX, TRAN_STOP};
+use crate::options::{Described, Value};
 use crate::service::proto;
 use proto::sweep_parameter::Values;
 use proto::sweep_spec::Analysis;
@@ -51,6 +52,18 @@ pub fn outputs(spec: &proto::SweepSpec) -> usize {
     }
 }
 
+/// Modes that are asked for at each point.
+pub fn modes(spec: &proto::SweepSpec) -> usize {
+    match &spec.analysis {
+        Some(Analysis::Modes(asked)) => modes_of(asked),
+        _ => 0,
+    }
+}
+
+fn modes_of(asked: &proto::SweepModes) -> usize {
+    if asked.count == 0 { MODES_COUNT.count() } else { asked.count as usize }
+}
+
 /// Points of a grid as it came, before any axis is laid out; an axis without values counts as one.
 pub fn grid_points(spec: &proto::SweepSpec) -> usize {
     let values = |axis: &proto::SweepParameter| match &axis.values {
@@ -72,23 +85,28 @@ pub fn spec_from_wire(spec: Option<proto::SweepSpec>) -> Result<SweepSpec, Viola
     for (i, axis) in spec.parameters.into_iter().enumerate() {
         parameters.push(axis_from_wire(&format!("spec.parameters[{i}]"), axis)?);
     }
+    let within = |part: &str, about: &Described, value: Value| {
+        options::analysis(about, value)
+            .map_err(|refused| Violation { field: format!("spec.{part}.{}", refused.field), ..refused })
+    };
     let analysis = match required("spec.analysis", spec.analysis)? {
         Analysis::Static(s) => {
             SweepAnalysis::Static { outputs: s.outputs, voltages: voltages("spec.static.voltages", s.voltages)? }
         }
         Analysis::Modes(m) => {
-            let count = if m.count == 0 { MODES_COUNT.count() } else { m.count as usize };
+            let count = modes_of(&m);
+            within("modes", &MODES_COUNT, Value::Count(count))?;
             SweepAnalysis::Modes { count, voltages: voltages("spec.modes.voltages", m.voltages)? }
         }
-        Analysis::PullIn(p) => SweepAnalysis::PullIn {
-            port: (!p.port.is_empty()).then_some(p.port),
-            max: number("spec.pull_in.max_v", p.max_v, true)?,
-        },
-        Analysis::Transient(t) => SweepAnalysis::Transient {
-            stop: number("spec.transient.stop_s", t.stop_s, true)?,
-            outputs: t.outputs,
-            voltages: voltages("spec.transient.voltages", t.voltages)?,
-        },
+        Analysis::PullIn(p) => {
+            within("pull_in", &PULL_IN_MAX, Value::Number(p.max_v))?;
+            SweepAnalysis::PullIn { port: (!p.port.is_empty()).then_some(p.port), max: p.max_v }
+        }
+        Analysis::Transient(t) => {
+            within("transient", &TRAN_STOP, Value::Number(t.stop_s))?;
+            let voltages = voltages("spec.transient.voltages", t.voltages)?;
+            SweepAnalysis::Transient { stop: t.stop_s, outputs: t.outputs, voltages }
+        }
     };
     let shard = Shard { index: spec.shard as usize, count: spec.shards.max(1) as usize };
     let samples = spec.samples.map(samples::from_wire).transpose()?;
@@ -181,6 +199,24 @@ mod tests {
         assert_eq!(points(&[3, 4]), 12);
         assert_eq!(points(&[0, 4_000_000_000]), 4_000_000_000);
         assert_eq!(points(&[4_000_000_000; 600]), usize::MAX);
+    }
+
+    /// What a single call refuses is refused of a sweep, by its field.
+    #[test]
+    fn ranges_are_those_of_single_calls() {
+        let field = |analysis| {
+            let spec = proto::SweepSpec { analysis: Some(analysis), ..Default::default() };
+            spec_from_wire(Some(spec)).err().map(|violation| violation.field)
+        };
+        let pull_in = |max_v| field(Analysis::PullIn(proto::SweepPullIn { max_v, ..Default::default() }));
+        let transient = |stop_s| field(Analysis::Transient(proto::SweepTransient { stop_s, ..Default::default() }));
+        let modes = |count| field(Analysis::Modes(proto::SweepModes { count, ..Default::default() }));
+        for bad in [1e300, f64::INFINITY, f64::NAN, 0.0, -1.0] {
+            assert_eq!(pull_in(bad).as_deref(), Some("spec.pull_in.max_v"), "{bad}");
+            assert_eq!(transient(bad).as_deref(), Some("spec.transient.stop_s"), "{bad}");
+        }
+        assert_eq!(modes(4_000_000_000).as_deref(), Some("spec.modes.count"));
+        assert_eq!((pull_in(30.0), transient(1e-3), modes(0)), (None, None, None));
     }
 
     #[test]
