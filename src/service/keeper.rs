@@ -5,7 +5,7 @@ use super::proto;
 use super::store::Store;
 use crate::device::{Device, DeviceError, Token};
 use std::io;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// Keeps the states of one session.
 #[derive(Debug)]
@@ -16,6 +16,8 @@ pub(super) struct Keeper {
     sequence: u64,
     /// The last accepted state; 0: none yet.
     pub(super) accepted: u64,
+    /// For how long the session is kept without use [ms]; 0: as long as any.
+    pub(super) lease_ms: u64,
 }
 
 impl Keeper {
@@ -25,16 +27,16 @@ impl Keeper {
     /// What the system said, or the bound.
     pub(super) fn new(store: &Arc<Store>, id: &str, model: &str, source: &proto::CompileRequest) -> io::Result<Self> {
         store.begin(id, model, source)?;
-        Ok(Self::of(store, id, model, 0, 0))
+        Ok(Self::of(store, id, model, 0, 0, 0))
     }
 
     /// Of one that goes on; it sleeps until [`Store::wake`].
     pub(super) fn after(store: &Arc<Store>, id: &str, model: &str, kept: &Kept) -> Self {
-        Self::of(store, id, model, kept.sequence, kept.accepted)
+        Self::of(store, id, model, kept.sequence, kept.accepted, kept.lease_ms)
     }
 
-    fn of(store: &Arc<Store>, id: &str, model: &str, sequence: u64, accepted: u64) -> Self {
-        Self { store: Arc::clone(store), id: id.to_owned(), model: model.to_owned(), sequence, accepted }
+    fn of(store: &Arc<Store>, id: &str, model: &str, sequence: u64, accepted: u64, lease_ms: u64) -> Self {
+        Self { store: Arc::clone(store), id: id.to_owned(), model: model.to_owned(), sequence, accepted, lease_ms }
     }
 
     /// Keeps `sealed`, whose last accepted state is `accepted`. When this returns it is on the disk, or, where nobody waits
@@ -45,7 +47,7 @@ impl Keeper {
     pub(super) fn keep(&mut self, accepted: u64, sealed: &[u8]) -> io::Result<()> {
         let sequence = self.sequence + 1;
         let path = self.store.session(&self.id, &self.model, sequence % 2);
-        let bytes = Kept::write(sequence, accepted, sealed);
+        let bytes = Kept::write(sequence, accepted, self.lease_ms, sealed);
         self.store.counted(&path, bytes.len(), || {
             self.store.disk().write(&path, &bytes)?;
             // the name of a new file is kept by its folder
@@ -53,6 +55,17 @@ impl Keeper {
         })?;
         (self.sequence, self.accepted) = (sequence, accepted);
         Ok(())
+    }
+
+    /// Keeps for how long the session is kept without use [ms], beside its states as they are.
+    ///
+    /// # Errors
+    /// As [`Self::keep`]; what was asked for before holds on.
+    pub(super) fn lease(&mut self, lease_ms: u64) -> io::Result<()> {
+        let before = std::mem::replace(&mut self.lease_ms, lease_ms);
+        let kept = (before != lease_ms).then(|| self.store.load(&self.id, &self.model)).flatten();
+        let written = kept.map_or(Ok(()), |kept| self.keep(kept.accepted, &kept.sealed));
+        written.inspect_err(|_| self.lease_ms = before)
     }
 
     /// What is kept waits for somebody to ask for it.
@@ -64,6 +77,11 @@ impl Keeper {
     pub(super) fn forget(&self) {
         self.store.forget(&self.id);
     }
+}
+
+/// Removes what is kept of a session that is closed: whoever keeps at this moment is waited for, and then finds it closed.
+pub(super) fn forget(keeper: &Mutex<Keeper>) {
+    keeper.lock().unwrap_or_else(PoisonError::into_inner).forget();
 }
 
 /// A state as bytes, with those that a client may go back to: the one it was tried from, and the one accepted `before`. A client

@@ -3,9 +3,9 @@
 use super::snapshots::checksum;
 
 /// What a file begins with.
-pub(super) const HEAD: &[u8; 16] = b"bimorph states 1";
-/// Head, checksum, sequence number, token, length.
-const BEFORE: usize = 16 + 16 + 3 * 8;
+pub(super) const HEAD: &[u8; 16] = b"bimorph states 2";
+/// Head, checksum, sequence number, token, lease, length.
+const BEFORE: usize = 16 + 16 + 4 * 8;
 
 /// What is kept of a session.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -13,16 +13,18 @@ pub(super) struct Kept {
     pub(super) sequence: u64,
     /// The last accepted state; 0: none yet.
     pub(super) accepted: u64,
+    /// For how long it is kept without use [ms]; 0: as long as any.
+    pub(super) lease_ms: u64,
     /// States in their envelope.
     pub(super) sealed: Vec<u8>,
 }
 
 impl Kept {
-    pub(super) fn write(sequence: u64, accepted: u64, sealed: &[u8]) -> Vec<u8> {
+    pub(super) fn write(sequence: u64, accepted: u64, lease_ms: u64, sealed: &[u8]) -> Vec<u8> {
         let mut out = Vec::with_capacity(BEFORE + sealed.len());
         out.extend(HEAD);
         out.extend([0; 16]);
-        for word in [sequence, accepted, sealed.len() as u64] {
+        for word in [sequence, accepted, lease_ms, sealed.len() as u64] {
             out.extend(word.to_le_bytes());
         }
         out.extend(sealed);
@@ -35,9 +37,9 @@ impl Kept {
     pub(super) fn read(bytes: &[u8]) -> Option<Self> {
         let (head, rest) = bytes.split_at_checked(32)?;
         let word = |k: usize| rest.get(8 * k..8 * k + 8).and_then(|b| b.try_into().ok()).map(u64::from_le_bytes);
-        let [sequence, accepted, length] = [word(0)?, word(1)?, word(2)?];
-        let whole = rest.get(..usize::try_from(length).ok()?.checked_add(24)?)?;
+        let [sequence, accepted, lease_ms, length] = [word(0)?, word(1)?, word(2)?, word(3)?];
+        let whole = rest.get(..usize::try_from(length).ok()?.checked_add(BEFORE - 32)?)?;
         let good = head.starts_with(HEAD) && head[16..] == checksum(whole).to_le_bytes();
-        good.then(|| Self { sequence, accepted, sealed: whole[24..].to_vec() })
+        good.then(|| Self { sequence, accepted, lease_ms, sealed: whole[BEFORE - 32..].to_vec() })
     }
 }

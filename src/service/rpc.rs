@@ -155,7 +155,10 @@ impl proto::bimorph_server::Bimorph for Calls {
         let lease_s = if lease_s > longest { longest } else { lease_s };
         let lease_s = if none { limits.idle.as_secs_f64() } else { lease_s };
         let lease_s = convert::number("lease_s", lease_s, true).map_err(status::violation)?;
-        session.usage.lease((!none).then(|| Duration::from_secs_f64(lease_s)));
+        let millis = || u64::try_from(Duration::from_secs_f64(lease_s).as_millis()).unwrap_or(u64::MAX).max(1);
+        let millis = if none { 0 } else { millis() };
+        // it may wait for the disk
+        self.0.desk.run(move || session.lease(millis)).await?;
         Ok(Response::new(proto::KeepAliveResponse { lease_s }))
     }
 

@@ -3,7 +3,7 @@
 use super::accounts::Seat;
 use super::answerable::bounded;
 use super::convert::device as wire;
-use super::keeper::{Keeper, with_those_before};
+use super::keeper::{Keeper, forget, with_those_before};
 use super::limits::Limits;
 use super::models::Model;
 use super::question::Question;
@@ -246,6 +246,19 @@ impl Session {
         Ok(true)
     }
 
+    /// Keeps it for so long without use [ms], 0: as long as any; in the server after this one too. Waits for the disk.
+    pub(super) fn lease(&self, millis: u64) -> Result<(), Status> {
+        if let Some(keeper) = &self.keeper {
+            let mut keeper = keeper.lock().unwrap_or_else(PoisonError::into_inner);
+            if self.is_closed() {
+                return Err(status::not_found("session", &self.id));
+            }
+            keeper.lease(millis).map_err(|error| status::not_kept(&error))?;
+        }
+        self.usage.lease(millis);
+        Ok(())
+    }
+
     /// Keeps all states that are held, where states are kept.
     pub(super) fn keep_all(&self) -> Result<(), Status> {
         let device = self.lock()?;
@@ -327,11 +340,6 @@ impl Session {
             forget(keeper);
         }
     }
-}
-
-/// Whoever keeps at this moment is waited for, and then finds the session closed.
-fn forget(keeper: &Mutex<Keeper>) {
-    keeper.lock().unwrap_or_else(PoisonError::into_inner).forget();
 }
 
 /// A status as a fault on a stream that goes on.

@@ -296,6 +296,24 @@ mod tests {
         assert_eq!((kept.accepted, &*kept.sealed), (10, &b"x"[..]));
     }
 
+    /// A lease stands beside the states, now and with every one that comes later, until it is another.
+    #[test]
+    fn a_lease_is_kept_beside_the_states() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let store = Arc::new(store(folder.path(), 1 << 20).expect("opens"));
+        let mut keeper = keeper(&store);
+        let kept = || store.load(ID, MODEL).map(|kept| (kept.lease_ms, kept.accepted, kept.sealed));
+        keeper.keep(7, b"seven").expect("kept");
+        keeper.lease(5000).expect("kept");
+        assert_eq!(kept(), Some((5000, 7, b"seven".to_vec())));
+        keeper.keep(8, b"eight").expect("kept");
+        assert_eq!(kept(), Some((5000, 8, b"eight".to_vec())));
+        let mut later = Keeper::after(&store, ID, MODEL, &store.load(ID, MODEL).expect("kept"));
+        later.keep(9, b"nine").expect("kept");
+        later.lease(0).expect("kept");
+        assert_eq!(kept(), Some((0, 9, b"nine".to_vec())));
+    }
+
     #[test]
     fn one_server_a_folder_bounded_and_private() {
         use std::os::unix::fs::PermissionsExt;

@@ -51,10 +51,9 @@ impl Usage {
         self.streams.fetch_sub(1, Ordering::Relaxed);
     }
 
-    /// Keeps it for `lease` without use, or for as long as the server keeps any.
-    pub(super) fn lease(&self, lease: Option<Duration>) {
+    /// Keeps it for so long without use [ms]; 0: for as long as the server keeps any.
+    pub(super) fn lease(&self, millis: u64) {
         self.touch();
-        let millis = lease.map_or(0, |lease| u64::try_from(lease.as_millis()).unwrap_or(u64::MAX).max(1));
         self.lease_ms.store(millis, Ordering::Relaxed);
     }
 

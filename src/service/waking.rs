@@ -77,6 +77,8 @@ impl Shared {
             let keeper = Keeper::after(store, id, model.id(), &kept);
             let session = Session::new(id.to_owned(), Some(keeper), &model, self.make, &self.limits)?;
             session.restore(&kept.sealed, &self.limits)?;
+            let longest = u64::try_from(self.limits.stream_idle.as_millis()).unwrap_or(u64::MAX);
+            session.usage.lease(kept.lease_ms.min(longest));
             if let Some(woken) = store.wake(id, &asleep, || self.sessions.admit(session, &self.limits)) {
                 return woken;
             }

@@ -11,6 +11,7 @@ mod echo;
 mod endings;
 mod inside;
 mod kept;
+mod leases;
 mod limits;
 mod lines;
 mod listening;

@@ -180,13 +180,13 @@ def fnv(data: bytes) -> bytes:
 
 
 def of_another_version(data: bytes) -> bytes:
-    """A file of states as another version would have written it: head, checksum, three words, and the envelope, whose body begins
+    """A file of states as another version would have written it: head, checksum, four words, and the envelope, whose body begins
     with the version."""
-    words, sealed = data[32:56], data[56 : 56 + struct.unpack("<Q", data[48:56])[0]]
+    words, sealed = data[32:64], data[64 : 64 + struct.unpack("<Q", data[56:64])[0]]
     body = sealed[33:]
     body = bytes([5]) + b"9.9.9" + body[1 + body[0] :]
     sealed = sealed[:17] + fnv(body) + body
-    rest = words[:16] + struct.pack("<Q", len(sealed)) + sealed
+    rest = words[:24] + struct.pack("<Q", len(sealed)) + sealed
     return data[:16] + fnv(rest) + rest
 
 
