@@ -1,6 +1,7 @@
 //! How what a server is told is written: whole numbers, bytes, times, files, addresses.
 
 use super::address::Address;
+use std::marker::PhantomData;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -45,22 +46,47 @@ impl Written for Count {
     }
 }
 
-/// A whole number, or none.
+/// What may also be none, written as 0.
+pub trait MayBeNone: Written {
+    /// What is expected where it may.
+    const OR_NONE: &'static str;
+}
+
+impl MayBeNone for Count {
+    const OR_NONE: &'static str = "a whole number, at most 1e15; 0: any";
+}
+
+impl MayBeNone for Bytes {
+    const OR_NONE: &'static str = "bytes, as 0, 1000000, 64M or 2G";
+}
+
+impl MayBeNone for Time {
+    const OR_NONE: &'static str = "seconds, at most 1e9; 0: any";
+}
+
+/// One of those, or none.
 #[derive(Debug)]
-pub struct CountOrNone;
+pub struct OrNone<W>(PhantomData<W>);
 
-impl Written for CountOrNone {
-    type Held = usize;
-    const PLACE: &'static str = "N";
+impl<W: MayBeNone<Held: Default>> Written for OrNone<W> {
+    type Held = W::Held;
+    const PLACE: &'static str = W::PLACE;
 
-    fn read(text: &str) -> Result<usize, &'static str> {
-        if text == "0" { Ok(0) } else { Count::read(text).map_err(|_| "a whole number, at most 1e15; 0: any") }
+    fn read(text: &str) -> Result<W::Held, &'static str> {
+        if text == "0" { Ok(W::Held::default()) } else { W::read(text).map_err(|_| W::OR_NONE) }
     }
 
-    fn write(held: &usize) -> String {
-        held.to_string()
+    fn write(held: &W::Held) -> String {
+        W::write(held)
     }
 }
+
+/// A whole number, or none.
+pub type CountOrNone = OrNone<Count>;
+/// Bytes, or none.
+pub type BytesOrNone = OrNone<Bytes>;
+/// A time in seconds, or none.
+pub type TimeOrNone = OrNone<Time>;
 
 /// Bytes: a whole number above 0, with an optional k, M or G (times 1024).
 #[derive(Debug)]
@@ -88,23 +114,6 @@ impl Written for Bytes {
     }
 }
 
-/// Bytes, or none.
-#[derive(Debug)]
-pub struct BytesOrNone;
-
-impl Written for BytesOrNone {
-    type Held = usize;
-    const PLACE: &'static str = "BYTES";
-
-    fn read(text: &str) -> Result<usize, &'static str> {
-        if text == "0" { Ok(0) } else { Bytes::read(text).map_err(|_| "bytes, as 0, 1000000, 64M or 2G") }
-    }
-
-    fn write(held: &usize) -> String {
-        Bytes::write(held)
-    }
-}
-
 /// A time in seconds, above 0.
 #[derive(Debug)]
 pub struct Time;
@@ -120,23 +129,6 @@ impl Written for Time {
 
     fn write(held: &Duration) -> String {
         held.as_secs_f64().to_string()
-    }
-}
-
-/// A time in seconds, or none.
-#[derive(Debug)]
-pub struct TimeOrNone;
-
-impl Written for TimeOrNone {
-    type Held = Duration;
-    const PLACE: &'static str = "SECONDS";
-
-    fn read(text: &str) -> Result<Duration, &'static str> {
-        if text == "0" { Ok(Duration::ZERO) } else { Time::read(text).map_err(|_| "seconds, at most 1e9; 0: any") }
-    }
-
-    fn write(held: &Duration) -> String {
-        Time::write(held)
     }
 }
 
