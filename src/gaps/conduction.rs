@@ -102,14 +102,15 @@ impl Conduction {
             [h.capacity * (a / 3.0 + b / 6.0 + own), h.capacity * (a / 6.0 + b / 3.0 + own)]
         };
         let late = self.ends(heaters, heaters.iter().zip(watts).zip(&warm).map(stored));
-        let one = |(((h, watts), warm), late): (((&Heater, &f64), [f64; 2]), [f64; 2])| {
+        let one = |(h, watts): (&Heater, &f64), warm: [f64; 2], late: [f64; 2]| {
             let own = h.capacity / h.conductance;
             let rise = mean(h, *watts, warm);
             let delayed =
                 0.5 * (late[0] + late[1]) + own * ((warm[0] + warm[1]) / 24.0 + watts / (120.0 * h.conductance));
             if rise > 0.0 { delayed / rise } else { own / 10.0 }
         };
-        heaters.iter().zip(watts).zip(warm).zip(late).map(one).collect()
+        let ends = warm.into_iter().zip(late);
+        heaters.iter().zip(watts).zip(ends).map(|(heated, (warm, late))| one(heated, warm, late)).collect()
     }
 }
 
