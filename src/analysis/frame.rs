@@ -7,7 +7,6 @@
 mod motion;
 
 use super::modes::{ModesResult, normalized};
-use super::sensitivity::Sensitivity;
 use super::statics::{NodeMotion, StaticResult, electrical, source_vector};
 use super::{AnalysisError, BeamMotions, NodeMotions, PortVoltages};
 use crate::compile::Compiled;
@@ -105,7 +104,7 @@ pub fn frame_modes(
     let shape = |x: &Vec<Pose>| normalized(node_motions(compiled, frame, x), beam_motions(frame, x));
     let (shapes, curves) = found.shapes.iter().map(shape).unzip();
     let result = ModesResult {
-        sensitivity: Sensitivity::default(),
+        per_deflection: 0.0,
         estimated_error: None,
         frequencies_hz: found.lambda.iter().map(|&l| l.max(0.0).sqrt() / std::f64::consts::TAU).collect(),
         shapes,

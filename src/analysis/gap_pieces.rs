@@ -15,6 +15,9 @@ use std::collections::HashMap;
 /// a deflection near the fold is off by 1.8 times that share, and release by 2 times.
 pub(super) const OF_DEFLECTION: f64 = 2.0;
 
+/// Error of a pull-in voltage for that share: a third of it, found likewise.
+pub(super) const OF_PULL_IN: f64 = 1.0 / 3.0;
+
 /// What to say of a gap that may be off by so much, where that is more than the tolerance.
 pub(super) fn told(compiled: &Compiled, worst: Option<(String, f64)>) -> Option<String> {
     let tol = compiled.options.tol;

@@ -15,7 +15,7 @@ pub mod mesh;
 pub mod modes;
 pub mod pull_in;
 mod rotary_left_out;
-pub mod sensitivity;
+mod sensitivity;
 pub mod side_by_side;
 pub mod signal;
 mod stability;

@@ -2,7 +2,7 @@
 use super::contact_range::comb_beyond_told;
 use super::gap_pieces;
 use super::rotary_left_out;
-use super::sensitivity::{self, Sensitivity};
+use super::sensitivity::About;
 use super::signal::{Signal, View};
 use super::statics::{NodeMotion, operating_point, told_at, too_hot};
 use super::{AnalysisError, BeamMotions, NodeMotions, PortVoltages};
@@ -34,9 +34,9 @@ pub struct ModesResult {
     pub unknowns: usize,
     /// Largest displacement of a node at the equilibrium that the modes are about [m].
     pub deflection_m: f64,
-    /// How much faster the frequencies move than the equilibrium.
+    /// How much faster a frequency moves than the equilibrium, d ln f / d ln q of the worst [1].
     #[serde(skip)]
-    pub sensitivity: Sensitivity,
+    pub per_deflection: f64,
     /// What the numbers do not say by themselves.
     pub warnings: Vec<String>,
     /// Largest estimated relative error by the mesh, of every frequency and of the equilibrium that they are about [1]; none without an
@@ -109,7 +109,7 @@ fn shapeless(compiled: &Compiled, count: usize, voltages: &PortVoltages) -> Resu
         let point = operating_point(compiled, voltages)?;
         way = told_at(compiled, &point);
         let share = gap_pieces::left_out(compiled, &point.q, &point.volts);
-        in_pieces = share.map(|(name, share)| (name.to_owned(), gap_pieces::OF_DEFLECTION * share));
+        in_pieces = share.map(|(name, share)| (name.to_owned(), share));
         way.extend(comb_beyond_told(compiled, &point.q));
         way.extend(too_hot(compiled, &point));
         let (mut rise, mut driven) = (point.rise.clone(), system.electrics.drive());
@@ -151,9 +151,13 @@ fn shapeless(compiled: &Compiled, count: usize, voltages: &PortVoltages) -> Resu
         if loaded && !as_sugar { axial_forces(&compiled.structure, &compiled.parts, &q, &drive) } else { Vec::new() };
     let mut errors = estimated(compiled, &tangent, &forces, &found);
     let mut warnings = told(compiled, count, &q, (&found.lambda, found.rounding));
-    let about = (found.lambda[..count.min(found.lambda.len())].as_ref(), found.shapes.as_slice());
-    let sensitivity = sensitivity::of_modes(compiled, (&q, &drive), !as_sugar, about);
-    let in_pieces = in_pieces.map(|(name, share)| (name, share * sensitivity.field.max(1.0)));
+    let modes = (&found.lambda[..count.min(found.lambda.len())], found.shapes.as_slice());
+    let about = About { compiled, q: &q, drive: &drive, stressed: !as_sugar, modes };
+    let per_deflection = if loaded { about.to_deflection() } else { 0.0 };
+    let in_pieces = in_pieces.map(|(name, share)| {
+        let next_to_fold = gap_pieces::OF_PULL_IN * about.to_voltage();
+        (name, share * next_to_fold.max(gap_pieces::OF_DEFLECTION))
+    });
     warnings.extend(gap_pieces::told(compiled, in_pieces));
     warnings.extend(way.into_iter().map(|way| format!("the equilibrium that these modes are about: {way}")));
     errors.truncate(count);
@@ -169,7 +173,7 @@ fn shapeless(compiled: &Compiled, count: usize, voltages: &PortVoltages) -> Resu
         errors,
         unknowns: system.model.unknowns(),
         deflection_m: deflection(compiled, &q),
-        sensitivity,
+        per_deflection,
         warnings,
     };
     Ok((result, q, found.shapes))

@@ -1,81 +1,90 @@
-//! How much faster frequencies move than the equilibrium that they are about.
+//! How much faster frequencies move than the equilibrium that they are about, and than the voltages that hold it.
 //!
 //! Next to a fold the lowest frequency goes to zero as the fourth root of what is left of the voltage: an error of the deflection there is
 //! one of a hundred times that in the frequency. Seen by moving the equilibrium by a share of itself, mode by mode:
 //! ```text
 //! d ln f / d ln q = xᵀ·[K(q·(1 + δ)) − K(q·(1 − δ))]·x / (4·δ·λ),   xᵀMx = 1
 //! ```
-//! The shape stays as it is, by which the quotient changes in the second order only (Rayleigh).
+//! and by raising the voltages across gaps, with the equilibrium that goes along: dq = −K⁻¹·dr. The shape stays as it is, by which the
+//! quotient changes in the second order only (Rayleigh).
 
 use crate::compile::Compiled;
 use crate::gaps::Drive;
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
 
-/// δ: far above rounding, far below what a gap closes by.
+/// δ of the equilibrium: far above rounding, far below what a gap closes by.
 const STEP: f64 = 1e-5;
+/// δ of the voltages, to which the equilibrium next to a fold answers far more than evenly.
+const RAISED: f64 = 1e-8;
 /// A mode below this share of the highest one is one without stiffness, whose frequency is rounding.
 const FREE: f64 = 1e-9;
 
-/// d ln f / d ln q of the worst of modes, and what of it the voltages across gaps bring [1].
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Sensitivity {
-    /// Of everything.
-    pub all: f64,
-    /// Of the field.
-    pub field: f64,
+/// Modes about an equilibrium: `q` under `drive`, with the stiffness that stress adds where `stressed`, their λ and shapes.
+#[derive(Clone, Copy)]
+pub(super) struct About<'a> {
+    pub(super) compiled: &'a Compiled,
+    pub(super) q: &'a [Pose],
+    pub(super) drive: &'a Drive,
+    pub(super) stressed: bool,
+    pub(super) modes: (&'a [f64], &'a [Vec<Pose>]),
 }
 
-/// That of the modes `shapes` with their λ, about the equilibrium `q` under `drive`; `stressed`: with the stiffness that stress adds.
-pub(super) fn of_modes(
-    compiled: &Compiled,
-    (q, drive): (&[Pose], &Drive),
-    stressed: bool,
-    (lambda, shapes): (&[f64], &[Vec<Pose>]),
-) -> Sensitivity {
-    if q.iter().all(|q| *q == Pose::zeros()) {
-        return Sensitivity::default();
+impl About<'_> {
+    /// d ln f / d ln q of the worst mode [1].
+    pub(super) fn to_deflection(&self) -> f64 {
+        if self.q.iter().all(|q| *q == Pose::zeros()) {
+            return 0.0;
+        }
+        let moved = |factor: f64| self.quotients(&self.q.iter().map(|q| q * factor).collect::<Vec<_>>(), self.drive);
+        self.worst(&moved(1.0 + STEP), &moved(1.0 - STEP), 2.0 * STEP)
     }
-    let slopes = |drive: &Drive| -> Vec<f64> {
-        let [more, less] =
-            [1.0 + STEP, 1.0 - STEP].map(|factor| quotients(compiled, (q, drive), factor, stressed, shapes));
-        more.iter().zip(less).map(|(more, less)| (more - less) / (4.0 * STEP)).collect()
-    };
-    let highest = lambda.iter().fold(0.0, |m: f64, l| m.max(l.abs()));
-    let worst = |slopes: &[f64]| {
-        let swings = slopes.iter().zip(lambda).filter(|(_, lambda)| lambda.abs() > FREE * highest);
-        swings.map(|(slope, lambda)| (slope / lambda).abs()).fold(0.0, f64::max)
-    };
-    let all = slopes(drive);
-    let field = if drive.volts.iter().all(|v| *v == 0.0) {
-        0.0
-    } else {
-        let without = slopes(&Drive { volts: vec![0.0; drive.volts.len()], ..drive.clone() });
-        worst(&all.iter().zip(without).map(|(all, without)| all - without).collect::<Vec<_>>())
-    };
-    Sensitivity { all: worst(&all), field }
-}
 
-/// xᵀ·K(factor·q)·x of each shape.
-fn quotients(
-    compiled: &Compiled,
-    (q, drive): (&[Pose], &Drive),
-    factor: f64,
-    stressed: bool,
-    shapes: &[Vec<Pose>],
-) -> Vec<f64> {
-    let system = &compiled.parts.system;
-    let q: Vec<Pose> = q.iter().map(|q| q * factor).collect();
-    let mut tangent = BlockMatrix::new(&system.model.pattern);
-    let mut force = q.clone();
-    system.tangent(&q, drive, &mut tangent, &mut force);
-    if stressed {
-        system.add_stress_stiffness(&q, drive, &mut tangent);
+    /// d ln f / d ln V of the worst mode, V the voltages across gaps [1]; 0 where the tangent is singular.
+    pub(super) fn to_voltage(&self) -> f64 {
+        let system = &self.compiled.parts.system;
+        let (model, pattern) = (&system.model, &system.model.pattern);
+        let raised =
+            Drive { volts: self.drive.volts.iter().map(|v| v * (1.0 + RAISED)).collect(), ..self.drive.clone() };
+        let (mut tangent, mut before) = (BlockMatrix::new(pattern), self.q.to_vec());
+        system.tangent(self.q, self.drive, &mut tangent, &mut before);
+        let mut way = self.q.to_vec();
+        system.residual(self.q, &raised, &mut way);
+        way.iter_mut().zip(&before).for_each(|(after, before)| *after = before - *after);
+        model.project_matrix(&mut tangent);
+        model.project(&mut way);
+        if tangent.factor(pattern).is_err() {
+            return 0.0;
+        }
+        tangent.solve(pattern, &mut way);
+        let there: Vec<Pose> = self.q.iter().zip(&way).map(|(q, way)| q + way).collect();
+        self.worst(&self.quotients(&there, &raised), &self.quotients(self.q, self.drive), RAISED)
     }
-    let quotient = |x: &Vec<Pose>| -> f64 {
-        let mut product = vec![Pose::zeros(); x.len()];
-        tangent.multiply_add(&system.model.pattern, x, &mut product);
-        x.iter().zip(&product).map(|(x, y)| x.dot(y)).sum()
-    };
-    shapes.iter().map(quotient).collect()
+
+    /// The largest relative change of a frequency from `less` to `more`, over `apart`.
+    fn worst(&self, more: &[f64], less: &[f64], apart: f64) -> f64 {
+        let highest = self.modes.0.iter().fold(0.0, |m: f64, l| m.max(l.abs()));
+        let one = |((more, less), lambda): ((&f64, &f64), &f64)| {
+            let swings = lambda.abs() > FREE * highest;
+            if swings { ((more - less) / (2.0 * apart * lambda)).abs() } else { 0.0 }
+        };
+        more.iter().zip(less).zip(self.modes.0).map(one).fold(0.0, f64::max)
+    }
+
+    /// xᵀ·K·x of each shape at `q` under `drive`.
+    fn quotients(&self, q: &[Pose], drive: &Drive) -> Vec<f64> {
+        let system = &self.compiled.parts.system;
+        let mut tangent = BlockMatrix::new(&system.model.pattern);
+        let mut force = q.to_vec();
+        system.tangent(q, drive, &mut tangent, &mut force);
+        if self.stressed {
+            system.add_stress_stiffness(q, drive, &mut tangent);
+        }
+        let quotient = |x: &Vec<Pose>| -> f64 {
+            let mut product = vec![Pose::zeros(); x.len()];
+            tangent.multiply_add(&system.model.pattern, x, &mut product);
+            x.iter().zip(&product).map(|(x, y)| x.dot(y)).sum()
+        };
+        self.modes.1.iter().map(quotient).collect()
+    }
 }

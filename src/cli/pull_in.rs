@@ -1,7 +1,7 @@
 //! `bimorph pullin`: where the gap closes, and where it opens again.
 
 use super::failure::Failure;
-use super::model::{Context, ModelArgs, warn_of_mesh};
+use super::model::{Context, ModelArgs, warn_of, warn_of_mesh};
 use super::output::OutputArgs;
 use super::{progress, report, value};
 use bimorph::analysis::mesh::pull_in_fitted;
@@ -60,6 +60,7 @@ impl Pullin {
         busy.finish_and_clear();
         let (compiled, result) = result?;
         warn_of_mesh(&drawn, &compiled);
+        warn_of(&result.warnings);
         let none = if result.held { "none: it stays closed" } else { "none: nothing holds the part beyond pull-in" };
         let release = result.release_v.map_or(none.to_owned(), |v| quantity(v, "V"));
         let text = format!(
@@ -68,7 +69,11 @@ impl Pullin {
             quantity(result.pull_in_v, "V"),
             report::options(&compiled)
         );
-        let document = Document { result: &result, max_v: self.max, context: self.model.context(&compiled) };
+        let document = Document {
+            result: &result,
+            max_v: self.max,
+            context: self.model.context(&compiled).with(&result.warnings),
+        };
         let table = || {
             let mut table = Table::new(self.model.title(), "Pull-in");
             table.push_real("pull_in", "V", vec![result.pull_in_v])?;

@@ -87,7 +87,7 @@ pub(super) fn for_modes(
 
 /// Whether what the mesh leaves uncertain of the equilibrium moves no frequency beyond the tolerance: next to a fold it does.
 pub(super) fn is_carried(compiled: &Compiled, found: &ModesResult, still: Option<f64>) -> bool {
-    still.is_some_and(|error| error * found.sensitivity.all.max(1.0) <= doubling::SAFETY * compiled.options.tol)
+    still.is_some_and(|error| error * found.per_deflection.max(1.0) <= doubling::SAFETY * compiled.options.tol)
 }
 
 /// Largest of the errors; none where one of them is not known.

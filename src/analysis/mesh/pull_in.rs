@@ -1,7 +1,7 @@
 //! The mesh for pull-in: both voltages, compared with those of twice the segments.
 
 use super::super::AnalysisError;
-use super::super::gap_pieces::OF_DEFLECTION;
+use super::super::gap_pieces::{OF_DEFLECTION, OF_PULL_IN};
 use super::super::linear_stress::left_out;
 use super::super::pull_in::{PullInResult, pull_in};
 use super::super::statics::{OperatingPoint, operating_point};
@@ -11,9 +11,6 @@ use crate::compile::Compiled;
 use crate::netlist::Diagnostic;
 use crate::refine::doubling::{self, Output};
 use crate::refine::model_order::ModelOrder;
-
-/// Error of a pull-in voltage for that share: a third of it, found as [`OF_DEFLECTION`].
-const OF_PULL_IN: f64 = 1.0 / 3.0;
 
 /// Share of the pull-in voltage that stands for the fold itself, next to which nothing has an equilibrium for sure.
 const NEXT: f64 = 0.98;

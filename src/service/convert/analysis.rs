@@ -3,7 +3,6 @@
 use super::{named, pairs};
 use crate::analysis::modes::ModesResult;
 use crate::analysis::pull_in::PullInResult;
-use crate::analysis::sensitivity::Sensitivity;
 use crate::analysis::statics::{NodeMotion, StaticResult};
 use crate::analysis::transient::{Counters, Event, TransientResult};
 use crate::service::proto;
@@ -92,7 +91,6 @@ pub fn modes_from_wire(wire: proto::ModesResponse) -> ModesResult {
     let mut errors: Vec<_> = errors.into_iter().map(|e| e.is_finite().then_some(e)).collect();
     errors.resize(frequencies_hz.len(), None);
     let unknowns = size(unknowns);
-    let sensitivity = Sensitivity::default();
     ModesResult {
         frequencies_hz,
         shapes,
@@ -101,7 +99,7 @@ pub fn modes_from_wire(wire: proto::ModesResponse) -> ModesResult {
         estimated_error,
         unknowns,
         deflection_m,
-        sensitivity,
+        per_deflection: 0.0,
         warnings,
     }
 }
