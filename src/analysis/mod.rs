@@ -13,6 +13,7 @@ pub mod joint_transient;
 mod linear_stress;
 pub mod mesh;
 pub mod modes;
+pub(crate) mod modes_side_by_side;
 pub mod pull_in;
 mod rotary_left_out;
 mod sensitivity;
@@ -20,6 +21,7 @@ pub mod side_by_side;
 pub mod signal;
 mod stability;
 pub mod statics;
+pub(crate) mod statics_side_by_side;
 pub mod step_error;
 pub mod transient;
 

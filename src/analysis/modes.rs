@@ -45,7 +45,7 @@ pub struct ModesResult {
 }
 
 /// Modes beyond those asked for, which keep the last of these apart from what follows.
-const GUARDS: usize = 2;
+pub(super) const GUARDS: usize = 2;
 /// Deflection, as a share of the drawing's size, from which modes are said to be about another shape.
 const FAR: f64 = 0.02;
 /// Below this share of a mode in its reference nothing is said about its error.
@@ -149,8 +149,7 @@ fn shapeless(compiled: &Compiled, count: usize, voltages: &PortVoltages) -> Resu
     }
     let forces =
         if loaded && !as_sugar { axial_forces(&compiled.structure, &compiled.parts, &q, &drive) } else { Vec::new() };
-    let mut errors = estimated(compiled, &tangent, &forces, &found);
-    let mut warnings = told(compiled, count, &q, (&found.lambda, found.rounding));
+    let errors = estimated(compiled, &tangent, &forces, &found);
     let modes = (&found.lambda[..count.min(found.lambda.len())], found.shapes.as_slice());
     let about = About { compiled, q: &q, drive: &drive, stressed: !as_sugar, modes };
     let per_deflection = if loaded { about.to_deflection() } else { 0.0 };
@@ -158,25 +157,51 @@ fn shapeless(compiled: &Compiled, count: usize, voltages: &PortVoltages) -> Resu
         let next_to_fold = gap_pieces::OF_PULL_IN * about.to_voltage();
         (name, share * next_to_fold.max(gap_pieces::OF_DEFLECTION))
     });
-    warnings.extend(gap_pieces::told(compiled, in_pieces));
-    warnings.extend(way.into_iter().map(|way| format!("the equilibrium that these modes are about: {way}")));
+    let way = way.into_iter().map(|way| format!("the equilibrium that these modes are about: {way}"));
+    let warnings = gap_pieces::told(compiled, in_pieces).into_iter().chain(way).collect();
+    let result = judged(compiled, count, &q, (errors, warnings), &mut found);
+    Ok((ModesResult { per_deflection, ..result }, q, found.shapes))
+}
+
+/// What there is to tell of `count` modes about `q`, of which some more may have been found; those are taken away. With the estimated errors
+/// of them all, and what is to be warned of besides.
+fn judged(
+    compiled: &Compiled,
+    count: usize,
+    q: &[Pose],
+    (mut errors, more): (Vec<Option<f64>>, Vec<String>),
+    found: &mut Modes,
+) -> ModesResult {
+    let mut warnings = told(compiled, count, q, (&found.lambda, found.rounding));
+    warnings.extend(more);
     errors.truncate(count);
     found.lambda.truncate(count);
     found.shapes.truncate(count);
     found.residuals.truncate(count);
     warnings.extend(rotary_left_out::told(compiled, &found.shapes));
-    let result = ModesResult {
+    ModesResult {
         estimated_error: None,
         frequencies_hz: found.lambda.iter().map(|&l| l.max(0.0).sqrt() / std::f64::consts::TAU).collect(),
         shapes: Vec::new(),
-        residuals: found.residuals,
+        residuals: std::mem::take(&mut found.residuals),
         errors,
-        unknowns: system.model.unknowns(),
-        deflection_m: deflection(compiled, &q),
-        per_deflection,
+        unknowns: compiled.parts.system.model.unknowns(),
+        deflection_m: deflection(compiled, q),
+        per_deflection: 0.0,
         warnings,
-    };
-    Ok((result, q, found.shapes))
+    }
+}
+
+/// The result of modes that have been found about the drawn geometry, on which nothing acts, with their errors and likeness; without the
+/// motion of nodes.
+pub(super) fn unloaded(compiled: &Compiled, count: usize, mut found: Modes, errors: Vec<(f64, f64)>) -> ModesResult {
+    let q = vec![Pose::zeros(); compiled.parts.system.bodies()];
+    judged(compiled, count, &q, (errors.into_iter().map(sure).collect(), Vec::new()), &mut found)
+}
+
+/// The estimate of a mode that is in its reference; none where it says nothing.
+fn sure((error, like): (f64, f64)) -> Option<f64> {
+    (error.abs() < BELIEVED && like >= ALIKE).then_some(error)
 }
 
 /// Estimated errors of modes about an equilibrium with this tangent, where the beams carry these axial forces.
@@ -203,7 +228,6 @@ fn estimated(compiled: &Compiled, tangent: &BlockMatrix<f64, 3>, forces: &[f64],
     let modes = (lambda.as_slice(), found.shapes.as_slice());
     let factor = (&factor, shift);
     let compared = relative_of_loaded_modes(&compiled.structure, options, &compiled.parts, factor, forces, modes);
-    let sure = |(error, like): (f64, f64)| (error.abs() < BELIEVED && like >= ALIKE).then_some(error);
     compared.map_or(none, |errors| errors.into_iter().map(sure).collect())
 }
 

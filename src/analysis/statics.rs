@@ -209,10 +209,22 @@ fn settle(
     }
     within_contact_range(compiled, &q)?;
     let free_motions = solver.held().iter().map(|&p| SolveError::singular(system, p).to_string()).collect();
+    Ok(settled(compiled, q, sources, path, free_motions))
+}
+
+/// The equilibrium `q` with what it was found at, sources steady.
+pub(super) fn settled(
+    compiled: &Compiled,
+    q: Vec<Pose>,
+    sources: Vec<f64>,
+    path: Path,
+    free_motions: Vec<String>,
+) -> OperatingPoint {
+    let electrics = &compiled.parts.system.electrics;
     let mut drive = electrics.drive();
     let mut rise = vec![0.0; electrics.heating.heaters.len()];
     electrics.steady(&sources, &mut rise, &mut drive);
-    Ok(OperatingPoint { q, sources, rise, volts: drive.volts, path, free_motions })
+    OperatingPoint { q, sources, rise, volts: drive.volts, path, free_motions }
 }
 
 /// Largest voltage of a port [V], as of those that are searched.

@@ -22,6 +22,8 @@ pub struct Joints {
     pub joints: Vec<Joint>,
     /// Pairs of joints whose rotations are coupled.
     pub couplings: Vec<Coupling>,
+    /// The bodies of the beam at hand.
+    bodies: Vec<Point>,
 }
 
 /// Lays a beam: adds its inner bodies, masses and joints. Returns the equally spaced points along it, the drawn ends
@@ -48,13 +50,13 @@ pub fn lay(
     let name = Arc::from(beam.name.as_str());
     let last = cut.parts.len() - 1;
     let place = |at: f64| start + (end - start) * (at / bar.length);
-    let bodies: Vec<Point> = (0..=last)
-        .map(|k| match k {
-            0 => drawn[0].beyond(shift[0]),
-            k if k == last => drawn[1].beyond(shift[1]),
-            k => rigid.add_segment(BodyName::segment(&name, k), place(cut.parts[k].at)),
-        })
-        .collect();
+    let mut bodies = std::mem::take(&mut out.bodies);
+    bodies.clear();
+    bodies.extend((0..=last).map(|k| match k {
+        0 => drawn[0].beyond(shift[0]),
+        k if k == last => drawn[1].beyond(shift[1]),
+        k => rigid.add_segment(BodyName::segment(&name, k), place(cut.parts[k].at)),
+    }));
     let drag_per_mass = drag_per_mass(beam, options.undamped);
     for (part, &point) in cut.parts.iter().zip(&bodies) {
         if part.mass > 0.0 {
@@ -99,6 +101,7 @@ pub fn lay(
         })
         .collect();
     (points[0], points[segments]) = (drawn[0], drawn[1]);
+    out.bodies = bodies;
     points
 }
 

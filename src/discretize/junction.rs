@@ -42,6 +42,38 @@ struct Branch {
     width: f64,
 }
 
+/// Those of each node, one node after the other.
+struct Branches {
+    start: Vec<usize>,
+    all: Vec<Branch>,
+}
+
+impl Branches {
+    fn new(structure: &Structure) -> Self {
+        let ends = |beam: &Beam| [beam.a.0, beam.b.0];
+        let mut start = vec![0; structure.nodes.len() + 1];
+        for node in structure.beams.iter().flat_map(ends) {
+            start[node + 1] += 1;
+        }
+        for k in 0..structure.nodes.len() {
+            start[k + 1] += start[k];
+        }
+        let mut at = start.clone();
+        let mut all = vec![Branch { beam: 0, end: 0, angle: 0.0, width: 0.0 }; 2 * structure.beams.len()];
+        for (k, beam) in structure.beams.iter().enumerate() {
+            for (end, node) in ends(beam).into_iter().enumerate() {
+                all[at[node]] = Branch { beam: k, end, angle: beam.angle + PI * end as f64, width: beam.width };
+                at[node] += 1;
+            }
+        }
+        Self { start, all }
+    }
+
+    fn of(&self, node: usize) -> &[Branch] {
+        &self.all[self.start[node]..self.start[node + 1]]
+    }
+}
+
 /// What junctions do to a drawing.
 #[derive(Debug, Clone)]
 pub struct Ends {
@@ -61,17 +93,13 @@ pub fn find(structure: &Structure, rigid: &Assembly, kind: Junctions) -> Ends {
         return ends;
     }
     let held = rigid_nodes(structure, rigid);
-    let mut at: Vec<Vec<Branch>> = vec![Vec::new(); structure.nodes.len()];
-    for (k, beam) in structure.beams.iter().enumerate() {
-        for (end, node) in [beam.a.0, beam.b.0].into_iter().enumerate() {
-            at[node].push(Branch { beam: k, end, angle: beam.angle + PI * end as f64, width: beam.width });
-        }
-    }
+    let at = Branches::new(structure);
     let mut guided = vec![false; structure.nodes.len()];
     for support in structure.supports.iter().filter(|s| s.held[2]) {
         guided[support.node.0] = true;
     }
-    for (node, branches) in at.iter().enumerate() {
+    for node in 0..structure.nodes.len() {
+        let branches = at.of(node);
         if held[node] || (branches.len() == 1 && guided[node]) {
             for b in branches {
                 ends.beams[b.beam][b.end].add(&table::CLAMP, &structure.beams[b.beam], b.width, false);
@@ -80,7 +108,7 @@ pub fn find(structure: &Structure, rigid: &Assembly, kind: Junctions) -> Ends {
             meet(branches, &structure.beams, &mut ends.beams);
             let strips = branches.iter().map(|b| Strip { angle: b.angle, width: b.width, weight: 1.0 }).collect();
             ends.meetings.push((node, strips, branches.iter().map(|b| b.beam).collect()));
-        } else if let [b] = branches.as_slice() {
+        } else if let [b] = branches {
             ends.beams[b.beam][b.end].free = true;
         }
     }

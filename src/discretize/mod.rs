@@ -134,7 +134,7 @@ pub fn discretize_like(
         beams.push(beam::lay(drawn, segments[index], heater, options, &ends.beams[index], &mut rigid, &mut laid));
     }
     ends.correct_mass(structure, options.undamped, &mut rigid);
-    let beam::Joints { mut joints, couplings: mut coupled } = laid;
+    let beam::Joints { mut joints, couplings: mut coupled, .. } = laid;
     for mass in &structure.masses {
         rigid.add_plate(mass, options.undamped);
     }

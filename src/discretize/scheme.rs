@@ -138,10 +138,14 @@ impl Scheme {
             // where nothing has been decided, what bodies take
             Self::B | Self::E4 | Self::Auto | Self::Es => {
                 let pins = (0..n).map(|k| self.elastic(bar, n, k)).collect();
-                let parts = if self == Self::B { rods(bar, &middles(n, h)) } else { self.points(bar, n) };
-                Cut { parts, pins, couplings: Vec::new(), nodes: (0..=n).collect() }
+                Cut { parts: self.parts(bar, n), pins, couplings: Vec::new(), nodes: (0..=n).collect() }
             }
         }
+    }
+
+    /// [`Cut::parts`] of B, E4 or Es alone.
+    pub fn parts(self, bar: &Bar, n: usize) -> Vec<Part> {
+        if self == Self::B { rods(bar, &middles(n, bar.length / n as f64)) } else { self.points(bar, n) }
     }
 
     /// Segment `k` of `n` as a joint with three directions. With S the flexibility over (g, p), K = S⁻¹; the second-order
@@ -255,13 +259,8 @@ fn rods(bar: &Bar, places: &[f64]) -> Vec<Part> {
             let from = if k == 0 { 0.0 } else { places[k - 1] };
             let to = if k == count { bar.length } else { places[k] };
             let (length, middle) = (to - from, 0.5 * (from + to));
-            let at = if k == 0 {
-                0.0
-            } else if k == count {
-                bar.length
-            } else {
-                middle
-            };
+            // the outer ones hang on the ends
+            let at = if k == count { bar.length } else { middle * f64::from(u8::from(k > 0)) };
             let (mass, off) = (length * bar.line_mass, middle - at);
             let second = mass * (length * length / 12.0 + off * off + bar.rotary);
             Part { at, mass, first: mass * off, second }

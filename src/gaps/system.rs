@@ -111,6 +111,12 @@ impl System {
     /// `out += (∂r/∂drive)·change` at `drive`, held directions removed from the sum.
     pub fn add_drive_force(&self, q: &[Pose], drive: &Drive, change: &Drive, out: &mut [Pose]) {
         forces::add_rest_change(&self.model, q, &change.rest(), out);
+        self.add_body_drive_force(q, drive, change, out);
+        self.model.project(out);
+    }
+
+    /// The share of gaps, loads and inputs in that, held directions not removed.
+    pub fn add_body_drive_force(&self, q: &[Pose], drive: &Drive, change: &Drive, out: &mut [Pose]) {
         for ((gap, &volts), &dv) in self.gaps.iter().zip(&drive.volts).zip(&change.volts) {
             if dv != 0.0 {
                 gap.add_force(self.model.linear, q, -volts * dv, false, out);
@@ -120,7 +126,6 @@ impl System {
             self.add_loads(q, -change.load, out);
         }
         self.add_input_change(q, drive, change, out);
-        self.model.project(out);
     }
 
     /// Capacitance of a gap [F].

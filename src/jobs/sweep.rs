@@ -15,6 +15,7 @@ mod point;
 mod samples;
 mod spec;
 mod table;
+mod together;
 mod transient;
 
 pub use design::{DESIGNS, Design};
@@ -34,6 +35,7 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use together::Together;
 use transient::Transients;
 
 /// How far a sweep has come.
@@ -135,14 +137,26 @@ pub fn run_on(
             !stop.load(Ordering::Relaxed)
         })
     };
-    let in_time = matches!(spec.analysis, SweepAnalysis::Transient { .. });
+    let together = Together::new(spec, &source, options, &family);
+    let several = |numbers: &[usize]| -> Option<Vec<point::Outcome>> {
+        if stop.load(Ordering::Relaxed) {
+            return None;
+        }
+        together.run(numbers, budget.as_ref(), &|outcome| {
+            counted(outcome);
+            !stop.load(Ordering::Relaxed)
+        })
+    };
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(spec.threads.unwrap_or(0))
         .build()
         .map_err(|error| SweepError::Threads { reason: error.to_string() })?;
-    let outcomes: Option<Vec<Vec<_>>> = pool.install(|| match in_time {
-        true => numbers.par_chunks(transient::CHUNK).map(some).collect(),
-        false => numbers.par_iter().map(one).collect(),
+    let outcomes: Option<Vec<Vec<_>>> = pool.install(|| match spec.analysis {
+        SweepAnalysis::Transient { .. } => numbers.par_chunks(transient::CHUNK).map(some).collect(),
+        SweepAnalysis::Static { .. } | SweepAnalysis::Modes { .. } => {
+            numbers.par_chunks(together::CHUNK).map(several).collect()
+        }
+        SweepAnalysis::PullIn { .. } => numbers.par_iter().map(one).collect(),
     });
     if let Some(&most) = full.get() {
         return Err(SweepError::TooLarge { most });

@@ -6,7 +6,6 @@ use super::joint::{BodyId, Joint};
 use super::planar::{JointFrame, Symmetric};
 use nalgebra::{Matrix2, Matrix3, Vector2};
 use rustc_hash::{FxBuildHasher, FxHashMap};
-use std::hash::BuildHasher;
 
 /// What the joints that are cut from one beam share.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -148,11 +147,10 @@ impl Sections {
     }
 
     fn find(&mut self, section: Section) -> u32 {
-        let bits = section.bits();
-        let last = self.known.entry(FxBuildHasher.hash_one(bits)).or_insert(NONE);
+        let last = self.known.entry(section.hash()).or_insert(NONE);
         let mut at = *last;
         while at != NONE {
-            if self.all[at as usize].bits() == bits {
+            if self.all[at as usize].is(&section) {
                 return at;
             }
             at = self.before[at as usize];
@@ -164,19 +162,23 @@ impl Sections {
 }
 
 impl Section {
-    /// All of its numbers, bit by bit.
-    fn bits(&self) -> [u64; 16] {
-        let mut key = [0; 16];
-        let numbers = self.axis.iter().chain(&self.stiffness.0).chain(&self.second);
-        for (key, number) in key.iter_mut().zip(numbers) {
-            *key = number.to_bits();
-        }
-        let (group, length) = self.expansion.unwrap_or((usize::MAX, 0.0));
-        (key[11], key[12]) = (group as u64, length.to_bits());
-        for (key, locked) in key[13..].iter_mut().zip(self.locked) {
-            *key = u64::from(locked);
-        }
-        key
+    /// True for one that has the same bits.
+    fn is(&self, other: &Self) -> bool {
+        let same = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits());
+        let expansion = |e: Option<(usize, f64)>| e.map(|(group, length)| (group, length.to_bits()));
+        same(&self.stiffness.0, &other.stiffness.0)
+            && same(self.axis.as_slice(), other.axis.as_slice())
+            && same(&self.second, &other.second)
+            && expansion(self.expansion) == expansion(other.expansion)
+            && self.locked == other.locked
+    }
+
+    /// A number that tells most sections apart.
+    fn hash(&self) -> u64 {
+        let [uu, ug, _, gg, gp, pp] = self.stiffness.0;
+        let length = self.expansion.map_or(0.0, |(group, length)| length * (group + 1) as f64);
+        let mix = |hash: u64, x: f64| (hash.rotate_left(23) ^ x.to_bits()).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        [uu, ug, gg, gp, pp, self.axis.x, self.axis.y, length].into_iter().fold(0, mix)
     }
 }
 

@@ -17,11 +17,13 @@ pub(crate) const NAME_COPIES: usize = 4;
 pub(crate) struct Placement {
     /// The element's place in the text, for messages.
     pub(crate) span: Span,
-    /// Its nodes.
-    pub(crate) nodes: Vec<NodeId>,
-    /// Position of each node relative to the first [m], global axes.
-    pub(crate) offsets: Vec<[f64; 2]>,
+    /// Its first node in [`Drawing::placed`], and how many there are.
+    first: usize,
+    count: usize,
 }
+
+/// A node, and its position relative to the first of the element [m], global axes.
+pub(crate) type Placed = (NodeId, [f64; 2]);
 
 /// A beam that takes its length and direction from the positions of its nodes.
 #[derive(Debug, Clone)]
@@ -106,6 +108,8 @@ pub(crate) struct Upright {
 pub(crate) struct Drawing {
     pub(crate) structure: Structure,
     pub(crate) placements: Vec<Placement>,
+    /// The nodes of all of them.
+    placed: Vec<Placed>,
     pub(crate) unmeasured: Vec<Unmeasured>,
     /// Members that leave the plane, until the anchors are known.
     pub(crate) upright: Vec<Upright>,
@@ -135,7 +139,13 @@ impl Drawing {
 
     /// Records how nodes lie; they may be mere points of the drawing.
     pub(crate) fn lay(&mut self, span: Span, nodes: &[NodeId], offsets: &[[f64; 2]]) {
-        self.placements.push(Placement { span, nodes: nodes.to_vec(), offsets: offsets.to_vec() });
+        self.placements.push(Placement { span, first: self.placed.len(), count: nodes.len() });
+        self.placed.extend(nodes.iter().copied().zip(offsets.iter().copied()));
+    }
+
+    /// The nodes that an element places.
+    pub(crate) fn placed_by(&self, placement: &Placement) -> &[Placed] {
+        &self.placed[placement.first..placement.first + placement.count]
     }
 
     pub(crate) fn mechanical(&mut self, nodes: &[NodeId]) {

@@ -37,31 +37,41 @@ pub(crate) fn place(drawing: &mut Drawing, sink: &mut Sink) {
 
 /// Places every node; answers the nodes that started at the origin.
 fn walk(drawing: &mut Drawing) -> Vec<usize> {
-    let nodes = &mut drawing.structure.nodes;
-    let mut elements = vec![Vec::new(); nodes.len()];
+    let mut nodes = std::mem::take(&mut drawing.structure.nodes);
     let mut marks = vec![Mark::None; nodes.len()];
+    // the elements of each node, one node after the other
+    let mut start = vec![0; nodes.len() + 1];
+    let of = |placement| drawing.placed_by(placement);
+    for (node, _) in drawing.placements.iter().flat_map(of) {
+        start[node.0 + 1] += 1;
+        marks[node.0] = Mark::Unplaced;
+    }
+    for k in 0..nodes.len() {
+        start[k + 1] += start[k];
+    }
+    let (mut at, mut elements) = (start.clone(), vec![0; start[nodes.len()]]);
     for (index, placement) in drawing.placements.iter().enumerate() {
-        for node in &placement.nodes {
-            elements[node.0].push(index);
-            marks[node.0] = Mark::Unplaced;
+        for (node, _) in of(placement) {
+            elements[at[node.0]] = index;
+            at[node.0] += 1;
         }
     }
     let mut starts = Vec::new();
-    for start in 0..nodes.len() {
-        if marks[start] != Mark::Unplaced {
+    for first in 0..nodes.len() {
+        if marks[first] != Mark::Unplaced {
             continue;
         }
-        starts.push(start);
-        marks[start] = Mark::Waiting;
-        let mut stack = vec![start];
+        starts.push(first);
+        marks[first] = Mark::Waiting;
+        let mut stack = vec![first];
         while let Some(node) = stack.pop() {
             marks[node] = Mark::Done;
-            for &element in &elements[node] {
-                let placement = &drawing.placements[element];
+            for &element in &elements[start[node]..start[node + 1]] {
+                let placed = of(&drawing.placements[element]);
                 // SUGAR takes the last node of the element that is done.
-                let Some(known) = placement.nodes.iter().rposition(|n| marks[n.0] == Mark::Done) else { continue };
-                let (from, at) = (placement.offsets[known], nodes[placement.nodes[known].0].position);
-                for (other, offset) in placement.nodes.iter().zip(&placement.offsets) {
+                let Some((known, from)) = placed.iter().rfind(|(n, _)| marks[n.0] == Mark::Done) else { continue };
+                let at = nodes[known.0].position;
+                for (other, offset) in placed {
                     if marks[other.0] == Mark::Unplaced {
                         nodes[other.0].position = [at[0] + offset[0] - from[0], at[1] + offset[1] - from[1]];
                         marks[other.0] = Mark::Waiting;
@@ -71,13 +81,14 @@ fn walk(drawing: &mut Drawing) -> Vec<usize> {
             }
         }
     }
+    drawing.structure.nodes = nodes;
     starts
 }
 
 /// Reports nodes that only beams and links without a length touch: nothing says where they lie.
 fn unplaced_nodes(drawing: &Drawing, sink: &mut Sink) -> bool {
     let mut placed = vec![false; drawing.structure.nodes.len()];
-    for node in drawing.placements.iter().flat_map(|p| &p.nodes) {
+    for (node, _) in drawing.placements.iter().flat_map(|p| drawing.placed_by(p)) {
         placed[node.0] = true;
     }
     let beams = drawing.structure.beams.iter().flat_map(|b| [b.a, b.b]);
@@ -108,9 +119,10 @@ fn unconnected_parts(drawing: &Drawing, starts: &[usize], sink: &mut Sink) {
 fn open_loops(drawing: &Drawing, sink: &mut Sink) {
     let mut open = Vec::new();
     for placement in &drawing.placements {
-        let largest = placement.offsets.iter().map(|o| o[0].hypot(o[1])).fold(0.0, f64::max);
-        let first = drawing.structure.nodes[placement.nodes[0].0].position;
-        let misses = placement.nodes.iter().zip(&placement.offsets).map(|(node, offset)| {
+        let placed = drawing.placed_by(placement);
+        let largest = placed.iter().map(|(_, o)| o[0].hypot(o[1])).fold(0.0, f64::max);
+        let first = drawing.structure.nodes[placed[0].0.0].position;
+        let misses = placed.iter().map(|(node, offset)| {
             let at = drawing.structure.nodes[node.0].position;
             [at[0] - first[0] - offset[0], at[1] - first[1] - offset[1]]
         });

@@ -29,15 +29,20 @@ pub fn carried(structure: &Structure, from: &Discretized, to: &Discretized, x: &
             y[k] = Pose::new(u.x, u.y, moved.turn);
         }
     };
+    let (mut moved, mut slopes) = (Vec::new(), Vec::new());
     for (beam, (from, to)) in structure.beams.iter().zip(from.beams.iter().zip(&to.beams)) {
         let (last, new) = (from.len() - 1, to.len() - 1);
         let h = beam.length / last as f64;
         let along = Vector2::new(beam.angle.cos(), beam.angle.sin());
+        moved.clear();
+        moved.extend(from.iter().map(at));
+        slopes.clear();
+        slopes.extend(moved.iter().map(|moved: &Moved| slope(along, h, moved.turn, linear)));
         for (k, point) in to.iter().enumerate() {
             let s = (k * last) as f64 / new as f64;
             let first = (s as usize).min(last - 1);
-            let ends = [at(&from[first]), at(&from[first + 1])];
-            put(point, between(along, h, ends, s - first as f64, linear));
+            let (ends, slopes) = ([moved[first], moved[first + 1]], [slopes[first], slopes[first + 1]]);
+            put(point, between((along, h), ends, slopes, s - first as f64, linear));
         }
     }
     for (from, to) in from.nodes.iter().zip(&to.nodes) {
@@ -48,13 +53,21 @@ pub fn carried(structure: &Structure, from: &Discretized, to: &Discretized, x: &
     y
 }
 
-/// The cubic between the ends of a segment, at its share `s`.
-fn between(along: Vector2<f64>, h: f64, [a, b]: [Moved; 2], s: f64, linear: bool) -> Moved {
-    let slope = |turn: f64| {
-        let (y, x) = if linear { (turn, 0.0) } else { (turn.sin(), turn.cos() - 1.0) };
-        Vector2::new(along.x * x - along.y * y, along.y * x + along.x * y) * h
-    };
-    let (ta, tb, step) = (slope(a.turn), slope(b.turn), b.u - a.u);
+/// What a rotation at an end of a segment adds to the slope there, times its length.
+fn slope(along: Vector2<f64>, h: f64, turn: f64, linear: bool) -> Vector2<f64> {
+    let (y, x) = if linear { (turn, 0.0) } else { (turn.sin(), turn.cos() - 1.0) };
+    Vector2::new(along.x * x - along.y * y, along.y * x + along.x * y) * h
+}
+
+/// The cubic between the ends of a segment with these slopes, at its share `s`.
+fn between(
+    (along, h): (Vector2<f64>, f64),
+    [a, b]: [Moved; 2],
+    [ta, tb]: [Vector2<f64>; 2],
+    s: f64,
+    linear: bool,
+) -> Moved {
+    let step = b.u - a.u;
     let u = a.u + step * (s * s * (3.0 - 2.0 * s)) + ta * (s * (1.0 - s) * (1.0 - s)) - tb * (s * s * (1.0 - s));
     let rate = step * (6.0 * s * (1.0 - s)) + ta * ((1.0 - s) * (1.0 - 3.0 * s)) - tb * (s * (2.0 - 3.0 * s));
     let across = (along.x * rate.y - along.y * rate.x) / h;

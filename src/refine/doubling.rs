@@ -120,6 +120,12 @@ pub fn errors<E>(options: &CompileOptions, segments: &[usize], analyse: Analyse<
     Ok(fine.map(|fine| differences(&coarse, &fine)))
 }
 
+/// The mesh of twice the segments; none where it would be too fine to compare with.
+pub fn twice(options: &CompileOptions, order: &ModelOrder) -> Option<ModelOrder> {
+    let segments = doubled(options, &order.segments, |_| true);
+    (segments.iter().sum::<usize>() <= MOST_SEGMENTS).then(|| ModelOrder { segments, ..order.clone() })
+}
+
 /// For each result that decides, what each group contributes to its error; none where a mesh has no results.
 fn shares<E>(
     options: &CompileOptions,

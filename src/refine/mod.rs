@@ -28,4 +28,5 @@ pub mod model_order;
 pub mod order_error;
 mod reference;
 mod rigid_beams;
+pub(crate) mod side_by_side;
 mod span;

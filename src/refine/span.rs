@@ -149,7 +149,7 @@ pub(super) fn spans(
             mass: if lumped { cubic::mass(&bar, h) } else { Matrix6::zeros() },
             second: cubic::second_mass(&bar, h),
             softer: Matrix6::zeros(),
-            lumps: if lumped { options.scheme.cut(&bar, n, false).parts } else { Vec::new() },
+            lumps: if lumped { options.scheme.parts(&bar, n) } else { Vec::new() },
         }
     };
     structure.beams.iter().zip(beams).zip(offsets).map(span).collect()

@@ -12,6 +12,7 @@
 
 mod fall;
 pub mod path;
+pub mod side_by_side;
 
 use super::SolveError;
 use crate::gaps::{Drive, System};

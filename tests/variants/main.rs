@@ -2,6 +2,7 @@
 //! one of them.
 
 mod lanes;
+mod together;
 
 use bimorph::analysis::transient::{TransientOptions, transient};
 use bimorph::compile::{CompileOptions, compile};

@@ -13,6 +13,7 @@ use super::super::{AnalysisError, BeamMotions, PortVoltages};
 use super::meshed::{chosen, meshed, on};
 use super::warnings::{of_fingers, of_heat, of_pieces, of_stress};
 use crate::compile::Compiled;
+use crate::multibody::planar::Pose;
 use crate::netlist::Diagnostic;
 use crate::refine::carry::carried;
 use crate::refine::doubling::{self, Output};
@@ -33,7 +34,7 @@ pub(super) fn order(
     if chosen(compiled) {
         return estimated(compiled, voltages, segments);
     }
-    let mut search = Search { compiled, voltages, last: None, points: Vec::new() };
+    let mut search = Search::new(compiled, voltages);
     let mut analyse = |segments: &[usize]| search.follow(segments);
     let order = doubling::fit(&compiled.structure, &compiled.options, segments, &mut analyse)?;
     search.ended(order)
@@ -45,9 +46,33 @@ pub(super) fn estimated(
     voltages: &PortVoltages,
     segments: Vec<usize>,
 ) -> Result<(ModelOrder, OperatingPoint), AnalysisError> {
-    let mut search = Search { compiled, voltages, last: None, points: Vec::new() };
-    let order = doubling::estimate(&compiled.options, segments, &mut |segments| search.follow(segments))?;
-    search.ended(order)
+    Search::new(compiled, voltages).estimated(segments)
+}
+
+/// The estimate of a mesh whose equilibrium is known, and that on twice the segments; its equilibrium.
+pub(super) fn estimated_from(
+    compiled: &Compiled,
+    voltages: &PortVoltages,
+    point: OperatingPoint,
+    finer: (Compiled, OperatingPoint),
+) -> Result<(OperatingPoint, Option<f64>), AnalysisError> {
+    let search = Search { known: Some(point), finer: Some(finer), ..Search::new(compiled, voltages) };
+    let (order, point) = search.estimated(compiled.order.segments.clone())?;
+    Ok((point, order.estimated_error))
+}
+
+/// A model of twice the segments, and where its equilibrium is about.
+pub(crate) struct Finer {
+    pub(crate) model: Compiled,
+    pub(crate) start: Vec<Pose>,
+}
+
+/// See [`Finer`]; none where it would be too fine.
+pub(crate) fn finer(compiled: &Compiled, point: &OperatingPoint) -> Option<Finer> {
+    let model = compiled.with_order(doubling::twice(&compiled.options, &compiled.order)?).ok()?;
+    let linear = model.parts.system.model.linear;
+    let start = carried(&model.structure, &compiled.parts, &model.parts, &point.q, linear);
+    Some(Finer { model, start })
 }
 
 /// The equilibrium on the mesh as it is, and the estimate of its error.
@@ -70,19 +95,27 @@ struct Search<'a> {
     last: Option<Cow<'a, Compiled>>,
     /// Its equilibrium, after those of all before.
     points: Vec<(Vec<usize>, OperatingPoint)>,
+    /// The first equilibrium, and that of another mesh next to it, where they have been found before.
+    known: Option<OperatingPoint>,
+    finer: Option<(Compiled, OperatingPoint)>,
 }
 
-impl Search<'_> {
+impl<'a> Search<'a> {
+    fn new(compiled: &'a Compiled, voltages: &'a PortVoltages) -> Self {
+        Self { compiled, voltages, last: None, points: Vec::new(), known: None, finer: None }
+    }
+
+    /// A mesh with the estimate of its error and its equilibrium.
+    fn estimated(mut self, segments: Vec<usize>) -> Result<(ModelOrder, OperatingPoint), AnalysisError> {
+        let order = doubling::estimate(&self.compiled.options, segments, &mut |segments| self.follow(segments))?;
+        self.ended(order)
+    }
+
     /// The equilibrium on a mesh, next to that of the mesh before.
     fn follow(&mut self, segments: &[usize]) -> Result<Vec<Output>, AnalysisError> {
-        let model = meshed(self.compiled, segments)?;
-        let linear = model.parts.system.model.linear;
-        let (mut point, from_rest) = match (&self.last, self.points.last()) {
-            (Some(before), Some((_, point))) => {
-                let start = carried(&model.structure, &before.parts, &model.parts, &point.q, linear);
-                operating_point_near(&model, self.voltages, start)?
-            }
-            _ => (operating_point(&model, self.voltages)?, true),
+        let (model, (mut point, from_rest)) = match self.finer.take_if(|(finer, _)| finer.order.segments == segments) {
+            Some((finer, point)) => (Cow::Owned(finer), (point, false)),
+            None => self.solve(segments)?,
         };
         if let (false, Some((_, before))) = (from_rest, self.points.last()) {
             // the way from rest is that of the mesh before
@@ -93,6 +126,21 @@ impl Search<'_> {
         self.last = Some(model);
         self.points.push((segments.to_vec(), point));
         Ok(outputs)
+    }
+
+    /// A model and its equilibrium, computed, and whether from rest.
+    fn solve(&mut self, segments: &[usize]) -> Result<(Cow<'a, Compiled>, (OperatingPoint, bool)), AnalysisError> {
+        let model = meshed(self.compiled, segments)?;
+        let linear = model.parts.system.model.linear;
+        let point = match (&self.last, self.points.last(), self.known.take()) {
+            (_, None, Some(known)) => (known, true),
+            (Some(before), Some((_, point)), _) => {
+                let start = carried(&model.structure, &before.parts, &model.parts, &point.q, linear);
+                operating_point_near(&model, self.voltages, start)?
+            }
+            _ => (operating_point(&model, self.voltages)?, true),
+        };
+        Ok((model, point))
     }
 
     /// The mesh that came out, with its equilibrium.

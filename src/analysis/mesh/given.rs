@@ -7,7 +7,7 @@
 
 use super::super::modes::{ModesResult, about_equilibrium, modes};
 use super::super::pull_in::{PullInResult, pull_in};
-use super::super::statics::{StaticResult, operating_point, result_at};
+use super::super::statics::{OperatingPoint, StaticResult, operating_point, result_at};
 use super::super::{AnalysisError, PortVoltages};
 use super::equilibrium::{self, told_of_static};
 use super::frequencies::{frequency_outputs, is_carried, worst};
@@ -18,6 +18,7 @@ use crate::compile::Compiled;
 use crate::netlist::Diagnostic;
 use crate::refine::counted;
 use crate::refine::doubling::{self, Output};
+pub(crate) use equilibrium::{Finer, finer};
 
 /// What an analysis found.
 #[derive(Debug, Clone)]
@@ -94,15 +95,45 @@ fn within(compiled: &Compiled, error: Option<f64>) -> bool {
 
 fn still(compiled: &Compiled, voltages: &PortVoltages) -> Result<Judged, AnalysisError> {
     let (point, estimated_error) = equilibrium::judged(compiled, voltages)?;
+    Ok(judged_at(compiled, point, estimated_error))
+}
+
+/// The result where the equilibrium on the mesh of `compiled` is known, and that of twice the segments.
+///
+/// # Errors
+/// What the analysis has against the model.
+pub(crate) fn judged_static(
+    compiled: &Compiled,
+    voltages: &PortVoltages,
+    point: OperatingPoint,
+    finer: (Compiled, OperatingPoint),
+) -> Result<Judged, AnalysisError> {
+    let (point, estimated_error) = equilibrium::estimated_from(compiled, voltages, point, finer)?;
+    Ok(judged_at(compiled, point, estimated_error))
+}
+
+fn judged_at(compiled: &Compiled, point: OperatingPoint, estimated_error: Option<f64>) -> Judged {
     let (point, told) = told_of_static(compiled, point);
     let result = result_at(compiled, &point);
     let warnings = coded(told).into_iter().chain(result.told()).collect();
     let answer = Answer::Static(result);
-    Ok(Judged { answer, estimated_error, warnings, holds: within(compiled, estimated_error) })
+    Judged { answer, estimated_error, warnings, holds: within(compiled, estimated_error) }
 }
 
 fn swinging(compiled: &Compiled, count: usize, voltages: &PortVoltages) -> Result<Judged, AnalysisError> {
-    let found = modes(compiled, count, voltages)?;
+    judged_modes(compiled, modes(compiled, count, voltages)?, count, voltages)
+}
+
+/// The same where the modes on the mesh of `compiled` are known.
+///
+/// # Errors
+/// What the analysis has against the model.
+pub(crate) fn judged_modes(
+    compiled: &Compiled,
+    found: ModesResult,
+    count: usize,
+    voltages: &PortVoltages,
+) -> Result<Judged, AnalysisError> {
     // a mesh without so many modes says nothing about those that it lacks
     let all = found.frequencies_hz.len() == count;
     let own = worst(found.errors.iter().copied());

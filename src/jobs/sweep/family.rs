@@ -49,10 +49,22 @@ impl<'a> Family<'a> {
         Ok(None)
     }
 
+    /// The variant that meshes are searched for and the first of these meshes, where they fit this one.
+    pub(super) fn first_mesh(&self, drawn: &Drawn, request: &Request<'_>) -> Option<(&Compiled, &Vec<usize>)> {
+        let first = self.like(drawn)?;
+        let segments = self.meshes[0].get_or_init(|| search(first, SHARES[0], request)).as_ref()?;
+        Some((first, segments))
+    }
+
+    /// True where points share meshes at all.
+    pub(super) fn shares(&self) -> bool {
+        let own = self.options.segments.is_some() || self.options.band.is_some();
+        !own && self.spec.grid_points().is_ok_and(|points| points > 1)
+    }
+
     /// The variant that meshes are searched for, where they fit this one.
     fn like(&self, drawn: &Drawn) -> Option<&Compiled> {
-        let own = self.options.segments.is_some() || self.options.band.is_some();
-        if own || drawn.structure.beams.is_empty() || self.spec.grid_points().ok()? < 2 {
+        if !self.shares() || drawn.structure.beams.is_empty() {
             return None;
         }
         let first = self.first.get_or_init(|| self.middle()).as_ref()?;

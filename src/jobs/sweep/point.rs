@@ -3,7 +3,7 @@
 use super::error::SweepError;
 use super::family::Family;
 use super::spec::{SweepAnalysis, SweepSpec, at};
-use crate::analysis::mesh::given::{Answer, judged, searched};
+use crate::analysis::mesh::given::{Answer, Judged, judged, searched};
 use crate::analysis::mesh::{self, Request};
 use crate::analysis::signal::Signal;
 use crate::analysis::{AnalysisError, statics};
@@ -153,6 +153,11 @@ fn solve(
             judge(&compiled, &request).map_err(said)?
         }
     };
+    found(judged, spec, options)
+}
+
+/// What is kept of a result.
+pub(super) fn found(judged: Judged, spec: &SweepSpec, options: &CompileOptions) -> Result<Found, String> {
     let estimated_error = judged.estimated_error;
     let beyond = mesh::beyond(options.tol, estimated_error).map(|message| format!("{}: {message}", mesh::WARNING));
     let warnings: Vec<String> = beyond.into_iter().chain(judged.warnings).collect();

@@ -213,7 +213,7 @@ fn alone(compiled: &Compiled, options: &TransientOptions<'_>) -> Result<RunEnd, 
 }
 
 /// Runs a job under a part of the budget. A fault inside is the error of that job.
-fn guarded<T>(budget: Option<&Budget>, job: &mut dyn FnMut() -> Result<T, String>) -> Result<T, String> {
+pub(super) fn guarded<T>(budget: Option<&Budget>, job: &mut dyn FnMut() -> Result<T, String>) -> Result<T, String> {
     let outcome = catch_unwind(AssertUnwindSafe(|| match budget.map(Budget::part) {
         Some(part) => budget::within(&part, job).unwrap_or_else(|why| Err(why.to_string())),
         None => job(),

@@ -76,6 +76,24 @@ impl LaneMatrix {
         spoilt.0.map(f64::is_nan)
     }
 
+    /// How many pivots are negative in each lane: as many as eigenvalues are (Sylvester). Not a number where a block has none.
+    #[inline(always)]
+    pub fn negative<W: Wide>(&self, simd: W::Simd) -> W {
+        let mut signs = W::splat(simd, 0.0);
+        for inverse in &self.diagonal {
+            // a block and its inverse have as many
+            let a = load_block::<W>(simd, inverse);
+            let (first, last) = (a[0][1] / a[0][0], a[0][2] / a[0][0]);
+            let middle = a[1][1] - first * a[0][1];
+            let beside = a[1][2] - last * a[0][1];
+            let corner = a[2][2] - last * a[0][2] - beside * beside / middle;
+            for pivot in [a[0][0], middle, corner] {
+                signs += pivot / pivot.abs();
+            }
+        }
+        (-signs + 3.0 * self.diagonal.len() as f64) * 0.5
+    }
+
     /// Solves in place with the factors.
     #[inline(always)]
     pub fn solve<W: Wide>(&self, simd: W::Simd, pattern: &Pattern, b: &mut [LanePose]) {

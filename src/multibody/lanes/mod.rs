@@ -12,21 +12,27 @@
 //! | [`joint`] | strains, forces and tangents of joints | [`super::planar`] |
 //! | [`forces`] | their sums over a mechanism | [`super::forces`] |
 //! | [`matrix`] | the factorization and solves | [`super::factor`] |
+//! | `double` | numbers of twice the digits | [`super::double`] |
+//! | `precise` | products with the tangent in them | [`super::precise`] |
 
 // fixed-size blocks are indexed as the formulas are written
 #![allow(clippy::needless_range_loop)]
 
+mod double;
 pub mod forces;
 pub mod joint;
 pub mod matrix;
 pub mod model;
 mod number;
+mod precise;
 mod wide;
 
 pub use super::rcr::Real;
+pub use double::LaneDouble;
 pub use matrix::LaneMatrix;
 pub use model::LaneModel;
 pub use number::Number;
+pub use precise::{LanePrecise, PrecisePose};
 pub use wide::{Eight, Kernel, LANES, Wide, across, add, load, store};
 
 /// Displacement, rate or force of a body in each variant: x, y, θ.

@@ -28,6 +28,8 @@ pub trait Wide: Number {
     fn store(self, to: &mut Eight);
     /// |x|.
     fn abs(self) -> Self;
+    /// √x.
+    fn sqrt(self) -> Self;
     /// `mark`, but not a number in lanes where this is at most `bound`.
     fn spoil(self, bound: Self, mark: Self) -> Self;
     /// `this` in lanes that are zero, `other` elsewhere.
@@ -181,6 +183,14 @@ impl<S: Simd, const M: usize> Wide for Registers<S, M> {
     }
 
     #[inline(always)]
+    fn sqrt(mut self) -> Self {
+        for i in 0..M {
+            self.x[i] = self.simd.sqrt_f64s(self.x[i]);
+        }
+        self
+    }
+
+    #[inline(always)]
     fn spoil(self, bound: Self, mut mark: Self) -> Self {
         let (simd, nan) = (self.simd, self.simd.splat_f64s(f64::NAN));
         for i in 0..M {
@@ -241,7 +251,7 @@ mod tests {
     struct Check([f64; LANES], [f64; LANES]);
 
     impl WithSimd for Check {
-        type Output = [[f64; LANES]; 10];
+        type Output = [[f64; LANES]; 11];
 
         #[inline(always)]
         fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
@@ -255,10 +265,11 @@ mod tests {
     }
 
     #[inline(always)]
-    fn operations<W: Wide>(simd: W::Simd, a: &[f64; LANES], b: &[f64; LANES]) -> [[f64; LANES]; 10] {
+    fn operations<W: Wide>(simd: W::Simd, a: &[f64; LANES], b: &[f64; LANES]) -> [[f64; LANES]; 11] {
         let (x, y) = (W::load(simd, &Lanes(*a)), W::load(simd, &Lanes(*b)));
         let (sin, cos) = x.sin_cos(simd);
-        let all = [x + y, x - y, x * y, x / y, -x, x.abs(), x * 0.3 + 0.7, y.if_zero(x, x + y), sin, cos];
+        let all =
+            [x + y, x - y, x * y, x / y, -x, x.abs(), x * 0.3 + 0.7, x.abs().sqrt(), y.if_zero(x, x + y), sin, cos];
         all.map(|x| {
             let mut to = Eight::of(0.0);
             x.store(&mut to);
@@ -267,7 +278,7 @@ mod tests {
     }
 
     /// The instruction sets of this processor that kernels are compiled for, and none.
-    fn everywhere(a: [f64; LANES], b: [f64; LANES]) -> Vec<[[f64; LANES]; 10]> {
+    fn everywhere(a: [f64; LANES], b: [f64; LANES]) -> Vec<[[f64; LANES]; 11]> {
         let mut found = vec![Arch::new().dispatch(Check(a, b)), pulp::Scalar::new().vectorize(Check(a, b))];
         #[cfg(target_arch = "x86_64")]
         if let Some(simd) = pulp::x86::V3::try_new() {
@@ -286,7 +297,8 @@ mod tests {
                     let (x, y) = (a[k], b[k]);
                     let (sin, cos) = crate::multibody::sine::sin_cos(x);
                     let chosen = if y == 0.0 { x } else { x + y };
-                    let alone = [x + y, x - y, x * y, x / y, -x, x.abs(), x * 0.3 + 0.7, chosen, sin, cos];
+                    let alone =
+                        [x + y, x - y, x * y, x / y, -x, x.abs(), x * 0.3 + 0.7, x.abs().sqrt(), chosen, sin, cos];
                     for (found, alone) in found.iter().zip(alone) {
                         assert_eq!(found[k].to_bits(), alone.to_bits(), "{x} {y}");
                     }

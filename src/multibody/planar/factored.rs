@@ -55,6 +55,19 @@ impl JointKinematics {
 }
 
 impl FactoredTangent {
+    /// All of its numbers: the slopes u, g, of the turns of a and of b, the stiffness, and both parts of the rest.
+    pub(crate) fn numbers(&self) -> [f64; 21] {
+        let mut numbers = [0.0; 21];
+        let all = (self.u.iter().chain(&self.g).chain(&self.turn_a).chain(&self.turn_b))
+            .chain(&self.stiffness.0)
+            .chain(&self.half)
+            .chain(&self.turn);
+        for (to, from) in numbers.iter_mut().zip(all) {
+            *to = *from;
+        }
+        numbers
+    }
+
     /// Its product with x_b − x_a and the rotations θ_a, θ_b.
     #[inline]
     pub(crate) fn times(&self, [dx, dy]: [Double; 2], a: Double, b: Double) -> PairForce {

@@ -8,6 +8,7 @@
 //! | [`mac`] | which mode of one model is which of another |
 //! | [`refined`] | solves that correct themselves in extended precision |
 //! | [`subspace`] | many of them at once |
+//! | [`side_by_side`] | modes of variants of one mechanism, in lanes |
 //! | [`fastest`] | the highest natural frequency in joint coordinates |
 //! | [`harmonic`] | small-signal response at one frequency: the same factorization over complex numbers |
 //! | [`pole`] | where that has no bound: a damped mode |
@@ -23,5 +24,6 @@ pub mod mac;
 mod mass;
 pub mod pole;
 pub mod refined;
+pub mod side_by_side;
 pub mod subspace;
 mod tridiagonal;

@@ -1,0 +1,74 @@
+//! Modes about the drawn geometry of many variants of one mechanism: in lanes where that is possible.
+//!
+//! All variants begin with the modes of one of them. One that differs from it in more than numbers, or that anything acts on, or whose
+//! lane does not settle, has no modes here: [`super::modes`] finds them, or says why there are none.
+
+use super::PortVoltages;
+use super::modes::{GUARDS, ModesResult, about_equilibrium, unloaded};
+use crate::compile::Compiled;
+use crate::multibody::BlockMatrix;
+use crate::multibody::lanes::LANES;
+use crate::multibody::planar::Pose;
+use crate::refine::side_by_side::{LaneReference, Variant};
+use crate::solve::eigen::{Modes, RELIABLE, lowest_modes};
+use crate::solve::frequency::side_by_side::LaneModes;
+
+/// Lanes for variants like one of them.
+#[derive(Debug, Clone)]
+pub(crate) struct ModesSideBySide {
+    lanes: LaneModes,
+    reference: LaneReference,
+    count: usize,
+}
+
+impl ModesSideBySide {
+    /// For the `count` lowest modes of variants like `first`; none where it has no lanes.
+    pub(crate) fn new(first: &Compiled, count: usize, voltages: &PortVoltages) -> Option<Self> {
+        if !at_rest(first, voltages) {
+            return None;
+        }
+        let system = &first.parts.system;
+        let (q, drive) = (vec![Pose::zeros(); system.bodies()], system.electrics.drive());
+        let mut tangent = BlockMatrix::new(&system.model.pattern);
+        system.tangent(&q, &drive, &mut tangent, &mut q.clone());
+        let mut found: Modes = lowest_modes(system, (&q, &drive), &tangent, count + GUARDS).ok()?;
+        let sound = found.lambda.len() == count + GUARDS && found.residuals.iter().all(|r| *r <= RELIABLE);
+        found.shapes.truncate(count + GUARDS);
+        let reference = LaneReference::new(drawn(first), found.shapes.len())?;
+        let lanes = LaneModes::new(system, found.shapes).filter(|_| sound && !found.missed)?;
+        Some(Self { lanes, reference, count })
+    }
+
+    /// The modes of each variant; none for one whose modes have to be found alone. Shapes of nodes are left out.
+    pub(crate) fn results(&self, variants: &[&Compiled], voltages: &PortVoltages) -> Vec<Option<ModesResult>> {
+        let mut results: Vec<Option<ModesResult>> = vec![None; variants.len()];
+        let fits = |&k: &usize| at_rest(variants[k], voltages) && self.lanes.fits(&variants[k].parts.system);
+        let able: Vec<usize> = (0..variants.len()).filter(fits).collect();
+        if able.is_empty() {
+            return results;
+        }
+        let (mut lanes, mut reference) = (self.lanes.clone(), self.reference.clone());
+        for some in able.chunks(LANES) {
+            let systems: Vec<_> = some.iter().map(|&k| &variants[k].parts.system).collect();
+            let found = lanes.find(&systems, self.count);
+            let some_drawn: Vec<_> = some.iter().map(|&k| drawn(variants[k])).collect();
+            let errors = reference.compare(&lanes, &some_drawn);
+            for ((&k, found), errors) in some.iter().zip(found).zip(errors) {
+                results[k] = found.zip(errors).map(|(found, errors)| unloaded(variants[k], self.count, found, errors));
+            }
+        }
+        results
+    }
+}
+
+fn drawn(compiled: &Compiled) -> Variant<'_> {
+    (&compiled.structure, &compiled.options, &compiled.parts)
+}
+
+/// True where nothing acts on the drawn geometry.
+fn at_rest(compiled: &Compiled, voltages: &PortVoltages) -> bool {
+    let system = &compiled.parts.system;
+    !about_equilibrium(compiled, voltages)
+        && !system.is_acted_on(&system.electrics.drive())
+        && system.electrics.inputs.is_empty()
+}

@@ -1,0 +1,80 @@
+//! Equilibria of many variants of one mechanism: in lanes where that is possible, with the bits of each alone.
+//!
+//! A variant that differs from the first in more than numbers, or with anything on its way, has no equilibrium here: [`super::statics`] finds it,
+//! or says why there is none.
+
+use super::PortVoltages;
+use super::contact_range::within_contact_range;
+use super::statics::{OperatingPoint, settled, source_vector};
+use crate::compile::Compiled;
+use crate::multibody::lanes::LANES;
+use crate::multibody::planar::Pose;
+use crate::solve::equilibrium::Path;
+use crate::solve::equilibrium::side_by_side::{LaneEquilibrium, Way};
+use crate::solve::path::SourcePath;
+
+/// Lanes for variants like one of them.
+#[derive(Debug, Clone)]
+pub(crate) struct StaticsSideBySide(LaneEquilibrium);
+
+/// A variant to be settled: where from, if not from rest.
+pub(crate) type Begins<'a> = (&'a Compiled, Option<Vec<Pose>>);
+
+/// A variant's sources at the end and at the beginning, and where it begins.
+struct Laid {
+    number: usize,
+    sources: Vec<f64>,
+    from: Vec<f64>,
+    q: Vec<Pose>,
+}
+
+impl StaticsSideBySide {
+    /// For variants like `first`; none where it has no lanes.
+    pub(crate) fn new(first: &Compiled) -> Option<Self> {
+        LaneEquilibrium::new(&first.parts.system).map(Self)
+    }
+
+    /// The equilibrium of each variant, from rest or, for all of them, next to where they begin. None for one whose equilibrium has to be
+    /// found alone.
+    pub(crate) fn points(&self, variants: &[Begins<'_>], voltages: &PortVoltages) -> Vec<Option<OperatingPoint>> {
+        let mut points: Vec<Option<OperatingPoint>> = vec![None; variants.len()];
+        let lay = |(number, (compiled, start)): (usize, &Begins<'_>)| {
+            let system = &compiled.parts.system;
+            let sources = source_vector(compiled, voltages).ok().filter(|_| self.0.fits(system))?;
+            let rest = vec![0.0; sources.len()];
+            let from = if start.is_some() { sources.clone() } else { rest };
+            let q = start.clone().unwrap_or_else(|| vec![Pose::zeros(); system.bodies()]);
+            Some(Laid { number, sources, from, q })
+        };
+        let laid: Vec<Laid> = variants.iter().enumerate().filter_map(lay).collect();
+        if laid.is_empty() {
+            return points;
+        }
+        let mut lanes = self.0.clone();
+        for some in laid.chunks(LANES) {
+            let path = |laid: &Laid| {
+                let (compiled, start) = &variants[laid.number];
+                let share = if start.is_some() { 1.0 } else { 0.0 };
+                (compiled, share)
+            };
+            let paths: Vec<SourcePath<'_>> = (some.iter())
+                .map(|laid| {
+                    let (compiled, share) = path(laid);
+                    SourcePath::new(&compiled.parts.system.electrics, &laid.from, &laid.sources, [share, 1.0])
+                })
+                .collect();
+            let ways: Vec<Way<'_>> = (some.iter().zip(&paths))
+                .map(|(laid, along)| Way { system: &path(laid).0.parts.system, path: along, q: &laid.q })
+                .collect();
+            for (laid, arrived) in some.iter().zip(lanes.follow(&ways)) {
+                let (compiled, _) = path(laid);
+                points[laid.number] = arrived.and_then(|arrived| {
+                    within_contact_range(compiled, &arrived.q).ok()?;
+                    let path = Path { iterations: arrived.iterations, fold: None, reached: 1.0 };
+                    Some(settled(compiled, arrived.q, laid.sources.clone(), path, Vec::new()))
+                });
+            }
+        }
+        points
+    }
+}

@@ -1,0 +1,81 @@
+//! What equilibria of variants side by side are found with.
+
+use crate::gaps::System;
+use crate::multibody::lanes::joint::LanePlaced;
+use crate::multibody::lanes::{Eight, LANES, LaneMatrix, LaneModel, LanePose, STILL};
+use crate::multibody::planar::Pose;
+use crate::multibody::rcr::has_lanes;
+use crate::multibody::{BlockMatrix, Pattern};
+
+/// As many variants as there are lanes, with storage.
+#[derive(Debug, Clone)]
+pub struct LaneEquilibrium {
+    pub(super) model: LaneModel,
+    pub(super) tangent: LaneMatrix,
+    pub(super) placed: Vec<LanePlaced>,
+    pub(super) expansion: Vec<Eight>,
+    pub(super) rate: Vec<Eight>,
+    /// Share of built-in strains, and the change of it.
+    pub(super) built_in: [f64; 2],
+    pub(super) trial: Vec<LanePose>,
+    /// Residual, then the step.
+    pub(super) force: Vec<LanePose>,
+    pub(super) residual: Vec<LanePose>,
+    pub(super) prediction: Vec<LanePose>,
+    /// Not zero for lanes that go on.
+    pub(super) goes: Eight,
+    pub(super) negative: Eight,
+    pub(super) vanished: [bool; LANES],
+    /// Bodies that gaps and loads act on, and the blocks between them.
+    pub(super) acted: Vec<usize>,
+    pub(super) blocks: Vec<usize>,
+    pub(super) gaps: usize,
+    pub(super) q: Vec<Pose>,
+    pub(super) r: Vec<Pose>,
+    pub(super) own: BlockMatrix<f64, 3>,
+}
+
+fn block(pattern: &Pattern, row: usize, column: usize) -> Option<usize> {
+    if row > column { pattern.block(row, column) } else { None }
+}
+
+impl LaneEquilibrium {
+    /// Lanes for variants like `first`; none where it has no lanes.
+    pub fn new(first: &System) -> Option<Self> {
+        let model = LaneModel::new(&first.model).filter(|_| has_lanes() && first.electrics.inputs.is_empty())?;
+        let (n, pattern) = (first.bodies(), &first.model.pattern);
+        let acted = first.acted_on();
+        let between = |&row: &usize| acted.iter().filter_map(move |&column| block(pattern, row, column));
+        let heaters = first.electrics.heating.heaters.len();
+        Some(Self {
+            tangent: LaneMatrix::new(pattern),
+            placed: vec![LanePlaced::GROUND; n + 1],
+            expansion: vec![Eight::NONE; heaters],
+            rate: vec![Eight::NONE; heaters],
+            built_in: [0.0; 2],
+            trial: vec![STILL; n],
+            force: vec![STILL; n],
+            residual: vec![STILL; n],
+            prediction: vec![STILL; n],
+            goes: Eight::of(1.0),
+            negative: Eight::NONE,
+            vanished: [false; LANES],
+            blocks: acted.iter().flat_map(between).collect(),
+            acted,
+            gaps: first.gaps.len(),
+            q: vec![Pose::zeros(); n],
+            r: vec![Pose::zeros(); n],
+            own: BlockMatrix::new(pattern),
+            model,
+        })
+    }
+
+    /// True for a variant that differs from the first in numbers alone.
+    pub fn fits(&self, system: &System) -> bool {
+        self.model.fits(&system.model)
+            && system.electrics.inputs.is_empty()
+            && self.expansion.len() == system.electrics.heating.heaters.len()
+            && self.gaps == system.gaps.len()
+            && self.acted == system.acted_on()
+    }
+}

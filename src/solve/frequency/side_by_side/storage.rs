@@ -1,0 +1,94 @@
+//! What modes of variants side by side are found with.
+
+use super::ritz::{MOST, Small};
+use crate::gaps::System;
+use crate::multibody::lanes::joint::LanePlaced;
+use crate::multibody::lanes::{Eight, LANES, LaneMatrix, LaneModel, LanePose, LanePrecise, PrecisePose, STILL};
+use crate::multibody::planar::Pose;
+use crate::multibody::rcr::has_lanes;
+
+/// Which factor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Which {
+    /// Of K.
+    Plain,
+    /// Of K − σM.
+    Shifted,
+}
+
+/// Modes of as many variants as there are lanes, with storage.
+#[derive(Debug, Clone)]
+pub struct LaneModes {
+    pub(super) model: LaneModel,
+    pub(super) precise: LanePrecise,
+    /// K, held directions not yet projected.
+    pub(super) stiffness: LaneMatrix,
+    pub(super) plain: LaneMatrix,
+    pub(super) shifted: LaneMatrix,
+    pub(super) placed: Vec<LanePlaced>,
+    pub(super) still: Vec<LanePose>,
+    pub(super) expansion: Vec<Eight>,
+    /// Shapes that every variant begins with.
+    pub(super) start: Vec<Vec<Pose>>,
+    pub(super) x: Vec<Vec<LanePose>>,
+    /// K·x of each, as the last inverse iteration had it.
+    pub(super) given: Vec<Vec<LanePose>>,
+    pub(super) force: Vec<LanePose>,
+    pub(super) product: Vec<PrecisePose>,
+    pub(super) lambda: Vec<Eight>,
+    pub(super) residual: Vec<Eight>,
+    /// σ.
+    pub(super) shift: Eight,
+    /// Modes below it.
+    pub(super) below: Eight,
+    pub(super) vanished: [bool; LANES],
+    pub(super) small: Small,
+}
+
+impl LaneModes {
+    /// Lanes for variants like `first`, beginning with these shapes; none where it has no lanes, or more shapes than they hold.
+    pub fn new(first: &System, start: Vec<Vec<Pose>>) -> Option<Self> {
+        let able = has_lanes() && first.model.couplings.is_empty() && (1..=MOST).contains(&start.len());
+        let model = LaneModel::new(&first.model).filter(|_| able)?;
+        let (n, pattern) = (first.bodies(), &first.model.pattern);
+        let block = vec![vec![STILL; n]; start.len()];
+        Some(Self {
+            precise: LanePrecise::default(),
+            stiffness: LaneMatrix::new(pattern),
+            plain: LaneMatrix::new(pattern),
+            shifted: LaneMatrix::new(pattern),
+            placed: vec![LanePlaced::GROUND; n + 1],
+            still: vec![STILL; n],
+            expansion: vec![Eight::NONE; first.electrics.heating.heaters.len()],
+            x: block.clone(),
+            given: block,
+            force: vec![STILL; n],
+            product: vec![[[Eight::NONE; 2]; 3]; n],
+            lambda: vec![Eight::NONE; start.len()],
+            residual: vec![Eight::NONE; start.len()],
+            shift: Eight::NONE,
+            below: Eight::NONE,
+            vanished: [false; LANES],
+            small: Small::default(),
+            start,
+            model,
+        })
+    }
+
+    /// True for a variant that differs from the first in numbers alone.
+    pub fn fits(&self, system: &System) -> bool {
+        self.model.fits(&system.model)
+            && system.model.couplings.is_empty()
+            && self.expansion.len() == system.electrics.heating.heaters.len()
+    }
+
+    /// λ of each shape, in each lane.
+    pub(crate) fn lambda(&self) -> &[Eight] {
+        &self.lambda
+    }
+
+    /// The models, the factor of K, the shapes, and their λ.
+    pub(crate) fn found(&self) -> (&LaneModel, &LaneMatrix, &[Vec<LanePose>], &[Eight]) {
+        (&self.model, &self.plain, &self.x, &self.lambda)
+    }
+}
