@@ -32,7 +32,7 @@ pub(super) struct About<'a> {
 
 impl About<'_> {
     /// d ln f / d ln q of the worst mode [1].
-    pub(super) fn to_deflection(&self) -> f64 {
+    pub(super) fn to_deflection(self) -> f64 {
         if self.q.iter().all(|q| *q == Pose::zeros()) {
             return 0.0;
         }
@@ -41,7 +41,7 @@ impl About<'_> {
     }
 
     /// d ln f / d ln V of the worst mode, V the voltages across gaps [1]; 0 where the tangent is singular.
-    pub(super) fn to_voltage(&self) -> f64 {
+    pub(super) fn to_voltage(self) -> f64 {
         let system = &self.compiled.parts.system;
         let (model, pattern) = (&system.model, &system.model.pattern);
         let raised =
