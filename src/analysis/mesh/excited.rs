@@ -115,6 +115,17 @@ pub(super) fn order(moving: &Compiled, options: &TransientOptions<'_>) -> Result
     }
 }
 
+/// The mode that a run in equal steps begins with and cannot follow: its frequency [Hz] and its share of the way. A step longer than a
+/// radian of it damps it away or slows it, in a companion of twice the step as well.
+pub(super) fn outrun(moving: &Compiled, options: &TransientOptions<'_>) -> Option<(f64, f64)> {
+    let step = options.step?;
+    let (modes, _) = excited(moving, options, &moving.order.segments, FIRST).ok()?;
+    let swings = |mode: &&Excited| mode.decay < 2.0 * TAU * mode.frequency && mode.amplitude > moving.options.tol;
+    let too_fast = |mode: &&Excited| TAU * mode.frequency * step > 1.0;
+    let most = modes.iter().filter(swings).filter(too_fast).max_by(|a, b| a.amplitude.total_cmp(&b.amplitude))?;
+    Some((most.frequency, most.amplitude))
+}
+
 /// A signal that is the rate of a displacement.
 fn is_rate(name: &str) -> bool {
     name.rsplit_once('.').is_some_and(|(_, part)| ["vx", "vy", "vrz"].contains(&part))

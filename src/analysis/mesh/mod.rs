@@ -36,6 +36,7 @@ use crate::multibody::planar::Pose;
 use crate::netlist::Diagnostic;
 use crate::refine::model_order::ModelOrder;
 pub use equilibrium::static_fitted;
+use excited::outrun;
 use frequencies::for_modes;
 pub use frequencies::modes_fitted;
 pub use in_band::harmonic_fitted;
@@ -43,7 +44,7 @@ use meshed::on;
 pub use path::path_fitted;
 use pull_in::for_pull_in;
 pub use pull_in::pull_in_fitted;
-use warnings::{of_pieces, of_stress};
+use warnings::{of_fingers, of_heat, of_pieces, of_steps, of_stress};
 
 pub use unasked::unasked;
 pub(crate) use warnings::WARNING;
@@ -107,16 +108,23 @@ pub fn fitted_in_time(
     let mut moving = on(moving, order)?;
     let told = told_of_run(&moving, start.as_ref(), &options.voltages);
     moving.warnings.items.extend(told);
+    let missed = options.step.zip(outrun(&moving, options)).map(|(step, mode)| of_steps(step, mode));
+    moving.warnings.items.extend(missed);
     Ok((moving, start))
 }
 
-/// What a run leaves out: the stiffness of stress in a linear model, and what beams bend between the ends of a gap along them, as far as
-/// that is seen where the run goes to.
+/// What a run leaves out: the stiffness of stress in a linear model, what beams bend between the ends of a gap along them, and combs and
+/// temperatures beyond their range, as far as that is seen where the run goes to.
 pub(crate) fn told_of_run(moving: &Compiled, start: Option<&Compiled>, voltages: &PortVoltages) -> Vec<Diagnostic> {
     let share = if moving.options.linear { left_out_in_time(moving, start, voltages) } else { None };
-    let end = if moving.structure.beam_gaps.is_empty() { None } else { operating_point(moving, voltages).ok() };
+    let drawn = &moving.structure;
+    let some = !(drawn.beam_gaps.is_empty() && drawn.combs.is_empty() && moving.parts.heaters.is_empty());
+    let end = if some { operating_point(moving, voltages).ok() } else { None };
     let points: Vec<(OperatingPoint, f64)> = end.map(|end| (end, OF_DEFLECTION)).into_iter().collect();
-    of_stress(moving, share).into_iter().chain(of_pieces(moving, &points)).collect()
+    let there = points.first().map(|(end, _)| end);
+    let told = of_stress(moving, share).into_iter().chain(of_pieces(moving, &points));
+    let told = told.chain(there.and_then(|end| of_fingers(moving, end)));
+    told.chain(there.and_then(|end| of_heat(moving, end))).collect()
 }
 
 /// What stress would change in the way that a linear run goes: from its first state to where it would rest.

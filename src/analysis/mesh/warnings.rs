@@ -16,6 +16,8 @@ const STRESS: &str = "W041";
 const FINGERS: &str = "W024";
 /// Code of the warning that nothing is solid at a temperature.
 const HEAT: &str = "W037";
+/// Code of the warning that the steps of a run are longer than what it begins with.
+const STEPS: &str = "W044";
 
 /// What fitting a model to a request warns of, as sentences for who has no other way to see them.
 pub fn warnings(fitted: &Compiled) -> impl Iterator<Item = String> {
@@ -23,7 +25,7 @@ pub fn warnings(fitted: &Compiled) -> impl Iterator<Item = String> {
         .warnings
         .items
         .iter()
-        .filter(|d| [WARNING, STRESS, PIECES, FINGERS, HEAT].contains(&d.code.as_str()))
+        .filter(|d| [WARNING, STRESS, PIECES, FINGERS, HEAT, STEPS].contains(&d.code.as_str()))
         .map(|d| d.message.clone())
 }
 
@@ -66,6 +68,17 @@ pub(super) fn of_pieces(compiled: &Compiled, points: &[(OperatingPoint, f64)]) -
 pub(super) fn of_fingers(compiled: &Compiled, point: &OperatingPoint) -> Option<Diagnostic> {
     let message = comb_beyond_told(compiled, &point.q)?;
     Some(Diagnostic::warning(FINGERS, message, "draw the `stop2d` that holds the part, or longer fingers"))
+}
+
+/// Where equal steps [s] are longer than a radian of a motion that a run begins with, of a frequency [Hz] and a share of the way.
+pub(super) fn of_steps(step: f64, (frequency, share): (f64, f64)) -> Diagnostic {
+    let message = format!(
+        "steps of {step:e} s are longer than a radian of the motion at {frequency:.4e} Hz, which has {:.0} % of the way that the run begins with: \
+         they damp it away or slow it, and no comparison of steps shows that",
+        100.0 * share
+    );
+    let help = format!("take a --step of {:.1e} s or less, or none", 0.2 / (std::f64::consts::TAU * frequency));
+    Diagnostic::warning(STEPS, message, &help)
 }
 
 /// Where current makes a beam hotter than any solid bears.
