@@ -118,6 +118,9 @@ pub fn discretize_like(
     let stiff: Vec<bool> = segments.iter().map(|n| *n == 0).collect();
     let mut rigid = rigid::Assembly::new(structure, &stiff);
     let mut laid = beam::Joints::default();
+    // a joint for each segment and a body between any two; a wall has a joint more
+    laid.joints.reserve(total + segments.len() + structure.springs.len() + structure.supports.len());
+    rigid.bodies.reserve(total);
     let mut dampers: Vec<Damper> = Vec::new();
     let mut beams = Vec::with_capacity(structure.beams.len());
     let mut heaters = Vec::new();

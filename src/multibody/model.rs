@@ -61,13 +61,11 @@ impl Model {
         linear: bool,
     ) -> (Self, Vec<usize>) {
         let pairs = joints.iter().map(|j| (j.a, j.b)).chain(dampers.iter().map(|d| (d.a, d.b)));
-        let edges: Vec<(usize, usize)> = pairs
-            .chain(couplings.iter().copied())
-            .filter_map(|pair| match pair {
-                (BodyId::Free(a), BodyId::Free(b)) => Some((a, b)),
-                _ => None,
-            })
-            .collect();
+        let mut edges: Vec<(usize, usize)> = Vec::with_capacity(joints.len() + dampers.len() + couplings.len());
+        edges.extend(pairs.chain(couplings.iter().copied()).filter_map(|pair| match pair {
+            (BodyId::Free(a), BodyId::Free(b)) => Some((a, b)),
+            _ => None,
+        }));
         let grounded: Vec<usize> = (joints.iter().map(|j| (j.a, j.b)))
             .filter_map(|pair| match pair {
                 (BodyId::Free(k), BodyId::Ground) | (BodyId::Ground, BodyId::Free(k)) => Some(k),

@@ -9,6 +9,8 @@ use rustc_hash::FxHashSet;
 const NODE_BYTES: usize = 200;
 /// Of an element without its name, about [byte].
 pub(crate) const ELEMENT_BYTES: usize = 400;
+/// Nodes and beams that room is made for at first.
+const ROOM: usize = 32;
 /// How often a model and its description hold a name.
 pub(crate) const NAME_COPIES: usize = 4;
 
@@ -123,6 +125,17 @@ pub(crate) struct Drawing {
 }
 
 impl Drawing {
+    /// Nothing drawn yet, with room for a small part.
+    pub(crate) fn new() -> Self {
+        let mut drawing = Self::default();
+        drawing.structure.nodes.reserve(ROOM);
+        drawing.structure.beams.reserve(ROOM);
+        drawing.placements.reserve(2 * ROOM);
+        drawing.placed.reserve(4 * ROOM);
+        drawing.first_named.reserve(ROOM);
+        drawing
+    }
+
     /// A new node.
     pub(crate) fn add_node(&mut self, name: String, span: Span) -> NodeId {
         budget::lay_out(NODE_BYTES + NAME_COPIES * name.len());

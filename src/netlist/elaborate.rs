@@ -81,7 +81,7 @@ impl<'p> Elaborator<'p> {
             sink,
             frames: vec![frame],
             layers: vec![None; program.layers.len()],
-            drawing: Drawing::default(),
+            drawing: Drawing::new(),
             parameters: Vec::new(),
             from_outside: FxHashSet::default(),
             parameter_at: FxHashMap::default(),

@@ -72,8 +72,11 @@ impl Site<'_, '_> {
 
     fn find(&self, name: &str) -> Option<(&Value, Span)> {
         let arguments = &self.instance.arguments;
-        let given = arguments.given.iter().find(|a| a.name == name && a.value != Value::Undefined);
-        let layer = || arguments.layer.iter().find(|(n, v)| *n == name && *v != Value::Undefined);
+        // most names that are as long begin otherwise
+        let first = name.as_bytes().first();
+        let is = |other: &str| other.len() == name.len() && other.as_bytes().first() == first && other == name;
+        let given = arguments.given.iter().find(|a| is(a.name) && a.value != Value::Undefined);
+        let layer = || arguments.layer.iter().find(|(n, v)| is(n) && *v != Value::Undefined);
         given.map(|a| (&a.value, a.span)).or_else(|| layer().map(|(_, v)| (v, self.instance.span)))
     }
 
