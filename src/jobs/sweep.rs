@@ -151,10 +151,15 @@ pub fn run_on(
         .num_threads(spec.threads.unwrap_or(0))
         .build()
         .map_err(|error| SweepError::Threads { reason: error.to_string() })?;
+    // no thread goes without while another has many; a row does not depend on who is beside it
+    let at_once = match family.shares() {
+        true => numbers.len().div_ceil(2 * pool.current_num_threads()).clamp(1, together::CHUNK),
+        false => 1,
+    };
     let outcomes: Option<Vec<Vec<_>>> = pool.install(|| match spec.analysis {
         SweepAnalysis::Transient { .. } => numbers.par_chunks(transient::CHUNK).map(some).collect(),
         SweepAnalysis::Static { .. } | SweepAnalysis::Modes { .. } => {
-            numbers.par_chunks(together::CHUNK).map(several).collect()
+            numbers.par_chunks(at_once).map(several).collect()
         }
         SweepAnalysis::PullIn { .. } => numbers.par_iter().map(one).collect(),
     });
