@@ -34,7 +34,8 @@ pub struct ModesResult {
     pub unknowns: usize,
     /// Largest displacement of a node at the equilibrium that the modes are about [m].
     pub deflection_m: f64,
-    /// How much faster a frequency moves than the equilibrium, d ln f / d ln q of the worst [1].
+    /// How much faster a frequency moves than the equilibrium, d ln f / d ln q of the worst [1]; for the search for a mesh, and 0 in
+    /// what it ends with.
     #[serde(skip)]
     pub per_deflection: f64,
     /// What the numbers do not say by themselves.

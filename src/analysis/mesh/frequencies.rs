@@ -30,7 +30,8 @@ pub fn modes_fitted(
         None => modes_with_curves(&fitted, count, voltages)?,
     };
     let estimated_error = fitted.order.estimated_error;
-    Ok((fitted, ModesResult { estimated_error, ..result }, curves))
+    // the search has no more use of how they follow the deflection
+    Ok((fitted, ModesResult { estimated_error, per_deflection: 0.0, ..result }, curves))
 }
 
 /// Modes with the shapes of their beams.
