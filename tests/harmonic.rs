@@ -231,8 +231,7 @@ fn heat_lags() {
     let options = HarmonicOptions { voltages: vec![("heat".into(), 1.0)], ..asked("heat", &["s.y"], 1.0, 1e6) };
     let corners: Vec<f64> =
         run(&compiled, &options).poles.unwrap().iter().filter(|p| p.im == 0.0).map(|p| -1.0 / p.re).collect();
-    let taus: Vec<f64> =
-        compiled.structure.beams.iter().filter_map(|b| b.heater.as_ref().map(|h| h.time_constant)).collect();
+    let taus: Vec<f64> = compiled.parts.system.electrics.heating.heaters.iter().map(|h| h.time_constant).collect();
     assert!(
         !corners.is_empty() && corners.iter().all(|c| taus.iter().any(|t| (c / t - 1.0).abs() < 1e-12)),
         "{corners:?} {taus:?}"

@@ -295,13 +295,14 @@ fn beam2det() {
     let plain = one("");
     same(plain.resistance, 500.0);
     same(plain.conductance, 30.0 * 4e-6 * 2e-6 / 100e-6);
-    assert_eq!((plain.time_constant, plain.capacity), (0.0, 0.0));
+    assert_eq!((plain.time_constant, plain.capacity), (Some(0.0), 0.0));
     let slow = one("specificheat=700 R=50");
     same(slow.resistance, 50.0);
     same(slow.capacity, 2000.0 * 700.0 * 100e-6 * 4e-6 * 2e-6);
-    assert_eq!(slow.time_constant, 0.0);
+    assert_eq!(slow.time_constant, None);
     let given = one("tau=1m specificheat=700");
-    assert_eq!((given.time_constant, given.capacity), (1e-3, 0.0));
+    assert_eq!(given.time_constant, Some(1e-3));
+    same(given.capacity, slow.capacity);
 }
 
 /// comb2d: constant force, b at 2L − l; comb2de: finite overlap between electrical nodes.

@@ -22,6 +22,11 @@ pub(super) const OF_PULL_IN: f64 = 1.0 / 3.0;
 pub(super) fn told(compiled: &Compiled, worst: Option<(String, f64)>) -> Option<String> {
     let tol = compiled.options.tol;
     let (name, error) = worst.filter(|(_, error)| *error > tol)?;
+    if error.is_infinite() {
+        return Some(format!(
+            "`{name}` acts on the ends of its beams, which would bend between them too: in more pieces it may pull in at this voltage"
+        ));
+    }
     Some(format!(
         "`{name}` acts on the ends of its beams, which would bend between them too: it may be off by {error:.1e}, more than the \
          tolerance {tol:e}"

@@ -155,8 +155,10 @@ fn shapeless(compiled: &Compiled, count: usize, voltages: &PortVoltages) -> Resu
     let about = About { compiled, q: &q, drive: &drive, stressed: !as_sugar, modes };
     let per_deflection = if loaded { about.to_deflection() } else { 0.0 };
     let in_pieces = in_pieces.map(|(name, share)| {
-        let next_to_fold = gap_pieces::OF_PULL_IN * about.to_voltage();
-        (name, share * next_to_fold.max(gap_pieces::OF_DEFLECTION))
+        // f goes as the fourth root of what is left of the voltage: by so much more than in proportion
+        let left = 1.0 - 4.0 * share * gap_pieces::OF_PULL_IN * about.to_voltage();
+        let next_to_fold = if left > 0.0 { left.powf(-0.25) - 1.0 } else { f64::INFINITY };
+        (name, next_to_fold.max(share * gap_pieces::OF_DEFLECTION))
     });
     let way = way.into_iter().map(|way| format!("the equilibrium that these modes are about: {way}"));
     let warnings = gap_pieces::told(compiled, in_pieces).into_iter().chain(way).collect();

@@ -57,6 +57,17 @@ pub fn pull_in(compiled: &Compiled, port: Option<&str>, max: f64) -> Result<Pull
                 .into(),
         });
     }
+    let rows = &system.electrics.gap_rows;
+    let pulls = |source: usize| (0..system.gaps.len()).any(|gap| rows[(gap, source)] != 0.0);
+    if !pulls(source) {
+        let names = &system.electrics.names;
+        let others: Vec<&str> = (0..names.len()).filter(|k| pulls(*k)).map(|k| names[k].as_str()).collect();
+        let detail = format!(
+            "it acts on no gap; of the others do {}",
+            if others.is_empty() { "none".into() } else { others.join(", ") }
+        );
+        return Err(AnalysisError::BadRequest { what: format!("port \"{}\"", names[source]), detail });
+    }
     let mut off = source_vector(compiled, &[])?;
     off[source] = 0.0;
     let mut sweep = Sweep {

@@ -10,18 +10,13 @@ use crate::multibody::planar::Pose;
 use crate::structure::Beam;
 
 /// What models are worth by themselves [1]: junctions stand within about this of plane stress (docs/junctions.md), and less is not told.
-const WORTH: f64 = 7e-3;
+pub(super) const WORTH: f64 = 7e-3;
 
 /// What to say of `modes` (xᵀMx = 1) where rotary inertia would take more off a frequency than the tolerance and than what models are worth.
 pub(super) fn told(compiled: &Compiled, modes: &[Vec<Pose>]) -> Option<String> {
     let options = &compiled.options;
-    // a user of --as-sugar asks for SUGAR's mass matrix, which has none either
-    if options.rotary_inertia || options.as_sugar {
-        return None;
-    }
-    let shares = modes.iter().map(|x| share(compiled, x));
-    let (mode, share) = shares.enumerate().max_by(|a, b| a.1.total_cmp(&b.1))?;
-    let over = (1.0 + share).sqrt() - 1.0;
+    let all = modes.iter().map(|x| too_high(compiled, x));
+    let (mode, over) = all.enumerate().max_by(|a, b| a.1.total_cmp(&b.1))?;
     (over > options.tol.max(WORTH)).then(|| {
         format!(
             "the sections of wide beams turn without inertia: mode {}, most of all, comes out too high by about {:.1} %; take --rotary-inertia",
@@ -29,6 +24,13 @@ pub(super) fn told(compiled: &Compiled, modes: &[Vec<Pose>]) -> Option<String> {
             100.0 * over
         )
     })
+}
+
+/// By how much the frequency of a mode (xᵀMx = 1) comes out too high [1].
+pub(super) fn too_high(compiled: &Compiled, x: &[Pose]) -> f64 {
+    let options = &compiled.options;
+    // a user of --as-sugar asks for SUGAR's mass matrix, which has none either
+    if options.rotary_inertia || options.as_sugar { 0.0 } else { (1.0 + share(compiled, x)).sqrt() - 1.0 }
 }
 
 /// J of a mode: the rotary inertia of beams that bend. Rigid ones (of no segment) have theirs.

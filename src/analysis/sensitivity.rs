@@ -30,6 +30,36 @@ pub(super) struct About<'a> {
     pub(super) modes: (&'a [f64], &'a [Vec<Pose>]),
 }
 
+/// d ln q / d ln V of an equilibrium, by its largest displacements [1]; infinite where the tangent is singular.
+pub(super) fn deflection_to_voltage(compiled: &Compiled, q: &[Pose], drive: &Drive) -> f64 {
+    let Some((way, _)) = raised(compiled, q, drive) else { return f64::INFINITY };
+    let linear = compiled.parts.system.model.linear;
+    let reach = |q: &[Pose], linear: bool| {
+        let moved = compiled.parts.nodes.iter().flatten().map(|p| p.displacement(q, linear).norm());
+        moved.fold(0.0, f64::max)
+    };
+    let (moved, whole) = (reach(&way, true), reach(q, linear));
+    if whole > 0.0 { moved / (RAISED * whole) } else { 0.0 }
+}
+
+/// The way that an equilibrium goes when the voltages across gaps rise by a little, and what drives it there; none where its tangent is
+/// singular.
+fn raised(compiled: &Compiled, q: &[Pose], drive: &Drive) -> Option<(Vec<Pose>, Drive)> {
+    let system = &compiled.parts.system;
+    let (model, pattern) = (&system.model, &system.model.pattern);
+    let raised = Drive { volts: drive.volts.iter().map(|v| v * (1.0 + RAISED)).collect(), ..drive.clone() };
+    let (mut tangent, mut before) = (BlockMatrix::new(pattern), q.to_vec());
+    system.tangent(q, drive, &mut tangent, &mut before);
+    let mut way = q.to_vec();
+    system.residual(q, &raised, &mut way);
+    way.iter_mut().zip(&before).for_each(|(after, before)| *after = before - *after);
+    model.project_matrix(&mut tangent);
+    model.project(&mut way);
+    tangent.factor(pattern).ok()?;
+    tangent.solve(pattern, &mut way);
+    Some((way, raised))
+}
+
 impl About<'_> {
     /// d ln f / d ln q of the worst mode [1].
     pub(super) fn to_deflection(self) -> f64 {
@@ -40,23 +70,9 @@ impl About<'_> {
         self.worst(&moved(1.0 + STEP), &moved(1.0 - STEP), 2.0 * STEP)
     }
 
-    /// d ln f / d ln V of the worst mode, V the voltages across gaps [1]; 0 where the tangent is singular.
-    pub(super) fn to_voltage(self) -> f64 {
-        let system = &self.compiled.parts.system;
-        let (model, pattern) = (&system.model, &system.model.pattern);
-        let raised =
-            Drive { volts: self.drive.volts.iter().map(|v| v * (1.0 + RAISED)).collect(), ..self.drive.clone() };
-        let (mut tangent, mut before) = (BlockMatrix::new(pattern), self.q.to_vec());
-        system.tangent(self.q, self.drive, &mut tangent, &mut before);
-        let mut way = self.q.to_vec();
-        system.residual(self.q, &raised, &mut way);
-        way.iter_mut().zip(&before).for_each(|(after, before)| *after = before - *after);
-        model.project_matrix(&mut tangent);
-        model.project(&mut way);
-        if tangent.factor(pattern).is_err() {
-            return 0.0;
-        }
-        tangent.solve(pattern, &mut way);
+    /// d ln f / d ln V of the worst mode, V the voltages across gaps [1]; infinite where the tangent is singular.
+    pub(super) fn to_voltage(&self) -> f64 {
+        let Some((way, raised)) = raised(self.compiled, self.q, self.drive) else { return f64::INFINITY };
         let there: Vec<Pose> = self.q.iter().zip(&way).map(|(q, way)| q + way).collect();
         self.worst(&self.quotients(&there, &raised), &self.quotients(self.q, self.drive), RAISED)
     }

@@ -33,7 +33,8 @@ pub fn lay(structure: &Structure, heated: &[usize], rigid: &Assembly) -> Result<
                 conductance: h.conductance,
                 expansion: beam.material.thermal_expansion,
                 ambient: beam.material.ambient_temperature,
-                time_constant: h.time_constant,
+                time_constant: h.time_constant.unwrap_or(0.0),
+                delayed: h.time_constant.is_none(),
                 capacity: h.capacity,
             });
         }

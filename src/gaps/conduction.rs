@@ -31,7 +31,9 @@ pub struct Heater {
     pub ambient: f64,
     /// Time constant [s]; 0: at once.
     pub time_constant: f64,
-    /// Heat capacity, where the time constant comes of it [J/K]; else 0.
+    /// Whether that is to come of the heat capacities of all that conducts.
+    pub delayed: bool,
+    /// Heat capacity [J/K]; 0 where it is not known.
     pub capacity: f64,
 }
 
@@ -94,8 +96,31 @@ impl Conduction {
         heaters.iter().map(|h| [at(h.a), at(h.b)]).collect()
     }
 
-    /// Mean delay of the rise of each heater behind the heat into all of them [s, W]. One that stays cold has its own.
+    /// The heat into each heater, and where none comes into a part that conducts together, heat in proportion to capacity [W]. The nodes
+    /// of a heater that are not at ambient join it to a part.
+    fn evenly(&self, heaters: &[Heater], watts: &[f64]) -> Vec<f64> {
+        let count = self.row.len();
+        let mut parts = Sets::new(count + heaters.len());
+        for (k, h) in heaters.iter().enumerate() {
+            for node in [h.a, h.b] {
+                if self.row[node].is_some() {
+                    parts.join(node, count + k);
+                }
+            }
+        }
+        let mut heated = vec![false; count + heaters.len()];
+        for (k, watts) in watts.iter().enumerate() {
+            heated[parts.first(count + k)] |= *watts > 0.0;
+        }
+        let one = |(k, (h, watts)): (usize, (&Heater, &f64))| {
+            if heated[parts.first(count + k)] { *watts } else { h.capacity }
+        };
+        heaters.iter().zip(watts).enumerate().map(one).collect()
+    }
+
+    /// Mean delay of the rise of each heater behind the heat into all of them [s, W]. A part that none comes into is heated evenly.
     pub(super) fn delays(&self, heaters: &[Heater], watts: &[f64]) -> Vec<f64> {
+        let watts = &self.evenly(heaters, watts);
         let warm = self.ends(heaters, watts.iter().map(|watts| [0.5 * watts; 2]));
         let stored = |((h, watts), [a, b]): ((&Heater, &f64), &[f64; 2])| {
             let own = watts / (24.0 * h.conductance);

@@ -67,13 +67,13 @@ impl Heating {
                 }
             }
         }
-        if heaters.iter().any(|h| h.capacity > 0.0) {
+        if heaters.iter().any(|h| h.delayed) {
             // that of one volt of each source in turn, all together
             for (k, watts) in watts.iter_mut().enumerate() {
                 *watts = heaters[k].resistance * currents[k].norm_squared();
             }
             let delays = conduction.delays(&heaters, &watts);
-            heaters.iter_mut().zip(delays).filter(|(h, _)| h.capacity > 0.0).for_each(|(h, tau)| h.time_constant = tau);
+            heaters.iter_mut().zip(delays).filter(|(h, _)| h.delayed).for_each(|(h, tau)| h.time_constant = tau);
         }
         Ok(Self { heaters, sources, form, currents, sink: sink.to_vec(), heat: Vec::new() })
     }
@@ -174,6 +174,7 @@ mod tests {
             expansion: 0.0,
             ambient: 0.0,
             time_constant: 0.0,
+            delayed: true,
             capacity: 1600e3 * l * area,
         };
         let heaters: Vec<_> = (0..pieces).map(heater).collect();
@@ -215,6 +216,27 @@ mod tests {
         }
     }
 
+    /// Heat that comes from elsewhere, without any circuit, lags as that of a current does; and a piece whose own time constant is given still
+    /// takes its heat.
+    #[test]
+    fn delays_need_no_current() {
+        let driven = bar(4);
+        let heaters: Vec<Heater> = driven.heaters.iter().map(|h| Heater { time_constant: 0.0, ..*h }).collect();
+        let sink = [true, false, false, false, true];
+        let none = Circuit { nodes: 5, resistors: Vec::new(), sources: Vec::new(), grounds: Vec::new() };
+        let alone = Heating::new(heaters.clone(), &none.solve().unwrap(), 0, &sink).unwrap();
+        let given: Vec<Heater> =
+            heaters.iter().enumerate().map(|(k, h)| Heater { delayed: k != 0, time_constant: 1e-6, ..*h }).collect();
+        let beside = Heating::new(given, &none.solve().unwrap(), 0, &sink).unwrap();
+        for k in 1..4 {
+            let want = driven.heaters[k].time_constant;
+            for heating in [&alone, &beside] {
+                assert!((heating.heaters[k].time_constant / want - 1.0).abs() < 1e-12, "{k}");
+            }
+        }
+        assert_eq!(beside.heaters[0].time_constant, 1e-6);
+    }
+
     /// A heater without a path for its heat is refused.
     #[test]
     fn no_sink() {
@@ -226,6 +248,7 @@ mod tests {
             expansion: 0.0,
             ambient: 0.0,
             time_constant: 0.0,
+            delayed: false,
             capacity: 0.0,
         };
         let circuit = Circuit { nodes: 2, resistors: vec![(0, 1, 1.0)], sources: vec![(0, Some(1))], grounds: vec![1] };

@@ -59,7 +59,7 @@ pub(crate) fn finite(drawing: &Drawing, sink: &mut Sink) {
     }
     for b in s.beams.iter().filter_map(|b| b.heater.as_ref().map(|h| (b, h))) {
         let conducts = RESISTANCES.contains(&b.1.resistance) && RESISTANCES.contains(&b.1.conductance);
-        look(&b.0.name, b.0.a, conducts && b.1.time_constant.is_finite());
+        look(&b.0.name, b.0.a, conducts && all(&[b.1.time_constant.unwrap_or(0.0), b.1.capacity]));
     }
 }
 

@@ -59,9 +59,10 @@ pub struct Heater {
     pub resistance: f64,
     /// Thermal conductance from end to end k·A/l [W/K].
     pub conductance: f64,
-    /// Time constant with which the mean temperature rise follows its steady value [s]; 0: at once, or as the heat capacities say.
-    pub time_constant: f64,
-    /// Heat capacity ρ·c·w·h·l, where the time constant is to come of those of all that conducts [J/K]; else 0.
+    /// Time constant with which the mean temperature rise follows its steady value [s], 0: at once; none where it comes of the heat
+    /// capacities of all that conducts.
+    pub time_constant: Option<f64>,
+    /// Heat capacity ρ·c·w·h·l [J/K]; 0 where no specific heat is known.
     pub capacity: f64,
 }
 

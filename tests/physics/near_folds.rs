@@ -38,6 +38,37 @@ fn modes_next_to_pull_in() {
     }
 }
 
+/// A gap in few pieces next to its pull-in is warned of, as far off as it is or further: a cantilever in 4 pieces against one in 24, 1e-4 and
+/// 1e-5 below 6.1849 V (2.1e-3 and 4.7e-3 off, in silence before).
+#[test]
+fn few_pieces_next_to_pull_in() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/netlists/accuracy/cantilever_gap.net");
+    let pieces = |n: f64| Bundle::read(&path, &[]).map(|bundle| with_pieces(bundle, n)).unwrap();
+    let at = |n: f64, volts: f64| {
+        let compiled = compile(&pieces(n), &CompileOptions::default()).unwrap();
+        let (fitted, result, _) = static_fitted(&compiled, &[("drive".into(), volts)]).unwrap();
+        let most = result.nodes.iter().map(|(_, m)| m.y.abs()).fold(0.0, f64::max);
+        (most, warnings(&fitted).find_map(|w| w.split("off by ").nth(1)?.split(',').next()?.parse::<f64>().ok()))
+    };
+    for below in [1e-4, 1e-5] {
+        let volts = 6.184_909 * (1.0 - below);
+        let ((found, told), (exact, _)) = (at(4.0, volts), at(24.0, volts));
+        let off = (found / exact - 1.0).abs();
+        assert!(told.is_some_and(|told| told >= off / 2.0), "{below}: {off:e}, told {told:?}");
+    }
+}
+
+/// The same drawing with another number of pieces.
+fn with_pieces(mut bundle: Bundle, n: f64) -> Bundle {
+    for text in bundle.files.values_mut() {
+        let lines = text
+            .lines()
+            .map(|line| if line.trim_start().starts_with("n =") { format!("n = {n}") } else { line.to_owned() });
+        *text = lines.collect::<Vec<_>>().join("\n");
+    }
+    bundle
+}
+
 /// A part that is stressed and still by symmetry needs no finer mesh for what rounding makes of its displacements (1e-27 m), and nothing is
 /// off; its modes hold the tolerance against 48 segments a beam.
 #[test]

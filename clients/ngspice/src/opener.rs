@@ -125,11 +125,11 @@ pub fn open_model(card: &mut ModelCard, directory: Option<&Path>) -> Result<Box<
     }
 }
 
-/// Gives the model twice the segments that it would have, every beam as many as the finest; a band is refined by its tolerance.
+/// Gives the model twice the segments that it would have, every beam as many as the finest.
 fn refine(card: &mut ModelCard, bundle: &Bundle) -> Result<(), OpenError> {
-    if card.options.band.is_none() {
-        let model = compiled(&card.file, bundle.clone(), &card.options)?;
-        card.options.segments = model.order.segments.iter().max().filter(|most| **most > 0).map(|most| 2 * most);
+    let model = compiled(&card.file, bundle.clone(), &card.options)?;
+    if let Some(most) = model.order.segments.iter().max().filter(|most| **most > 0) {
+        (card.options.segments, card.options.band) = (Some(2 * most), None);
     }
     Ok(())
 }

@@ -4,8 +4,9 @@
 //! hardly moves; that of a rotation likewise, and no smaller than what turns the size of the mechanism by a thirtieth of the largest
 //! displacement. The finer mesh starts from the state of the coarser one, so that both are on one branch.
 
-use super::super::gap_pieces::OF_DEFLECTION;
+use super::super::gap_pieces::{OF_DEFLECTION, OF_PULL_IN};
 use super::super::linear_stress::left_out;
+use super::super::sensitivity::deflection_to_voltage;
 use super::super::statics::{
     OperatingPoint, StaticResult, beam_motions, operating_point, operating_point_near, result_at,
 };
@@ -212,7 +213,16 @@ pub fn static_fitted(
 /// What an equilibrium is warned of beside its mesh: what a linear model leaves out, and gaps in too few pieces.
 pub(super) fn told_of_static(fitted: &Compiled, point: OperatingPoint) -> (OperatingPoint, Vec<Diagnostic>) {
     let share = if fitted.options.linear { left_out(fitted, &point, &point.q) } else { None };
-    let points = [(point, OF_DEFLECTION)];
+    let times = if fitted.structure.beam_gaps.is_empty() {
+        OF_DEFLECTION
+    } else {
+        let electrics = &fitted.parts.system.electrics;
+        let (mut rise, mut drive) = (point.rise.clone(), electrics.drive());
+        electrics.steady(&point.sources, &mut rise, &mut drive);
+        // next to a fold it moves far faster than the voltage
+        OF_DEFLECTION.max(OF_PULL_IN * deflection_to_voltage(fitted, &point.q, &drive))
+    };
+    let points = [(point, times)];
     let told = of_stress(fitted, share).into_iter().chain(of_pieces(fitted, &points));
     let told = told.chain(of_fingers(fitted, &points[0].0)).chain(of_heat(fitted, &points[0].0)).collect();
     let [(point, _)] = points;

@@ -11,17 +11,20 @@
 //! drives comes with its time constant τ: of it a mode swings with 1/√(1 + (ωτ)²), the rest follows slowly.
 
 use super::super::modes::modes;
+use super::super::rotary_left_out;
 use super::super::statics::{OperatingPoint, operating_point};
 use super::super::transient::TransientOptions;
 use super::super::{AnalysisError, PortVoltages};
 use super::equilibrium;
 use super::meshed::{chosen, meshed};
+use super::warnings::{of_rotary, of_steps};
 use crate::compile::Compiled;
 use crate::discretize::DiscretizeError;
 use crate::gaps::Drive;
 use crate::multibody::forces::add_damping;
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, Model};
+use crate::netlist::Diagnostic;
 use crate::options::CompileOptions;
 use crate::refine::counted;
 use crate::refine::doubling::{self, Output};
@@ -42,6 +45,8 @@ struct Excited {
     frequency: f64,
     amplitude: f64,
     decay: f64,
+    /// By how much its frequency is too high for want of rotary inertia [1].
+    rotary: f64,
 }
 
 /// The mesh for a run.
@@ -115,11 +120,22 @@ pub(super) fn order(moving: &Compiled, options: &TransientOptions<'_>) -> Result
     }
 }
 
+/// What a run on its mesh is warned of beside it: equal steps that its motion outruns, and rotary inertia left out.
+pub(super) fn told_of_motion(moving: &Compiled, options: &TransientOptions<'_>) -> Vec<Diagnostic> {
+    let Ok((modes, _)) = excited(moving, options, &moving.order.segments, FIRST) else { return Vec::new() };
+    let missed = options.step.and_then(|step| Some(of_steps(step, outrun(moving, step, &modes)?)));
+    let late = |mode: &Excited| {
+        let lasts = options.stop.min(2.0 / mode.decay.max(f64::MIN_POSITIVE));
+        // a wave that has lost its phase is off by what it swings
+        mode.amplitude * (mode.rotary * TAU * mode.frequency * lasts / 3f64.sqrt()).min(2f64.sqrt())
+    };
+    let error = modes.iter().map(late).fold(0.0, f64::max);
+    missed.into_iter().chain(of_rotary(moving, error)).collect()
+}
+
 /// The mode that a run in equal steps begins with and cannot follow: its frequency [Hz] and its share of the way. A step longer than a
 /// radian of it damps it away or slows it, in a companion of twice the step as well.
-pub(super) fn outrun(moving: &Compiled, options: &TransientOptions<'_>) -> Option<(f64, f64)> {
-    let step = options.step?;
-    let (modes, _) = excited(moving, options, &moving.order.segments, FIRST).ok()?;
+fn outrun(moving: &Compiled, step: f64, modes: &[Excited]) -> Option<(f64, f64)> {
     let swings = |mode: &&Excited| mode.decay < 2.0 * TAU * mode.frequency && mode.amplitude > moving.options.tol;
     let too_fast = |mode: &&Excited| TAU * mode.frequency * step > 1.0;
     let most = modes.iter().filter(swings).filter(too_fast).max_by(|a, b| a.amplitude.total_cmp(&b.amplitude))?;
@@ -237,7 +253,12 @@ fn excited(
                 *way -= x * share;
             }
             let swung = (share.abs() * reach(&model, x) / size / (1.0 + (omega * slow).powi(2)).sqrt()).min(1.0);
-            Excited { frequency: omega / TAU, amplitude: swung, decay: damping(&system.model, x) }
+            Excited {
+                frequency: omega / TAU,
+                amplitude: swung,
+                decay: damping(&system.model, x),
+                rotary: rotary_left_out::too_high(&model, x),
+            }
         })
         .collect();
     let last = found.lambda.last().map_or(0.0, |l| l.max(0.0).sqrt());

@@ -79,7 +79,9 @@ pub(super) fn for_modes(
     let carried = found.as_ref().is_some_and(|(_, (modes, _))| is_carried(compiled, modes, still.estimated_error));
     let enough = carried && own.estimated_error.is_some_and(|error| error <= counted::SAFETY * compiled.options.tol);
     if enough || count > MOST_COMPARED {
-        let estimated_error = worst(still.estimated_error, own.estimated_error);
+        let faster = found.as_ref().map_or(1.0, |(_, (modes, _))| modes.per_deflection.max(1.0));
+        let moved = still.estimated_error.map(|error| if carried { error } else { error * faster });
+        let estimated_error = worst(moved, own.estimated_error);
         return Ok((ModelOrder { estimated_error, ..own }, found));
     }
     let moving = doubling::fit(&compiled.structure, &compiled.options, still.segments, &mut analyse)?;

@@ -36,7 +36,7 @@ use crate::multibody::planar::Pose;
 use crate::netlist::Diagnostic;
 use crate::refine::model_order::ModelOrder;
 pub use equilibrium::static_fitted;
-use excited::outrun;
+use excited::told_of_motion;
 use frequencies::for_modes;
 pub use frequencies::modes_fitted;
 pub use in_band::harmonic_fitted;
@@ -44,7 +44,7 @@ use meshed::on;
 pub use path::path_fitted;
 use pull_in::for_pull_in;
 pub use pull_in::pull_in_fitted;
-use warnings::{of_fingers, of_heat, of_pieces, of_steps, of_stress};
+use warnings::{of_fingers, of_heat, of_pieces, of_stress};
 
 pub use unasked::unasked;
 pub(crate) use warnings::WARNING;
@@ -108,8 +108,8 @@ pub fn fitted_in_time(
     let mut moving = on(moving, order)?;
     let told = told_of_run(&moving, start.as_ref(), &options.voltages);
     moving.warnings.items.extend(told);
-    let missed = options.step.zip(outrun(&moving, options)).map(|(step, mode)| of_steps(step, mode));
-    moving.warnings.items.extend(missed);
+    let told = told_of_motion(&moving, options);
+    moving.warnings.items.extend(told);
     Ok((moving, start))
 }
 

@@ -2,6 +2,7 @@
 
 use super::super::contact_range::comb_beyond_told;
 use super::super::gap_pieces;
+use super::super::rotary_left_out;
 use super::super::statics::{OperatingPoint, too_hot};
 use crate::compile::Compiled;
 use crate::netlist::Diagnostic;
@@ -18,6 +19,8 @@ const FINGERS: &str = "W024";
 const HEAT: &str = "W037";
 /// Code of the warning that the steps of a run are longer than what it begins with.
 const STEPS: &str = "W044";
+/// Code of the warning that rotary inertia is left out.
+const ROTARY: &str = "W045";
 
 /// What fitting a model to a request warns of, as sentences for who has no other way to see them.
 pub fn warnings(fitted: &Compiled) -> impl Iterator<Item = String> {
@@ -25,7 +28,7 @@ pub fn warnings(fitted: &Compiled) -> impl Iterator<Item = String> {
         .warnings
         .items
         .iter()
-        .filter(|d| [WARNING, STRESS, PIECES, FINGERS, HEAT, STEPS].contains(&d.code.as_str()))
+        .filter(|d| [WARNING, STRESS, PIECES, FINGERS, HEAT, STEPS, ROTARY].contains(&d.code.as_str()))
         .map(|d| d.message.clone())
 }
 
@@ -79,6 +82,17 @@ pub(super) fn of_steps(step: f64, (frequency, share): (f64, f64)) -> Diagnostic 
     );
     let help = format!("take a --step of {:.1e} s or less, or none", 0.2 / (std::f64::consts::TAU * frequency));
     Diagnostic::warning(STEPS, message, &help)
+}
+
+/// Where the rotary inertia that wide beams lack makes a run's waveform this far off.
+pub(super) fn of_rotary(compiled: &Compiled, error: f64) -> Option<Diagnostic> {
+    if error <= compiled.options.tol.max(rotary_left_out::WORTH) {
+        return None;
+    }
+    let message = format!(
+        "the sections of wide beams turn without inertia: the motion may be off by {error:.1e} of its amplitude"
+    );
+    Some(Diagnostic::warning(ROTARY, message, "take --rotary-inertia"))
 }
 
 /// Where current makes a beam hotter than any solid bears.

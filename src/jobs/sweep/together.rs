@@ -3,7 +3,7 @@
 //! Points are laid out on the first mesh that all share. Equilibria in lanes have the bits of a point alone. Modes in lanes begin with
 //! those of the middle of the grid, and are those of a point alone to rounding. A point that has its result from lanes, and whose mesh
 //! holds, is done; any other runs as a point alone. Which of the two it is depends on the grid and on the point, not on its neighbours, on
-//! shards or on threads.
+//! shards or on threads, but for points that spend a server's budget together.
 
 use super::family::Family;
 use super::point::{self, Found, Outcome, brief};
@@ -162,6 +162,10 @@ impl<'a> Together<'a> {
         if lanes.is_none() {
             return Ok(None);
         }
-        drawn.on(order).map(Some).map_err(|error| error.to_string())
+        let laid = drawn.on(order).map_err(|error| error.to_string())?;
+        if let Request::Modes { count, .. } = *request {
+            crate::budget::modes(count, || laid.unknowns());
+        }
+        Ok(Some(laid))
     }
 }

@@ -152,11 +152,8 @@ impl<'a> OfStructure<'a> {
             let conductivity = heater.conductance * beam.length / (beam.width * beam.thickness);
             parameters.extend([("R", heater.resistance), ("thermcond", conductivity)]);
             let mass = beam.material.density * beam.length * beam.width * beam.thickness;
-            parameters.push(if heater.capacity > 0.0 && mass > 0.0 {
-                ("specificheat", heater.capacity / mass)
-            } else {
-                ("tau", heater.time_constant)
-            });
+            parameters.extend((mass > 0.0 && heater.capacity > 0.0).then(|| ("specificheat", heater.capacity / mass)));
+            parameters.extend(heater.time_constant.map(|tau| ("tau", tau)));
             if let Some(strength) = self.structure.yields.iter().find(|y| y.beam == index) {
                 parameters.extend([("yieldstress", strength.stress), ("softening", strength.softening)]);
             }

@@ -172,10 +172,12 @@ pub(super) fn beam2det(site: &mut Site<'_, '_>) -> Result<(), Reported> {
         return Err(site.missing("thermalexpansion"));
     }
     let mut beam = site.beam(site.name(), [a, b], width, Some(length))?;
-    let (time_constant, capacity) = match (site.number("tau")?, site.positive_if_any("specificheat")?) {
-        (Some(_), _) => (site.non_negative_or("tau", 0.0)?, 0.0),
-        (None, heat) => (0.0, beam.material.density * heat.unwrap_or(0.0) * length * width * height),
+    let (time_constant, heat) = match (site.number("tau")?, site.positive_if_any("specificheat")?) {
+        (Some(_), heat) => (Some(site.non_negative_or("tau", 0.0)?), heat),
+        (None, Some(heat)) => (None, Some(heat)),
+        (None, None) => (Some(0.0), None),
     };
+    let capacity = beam.material.density * heat.unwrap_or(0.0) * length * width * height;
     beam.temperature = None;
     beam.heater =
         Some(Heater { resistance, conductance: conductivity * width * height / length, time_constant, capacity });
