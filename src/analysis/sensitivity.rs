@@ -71,7 +71,7 @@ impl About<'_> {
     }
 
     /// d ln f / d ln V of the worst mode, V the voltages across gaps [1]; infinite where the tangent is singular.
-    pub(super) fn to_voltage(&self) -> f64 {
+    pub(super) fn to_voltage(self) -> f64 {
         let Some((way, raised)) = raised(self.compiled, self.q, self.drive) else { return f64::INFINITY };
         let there: Vec<Pose> = self.q.iter().zip(&way).map(|(q, way)| q + way).collect();
         self.worst(&self.quotients(&there, &raised), &self.quotients(self.q, self.drive), RAISED)
