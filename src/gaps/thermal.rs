@@ -12,7 +12,7 @@
 //! the same thermal resistances Z. Resistance and conductivity do not depend on temperature here.
 //!
 //! With a time constant the rise follows its steady value: [`super::lag`]. Where a beam has a heat capacity instead, that comes from
-//! [`super::conduction`].
+//! `conduction.rs`.
 
 use super::conduction::Conduction;
 pub use super::conduction::{Heater, NoHeatSink};
