@@ -50,16 +50,11 @@ pub fn pull_in(compiled: &Compiled, port: Option<&str>, max: f64) -> Result<Pull
         });
     }
     let system = &compiled.parts.system;
-    if system.gaps.is_empty() {
-        return Err(AnalysisError::BadRequest {
-            what: format!("port \"{}\"", system.electrics.names[source]),
-            detail: "the netlist has no gap, so that nothing pulls in; `path --along` raises a voltage without one"
-                .into(),
-        });
-    }
-    let rows = &system.electrics.gap_rows;
+    let (rows, heating) = (&system.electrics.gap_rows, &system.electrics.heating);
     let pulls = |source: usize| (0..system.gaps.len()).any(|gap| rows[(gap, source)] != 0.0);
-    if !pulls(source) {
+    // what is heated may be pushed to where another voltage closes a gap
+    let pushes = !system.gaps.is_empty() && (0..heating.heaters.len()).any(|k| heating.current(k, source) != 0.0);
+    if !pulls(source) && !pushes {
         let names = &system.electrics.names;
         let others: Vec<&str> = (0..names.len()).filter(|k| pulls(*k)).map(|k| names[k].as_str()).collect();
         let detail = format!(

@@ -174,3 +174,21 @@ fn voltages_are_bounded_and_given_once() {
     }
     let _ = static_fitted(&compiled, &[("drive".into(), 1e9)]);
 }
+
+/// A port that acts on no gap is refused, and those that do are named; a heater is none of them, since what it warms may be pushed to where
+/// another voltage closes a gap: of it the search itself says that nothing pulls in.
+#[test]
+fn ports_that_pull_nothing() {
+    let parts = "process hot = [Youngsmodulus=165e9 density=2300 h=2u thermalexpansion=2.33e-6 sheetresistance=20 thermcond=41]\n\
+        anchor hot [x] []\nh beam2det hot [x y] [l=100u w=4u]\nanchor hot [y] []\neground * [y] []\nheat port * [x y] []\n\
+        anchor * [e] []\nplategap2d * [m e] [A=2e-9 gap=3u oz=-pi/2]\neground * [e] []\ndrive port * [m e] []\n\
+        R * [u w] [R=1k]\neground * [w] []\nidle port * [u w] []\n";
+    let compiled = stressed(parts, 0.0, &CompileOptions::default());
+    let said = |port: &str| pull_in_fitted(&compiled, Some(port), 5.0).map(|_| ()).unwrap_err();
+    assert!(
+        matches!(&said("idle"), AnalysisError::BadRequest { detail, .. } if detail.contains("no gap") && detail.ends_with("drive")),
+        "{}",
+        said("idle")
+    );
+    assert!(matches!(said("heat"), AnalysisError::NoEquilibrium { .. }), "{}", said("heat"));
+}

@@ -116,9 +116,6 @@ pub fn open_model(card: &mut ModelCard, directory: Option<&Path>) -> Result<Box<
         None => {
             let model = compiled(&card.file, bundle, &card.options)?;
             tell(card, &model.warnings.items);
-            if !card.finer {
-                tell(card, mesh::unasked(&model).as_slice());
-            }
             Ok(Box::new(LocalDevice::new(model)))
         }
         Some(address) => connect(address, &bundle, card),
@@ -194,15 +191,17 @@ struct Kept {
 
 static MODELS: Mutex<Vec<Kept>> = Mutex::new(Vec::new());
 
-/// The model of a netlist text under these options, compiled once.
+/// The model of a netlist text under these options, compiled once, with what is known of its mesh among its warnings.
 fn compiled(file: &str, bundle: Bundle, options: &CompileOptions) -> Result<Arc<Compiled>, OpenError> {
     let mut models = MODELS.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some(kept) = models.iter().find(|k| k.bundle == bundle && k.options == *options) {
         return Ok(Arc::clone(&kept.model));
     }
-    let model = compile(&bundle, options)
-        .map_err(|source| OpenError::Compile { file: file.to_owned(), source })
-        .map(Arc::new)?;
+    let mut model = compile(&bundle, options).map_err(|source| OpenError::Compile { file: file.to_owned(), source })?;
+    // once for all instances of it
+    let told = mesh::unasked(&model);
+    model.warnings.items.extend(told);
+    let model = Arc::new(model);
     if models.len() == KEPT {
         models.remove(0);
     }
