@@ -24,6 +24,8 @@ pub struct Joints {
     pub couplings: Vec<Coupling>,
     /// The bodies of the beam at hand.
     bodies: Vec<Point>,
+    /// How that beam is cut.
+    cut: Cut,
 }
 
 /// Lays a beam: adds its inner bodies, masses and joints. Returns the equally spaced points along it, the drawn ends
@@ -46,9 +48,10 @@ pub fn lay(
     // a rigid beam is the rods of a single segment, which its one body holds together
     let scheme = if segments == 0 { Scheme::B } else { options.scheme };
     let segments = segments.max(1);
-    let cut = scheme.cut(&bar, segments, rigid.grounded(beam.b.0));
-    let name = Arc::from(beam.name.as_str());
+    let mut cut = std::mem::take(&mut out.cut);
+    scheme.cut(&bar, segments, rigid.grounded(beam.b.0), &mut cut);
     let last = cut.parts.len() - 1;
+    let name = if last > 1 { Arc::from(beam.name.as_str()) } else { Arc::default() };
     let place = |at: f64| start + (end - start) * (at / bar.length);
     let mut bodies = std::mem::take(&mut out.bodies);
     bodies.clear();
@@ -101,55 +104,72 @@ pub fn lay(
         })
         .collect();
     (points[0], points[segments]) = (drawn[0], drawn[1]);
-    out.bodies = bodies;
+    (out.bodies, out.cut) = (bodies, cut);
     points
 }
 
-/// The last joint away from the ends: those of one beam are mostly alike, and their stiffness is what it was.
+/// What the joints of one beam have in common: they are mostly alike.
 #[derive(Default)]
-struct Springs(Option<(Pin, Matrix3<f64>)>);
+struct Springs {
+    /// The last joint away from the ends, and its stiffness.
+    inner: Option<(Pin, Matrix3<f64>)>,
+    /// The last stiffness, and its inverse.
+    own: Option<(Matrix3<f64>, Option<Matrix3<f64>>)>,
+}
 
 impl Springs {
-    /// [`with_springs`] of joint `k`.
+    /// [`Springs::with_ends`] of joint `k`.
     fn with(&mut self, beam: &Beam, bar: &Bar, cut: &Cut, k: usize, ends: &[End; 2]) -> Matrix3<f64> {
         let pin = &cut.pins[k];
         if k == 0 || k == cut.pins.len() - 1 {
-            return with_springs(beam, bar, cut, k, ends);
+            return self.with_ends(beam, bar, cut, k, ends);
         }
         let alike = |last: &Pin| (last.stiffness, last.length, last.locked) == (pin.stiffness, pin.length, pin.locked);
-        match &self.0 {
+        match &self.inner {
             Some((last, stiffness)) if alike(last) => *stiffness,
             _ => {
-                let stiffness = with_springs(beam, bar, cut, k, ends);
-                self.0 = Some((*pin, stiffness));
+                let stiffness = self.with_ends(beam, bar, cut, k, ends);
+                self.inner = Some((*pin, stiffness));
                 stiffness
             }
         }
     }
-}
 
-/// Stiffness of joint `k` of a cut beam with the shear compliance of its segment and the springs of the ends next to it.
-///
-/// A joint with rigid directions takes the bending part of the springs alone.
-fn with_springs(beam: &Beam, bar: &Bar, cut: &Cut, k: usize, ends: &[End; 2]) -> Matrix3<f64> {
-    let pin = &cut.pins[k];
-    let mut springs = Matrix3::zeros();
-    if k == 0 {
-        springs += ends[0].at_joint(pin.at, true);
+    /// Stiffness of joint `k` of a cut beam with the shear compliance of its segment and the springs of the ends next to it.
+    ///
+    /// A joint with rigid directions takes the bending part of the springs alone.
+    fn with_ends(&mut self, beam: &Beam, bar: &Bar, cut: &Cut, k: usize, ends: &[End; 2]) -> Matrix3<f64> {
+        let pin = &cut.pins[k];
+        let mut springs = Matrix3::zeros();
+        if k == 0 {
+            springs += ends[0].at_joint(pin.at, true);
+        }
+        if k == cut.pins.len() - 1 {
+            springs += ends[1].at_joint(bar.length - pin.at, false);
+        }
+        if pin.locked != [false; 3] {
+            let bent = springs[(2, 2)];
+            springs = Matrix3::zeros();
+            springs[(2, 2)] = bent;
+        }
+        let Some(mut own) = self.compliance(&pin.stiffness) else { return pin.stiffness };
+        if bar.shear == 0.0 && !pin.locked[1] {
+            own[(1, 1)] += pin.length * shear_flexibility(beam);
+        }
+        (own + springs).cholesky().map_or(pin.stiffness, |whole| whole.inverse())
     }
-    if k == cut.pins.len() - 1 {
-        springs += ends[1].at_joint(bar.length - pin.at, false);
+
+    /// Inverse of a joint's own stiffness.
+    fn compliance(&mut self, stiffness: &Matrix3<f64>) -> Option<Matrix3<f64>> {
+        match &self.own {
+            Some((last, inverse)) if last == stiffness => *inverse,
+            _ => {
+                let inverse = stiffness.try_inverse();
+                self.own = Some((*stiffness, inverse));
+                inverse
+            }
+        }
     }
-    if pin.locked != [false; 3] {
-        let bent = springs[(2, 2)];
-        springs = Matrix3::zeros();
-        springs[(2, 2)] = bent;
-    }
-    let Some(mut own) = pin.stiffness.try_inverse() else { return pin.stiffness };
-    if bar.shear == 0.0 && !pin.locked[1] {
-        own[(1, 1)] += pin.length * shear_flexibility(beam);
-    }
-    (own + springs).cholesky().map_or(pin.stiffness, |whole| whole.inverse())
 }
 
 /// Drag per mass of a beam over a gas film [1/s].

@@ -16,10 +16,11 @@
 //! Not in the table: Poisson's ratios other than 0.3, branches of different stiffness or thickness (each takes its own),
 //! ratios of widths beyond 8 and stems that lean by more than 45° (the last row holds).
 
+use super::excess::{self, Excess, Meetings};
 use super::junction_springs::{End, corner, interpolate};
 use super::junction_table as table;
-use super::overlap::{self, IN_LINE, Strip, turn};
-use super::rigid::{Assembly, Lump};
+use super::overlap::{IN_LINE, Strip, turn};
+use super::rigid::Assembly;
 use crate::budget;
 use crate::multibody::BodyId;
 use crate::options::Junctions;
@@ -28,9 +29,6 @@ use std::f64::consts::PI;
 
 /// Share of a beam that its two offsets may take together.
 const MOST: f64 = 0.9;
-/// Share of the mass that beams bring to a junction which it may have twice.
-const MOST_MASS: f64 = 0.5;
-
 /// One beam as its junction sees it.
 #[derive(Debug, Clone, Copy)]
 struct Branch {
@@ -79,16 +77,18 @@ impl Branches {
 pub struct Ends {
     /// For each beam, its start and its end.
     pub beams: Vec<[End; 2]>,
-    /// Junctions with two beams or more: node, its strips, and the beam of each.
-    pub(super) meetings: Vec<(usize, Vec<Strip>, Vec<usize>)>,
+    /// Junctions with two beams or more.
+    pub(super) meetings: Meetings,
+    /// What is drawn twice there.
+    pub(super) excess: Vec<Excess>,
     /// Beams whose offsets were cut down.
     pub(super) cut: Vec<usize>,
 }
 
 /// Finds the junctions of a drawing.
-pub fn find(structure: &Structure, rigid: &Assembly, kind: Junctions) -> Ends {
-    let mut ends =
-        Ends { beams: vec![[End::default(); 2]; structure.beams.len()], meetings: Vec::new(), cut: Vec::new() };
+pub fn find(structure: &Structure, rigid: &Assembly, kind: Junctions, undamped: bool) -> Ends {
+    let beams = vec![[End::default(); 2]; structure.beams.len()];
+    let mut ends = Ends { beams, meetings: Meetings::default(), excess: Vec::new(), cut: Vec::new() };
     if kind == Junctions::Centreline {
         return ends;
     }
@@ -106,8 +106,8 @@ pub fn find(structure: &Structure, rigid: &Assembly, kind: Junctions) -> Ends {
             }
         } else if branches.len() > 1 {
             meet(branches, &structure.beams, &mut ends.beams);
-            let strips = branches.iter().map(|b| Strip { angle: b.angle, width: b.width, weight: 1.0 }).collect();
-            ends.meetings.push((node, strips, branches.iter().map(|b| b.beam).collect()));
+            let strip = |b: &Branch| (Strip { angle: b.angle, width: b.width, weight: 1.0 }, b.beam);
+            ends.meetings.add(node, branches.iter().map(strip));
         } else if let [b] = branches {
             ends.beams[b.beam][b.end].free = true;
         }
@@ -129,65 +129,8 @@ pub fn find(structure: &Structure, rigid: &Assembly, kind: Junctions) -> Ends {
             }
         }
     }
+    ends.excess = excess::find(structure, &ends.meetings, undamped);
     ends
-}
-
-impl Ends {
-    /// Takes away the mass that junctions have twice, and adds what corners lack.
-    pub fn correct_mass(&self, structure: &Structure, undamped: bool, rigid: &mut Assembly) {
-        let mut shortest = vec![f64::INFINITY; structure.nodes.len()];
-        let mut brought = vec![0.0; structure.nodes.len()];
-        for beam in &structure.beams {
-            for node in [beam.a, beam.b] {
-                shortest[node.0] = shortest[node.0].min(beam.length);
-                brought[node.0] += 0.5 * beam.material.density * beam.width * beam.thickness * beam.length;
-            }
-        }
-        for (node, strips, beams) in &self.meetings {
-            let beams = || beams.iter().map(|beam| &structure.beams[*beam]);
-            let (mass, strips) = weighted(strips, beams().map(|b| b.material.density * b.thickness));
-            if mass <= 0.0 {
-                continue;
-            }
-            let mut excess = overlap::overlap(&strips);
-            // beams shorter than the junction have no such overlap
-            let shortest = shortest[*node];
-            let widest = strips.iter().map(|s| s.width).fold(0.0, f64::max);
-            let room = (shortest / widest).min(1.0);
-            let whole = mass * room;
-            // where junctions of stout beams overlap in turn, no more goes than leaves half of what the beams bring
-            let left = MOST_MASS * brought[*node] / (whole * excess.amount).max(f64::MIN_POSITIVE);
-            let scale = -whole * left.min(1.0);
-            scaled(&mut excess, scale);
-            let drag = |beam: &Beam| super::beam::drag_per_mass(beam, undamped);
-            let first = beams().next().map_or(0.0, drag);
-            let point = rigid.point(*node);
-            if beams().all(|beam| drag(beam) == first) {
-                rigid.add_mass(point, &excess, first);
-                continue;
-            }
-            rigid.add_mass(point, &excess, 0.0);
-            let film =
-                |b: &Beam| if b.material.density > 0.0 { drag(b) * b.material.density * b.thickness } else { 0.0 };
-            let (most, strips) = weighted(&strips, beams().map(film));
-            let mut twice = overlap::overlap(&strips);
-            scaled(&mut twice, -most * room * left.min(1.0));
-            rigid.add_drag(point, &twice);
-        }
-    }
-}
-
-/// The largest of some amounts per area, and strips with their shares in it.
-fn weighted(strips: &[Strip], amounts: impl Iterator<Item = f64> + Clone) -> (f64, Vec<Strip>) {
-    let most = amounts.clone().fold(0.0, f64::max);
-    let share = |amount: f64| if most > 0.0 { amount / most } else { 1.0 };
-    (most, strips.iter().zip(amounts).map(|(strip, amount)| Strip { weight: share(amount), ..*strip }).collect())
-}
-
-fn scaled(lump: &mut Lump, scale: f64) {
-    lump.amount *= scale;
-    lump.first *= scale;
-    lump.second *= scale;
 }
 
 /// Nodes on anchors, plates and rigid links: beams end there where they are drawn.
@@ -208,7 +151,7 @@ fn meet(branches: &[Branch], beams: &[Beam], ends: &mut [[End; 2]]) {
     let mut add = |b: &Branch, row: &table::Row, other: f64, mirrored: bool| {
         ends[b.beam][b.end].add(row, &beams[b.beam], other, mirrored);
     };
-    let pairs = in_line(branches);
+    let pairs = if branches.len() > 2 { in_line(branches) } else { Vec::new() };
     match (branches, pairs.as_slice()) {
         ([a, b], _) => {
             let between = turn(a.angle, b.angle).to_degrees();

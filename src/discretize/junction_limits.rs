@@ -29,11 +29,11 @@ pub struct Beyond {
 pub fn beyond(structure: &Structure, ends: &Ends) -> Option<Beyond> {
     let mut why: Vec<Option<&'static str>> = vec![None; structure.beams.len()];
     let mut goes_on = vec![false; structure.beams.len()];
-    for (_, strips, beams) in &ends.meetings {
-        for (k, strip) in strips.iter().enumerate() {
-            let others = || strips.iter().enumerate().filter(|(i, _)| *i != k).map(|(_, other)| other);
-            goes_on[beams[k]] |= others().any(|other| turn(strip.angle, other.angle) < STRAIGHT);
-            why[beams[k]] = why[beams[k]].or(at_node(strip, others));
+    for (_, meeting) in ends.meetings.iter() {
+        for (k, (strip, beam)) in meeting.iter().enumerate() {
+            let others = || meeting.iter().enumerate().filter(|(i, _)| *i != k).map(|(_, (other, _))| other);
+            goes_on[*beam] |= others().any(|other| turn(strip.angle, other.angle) < STRAIGHT);
+            why[*beam] = why[*beam].or(at_node(strip, others));
         }
     }
     for &beam in ends.cut.iter().filter(|&&beam| !goes_on[beam]) {

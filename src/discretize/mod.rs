@@ -15,6 +15,7 @@
 //! | [`junction_limits`] | where a drawing goes beyond the table of junctions |
 //! | [`junction_springs`] | offset and spring at the end of a beam |
 //! | [`junction_table`] | the springs' numbers, from plane stress |
+//! | `excess` | mass and drag that junctions have twice, or lack |
 //! | [`overlap`] | mass that is drawn twice where beams meet |
 //! | [`scheme`] | ways to cut a beam: places, stiffness and second-order strain of joints, masses |
 //! | [`beam`] | a cut beam in the drawing: bodies, masses, joints, points |
@@ -27,6 +28,7 @@ pub(crate) mod bar;
 pub mod beam;
 pub mod cubic;
 mod error;
+mod excess;
 pub mod frame;
 pub mod gap;
 pub mod junction;
@@ -126,7 +128,7 @@ pub fn discretize_like(
     let mut heaters = Vec::new();
     let ends = match other {
         Some(other) => Arc::clone(&other.ends),
-        None => Arc::new(junction::find(structure, &rigid, options.junctions)),
+        None => Arc::new(junction::find(structure, &rigid, options.junctions, options.undamped)),
     };
     for (index, drawn) in structure.beams.iter().enumerate() {
         budget::check();
@@ -136,7 +138,9 @@ pub fn discretize_like(
         });
         beams.push(beam::lay(drawn, segments[index], heater, options, &ends.beams[index], &mut rigid, &mut laid));
     }
-    ends.correct_mass(structure, options.undamped, &mut rigid);
+    for excess in &ends.excess {
+        excess.add_to(&mut rigid);
+    }
     let beam::Joints { mut joints, couplings: mut coupled, .. } = laid;
     for mass in &structure.masses {
         rigid.add_plate(mass, options.undamped);

@@ -42,6 +42,8 @@ pub fn turn(a: f64, b: f64) -> f64 {
 
 /// Junctions that a thread remembers.
 const MOST_KNOWN: usize = 512;
+/// Strips that are looked up without memory of their own.
+const FEW: usize = 8;
 
 thread_local! {
     /// What is known of junctions: a drawing is laid out on many meshes, and has many junctions of one kind.
@@ -51,8 +53,16 @@ thread_local! {
 /// Area, by its weight, that the strips have in excess of their union, with its moments about the node: [m²], [m³], [m⁴].
 pub fn overlap(strips: &[Strip]) -> Lump {
     let bits = |s: &Strip| [s.angle.to_bits(), s.width.to_bits(), s.weight.to_bits()];
-    let key: Vec<[u64; 3]> = strips.iter().map(bits).collect();
-    if let Some(known) = KNOWN.with_borrow(|known| known.get(&key).copied()) {
+    let mut few = [[0; 3]; FEW];
+    let many: Vec<[u64; 3]>;
+    let key: &[[u64; 3]] = if strips.len() <= FEW {
+        few.iter_mut().zip(strips).for_each(|(key, strip)| *key = bits(strip));
+        &few[..strips.len()]
+    } else {
+        many = strips.iter().map(bits).collect();
+        &many
+    };
+    if let Some(known) = KNOWN.with_borrow(|known| known.get(key).copied()) {
         return known;
     }
     let found = if strips.iter().all(|s| s.weight == 1.0) {
@@ -67,7 +77,7 @@ pub fn overlap(strips: &[Strip]) -> Lump {
         if known.len() >= MOST_KNOWN {
             known.clear();
         }
-        known.insert(key, found);
+        known.insert(key.to_vec(), found);
     });
     found
 }

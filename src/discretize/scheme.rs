@@ -73,7 +73,7 @@ pub struct Pin {
 }
 
 /// A beam cut into parts and joints.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Cut {
     /// Bodies from start to end, end nodes included.
     pub parts: Vec<Part>,
@@ -102,9 +102,10 @@ impl Scheme {
     }
 
     /// Cuts a beam into `n` segments. `wall`: the far end is clamped to ground, where A0 has one joint more.
-    pub fn cut(self, bar: &Bar, n: usize, wall: bool) -> Cut {
+    /// The storage of what was cut before is used again.
+    pub fn cut(self, bar: &Bar, n: usize, wall: bool, cut: &mut Cut) {
         let h = bar.length / n as f64;
-        match self {
+        *cut = match self {
             Self::A0 => {
                 let count = n + usize::from(wall);
                 let places: Vec<f64> = (0..count).map(|k| k as f64 * h).collect();
@@ -128,24 +129,30 @@ impl Scheme {
                 let phi = 12.0 * bar.ei * bar.shear / (pair * pair);
                 // shear moves the points outwards; further than this they would meet those of the next pair
                 let from_middle = 0.5 * ((1.0 + phi.min(1.9)) / 3.0).sqrt();
-                let places: Vec<f64> = (0..n)
-                    .map(|k| (k / 2) as f64 + 0.5 + if k % 2 == 0 { -from_middle } else { from_middle })
-                    .map(|x| x * pair)
-                    .collect();
+                let off = |k: usize| if k.is_multiple_of(2) { -from_middle } else { from_middle };
+                let places: Vec<f64> = (0..n).map(|k| ((k / 2) as f64 + 0.5 + off(k)) * pair).collect();
                 let pins = places.iter().map(|&at| turning(bar, at, h)).collect();
                 Cut { parts: rods(bar, &places), pins, couplings: Vec::new(), nodes: (0..=n).collect() }
             }
             // where nothing has been decided, what bodies take
             Self::B | Self::E4 | Self::Auto | Self::Es => {
-                let pins = (0..n).map(|k| self.elastic(bar, n, k)).collect();
-                Cut { parts: self.parts(bar, n), pins, couplings: Vec::new(), nodes: (0..=n).collect() }
+                cut.pins.clear();
+                cut.pins.extend((0..n).map(|k| self.elastic(bar, n, k)));
+                self.parts_into(bar, n, &mut cut.parts);
+                cut.couplings.clear();
+                cut.nodes.clear();
+                return cut.nodes.extend(0..=n);
             }
-        }
+        };
     }
 
     /// [`Cut::parts`] of B, E4 or Es alone.
-    pub fn parts(self, bar: &Bar, n: usize) -> Vec<Part> {
-        if self == Self::B { rods(bar, &middles(n, bar.length / n as f64)) } else { self.points(bar, n) }
+    pub fn parts_into(self, bar: &Bar, n: usize, parts: &mut Vec<Part>) {
+        parts.clear();
+        match self {
+            Self::B => parts.extend(rods(bar, &middles(n, bar.length / n as f64))),
+            _ => parts.extend(self.points(bar, n)),
+        }
     }
 
     /// Segment `k` of `n` as a joint with three directions. With S the flexibility over (g, p), K = S⁻¹; the second-order
@@ -200,21 +207,14 @@ impl Scheme {
     }
 
     /// Masses at the nodes: E4 or Es.
-    fn points(self, bar: &Bar, n: usize) -> Vec<Part> {
+    fn points(self, bar: &Bar, n: usize) -> impl Iterator<Item = Part> {
         let h = bar.length / n as f64;
-        let unit = bar.line_mass * h;
-        (0..=n)
-            .map(|k| {
-                let (mass, first, second) = if self == Self::Es { tuned(n, k) } else { shares(n, k) };
-                let mass = mass * unit;
-                Part {
-                    at: k as f64 * h,
-                    mass,
-                    first: first * h * unit,
-                    second: second * h * h * unit + bar.rotary * mass,
-                }
-            })
-            .collect()
+        let (unit, rotary) = (bar.line_mass * h, bar.rotary);
+        (0..=n).map(move |k| {
+            let (mass, first, second) = if self == Self::Es { tuned(n, k) } else { shares(n, k) };
+            let mass = mass * unit;
+            Part { at: k as f64 * h, mass, first: first * h * unit, second: second * h * h * unit + rotary * mass }
+        })
     }
 }
 
@@ -318,11 +318,13 @@ mod tests {
     /// for Es, whose rotary inertia is tuned.
     #[test]
     fn moments_are_exact() {
+        let mut cut = Cut::default();
         for scheme in Scheme::ALL {
             for n in (1..12).map(|n| scheme.segments(n)) {
                 for wall in [false, true] {
                     let (mut mass, mut first, mut second) = (0.0, 0.0, 0.0);
-                    for p in scheme.cut(&BAR, n, wall).parts {
+                    scheme.cut(&BAR, n, wall, &mut cut);
+                    for p in &cut.parts {
                         mass += p.mass;
                         first += p.mass * p.at + p.first;
                         second += p.mass * p.at * p.at + 2.0 * p.first * p.at + p.second;

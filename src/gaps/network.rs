@@ -138,12 +138,13 @@ impl Circuit {
         }
         let mut conductance = DMatrix::zeros(count, count);
         for (k, step) in known.order.iter().enumerate().rev() {
-            let row = leaves.row(k).into_owned();
-            if let Some((source, sign, parent)) = step.by {
-                conductance.set_row(source, &(&row * sign));
-                if let Some(parent) = parent.map(|node| place[node]).filter(|k| *k != usize::MAX) {
-                    let mut above = leaves.row_mut(parent);
-                    above += row;
+            let Some((source, sign, parent)) = step.by else { continue };
+            let parent = parent.map(|node| place[node]).filter(|k| *k != usize::MAX);
+            for s in 0..count {
+                let leaves_here = leaves[(k, s)];
+                conductance[(source, s)] = leaves_here * sign;
+                if let Some(parent) = parent {
+                    leaves[(parent, s)] += leaves_here;
                 }
             }
         }
@@ -152,6 +153,12 @@ impl Circuit {
 }
 
 impl Potentials {
+    /// ∂(current through `resistance` [Ω] from a to b)/∂source [S], one entry per source.
+    pub fn current(&self, a: usize, b: usize, resistance: f64) -> DVector<f64> {
+        let p = &self.potential;
+        DVector::from_fn(p.ncols(), |s, _| (p[(a, s)] - p[(b, s)]) / resistance)
+    }
+
     /// ∂(potential of a − potential of b)/∂source, one entry per source.
     pub fn difference(&self, a: usize, b: usize) -> DVector<f64> {
         (self.potential.row(a) - self.potential.row(b)).transpose()

@@ -82,10 +82,12 @@ impl Model {
             (d.a, d.b) = (moved(d.a), moved(d.b));
         }
         let mut sections = Sections::new(joints.len());
-        let mut laid: Vec<LaidJoint> =
+        let given: Vec<LaidJoint> =
             joints.iter().map(|j| sections.lay(j, locate(pattern, moved(j.a), moved(j.b)))).collect();
         drop(joints);
-        laid.sort_by_key(|j| j.place.order());
+        let mut sorted: Vec<((u32, u32), u32)> = given.iter().map(|j| j.place.order()).zip(0..).collect();
+        sorted.sort_unstable();
+        let laid = sorted.iter().map(|(_, k)| given[*k as usize]).collect();
         let mut slots: Vec<Option<Body>> = bodies.into_iter().map(Some).collect();
         let mut bodies = Vec::with_capacity(order.len());
         bodies.extend(order.iter().filter_map(|&k| slots[k].take()));

@@ -101,10 +101,12 @@ pub(crate) enum LayerRef {
 
 #[derive(Debug, Clone)]
 pub(crate) struct Element {
-    /// The name given; none: `anonN` with N in [`Element::number`].
+    /// The name given.
     pub(crate) name: Option<Name>,
-    /// Count of this anonymous line, from 1, in reading order over all files.
+    /// Count of this anonymous line, from 1, in reading order over all files; 0 for one that has a name.
     pub(crate) number: usize,
+    /// `anonN`, where N is that count; empty where there is a name.
+    pub(crate) unnamed: Arc<str>,
     pub(crate) model: Ident,
     /// The subnet of that name, once resolved; none: a built-in element.
     pub(crate) subnet: Option<usize>,

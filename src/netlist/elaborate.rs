@@ -2,6 +2,7 @@
 
 use super::ast::{Def, Expr, Name, PI_SLOT, Program, Slot, Statement};
 use super::drawing::Drawing;
+use super::elements::Argument;
 use super::rotation::Rotation;
 use super::setting::Setting;
 use super::sink::{Reported, Sink};
@@ -26,7 +27,7 @@ pub(super) struct Frame {
     /// Nodes by the name they have here.
     pub(super) nodes: FxHashMap<Arc<str>, NodeId>,
     /// Names of the enclosing instances with a point after each.
-    pub(super) prefix: String,
+    pub(super) prefix: Arc<str>,
     pub(super) rotation: Rotation,
     /// What `parent` means here.
     pub(super) layer: Option<usize>,
@@ -47,8 +48,10 @@ pub(crate) struct Elaborator<'p> {
     from_outside: FxHashSet<usize>,
     /// Where each stands in `parameters`.
     parameter_at: FxHashMap<&'p str, usize>,
-    /// Full names given so far, without the anonymous ones.
-    pub(super) names: FxHashSet<String>,
+    /// Full names given so far, without the anonymous ones: what stands before the last point, and after it.
+    pub(super) names: FxHashSet<(Arc<str>, Arc<str>)>,
+    /// Storage of node and parameter lists that are no longer needed.
+    pub(super) spare: Vec<(Vec<NodeId>, Vec<Argument<'p>>)>,
     /// Statements and expressions run so far.
     pub(super) steps: usize,
     pub(super) elements: usize,
@@ -70,7 +73,7 @@ impl<'p> Elaborator<'p> {
         let frame = Frame {
             values,
             nodes: FxHashMap::default(),
-            prefix: String::new(),
+            prefix: Arc::default(),
             rotation: Rotation::IDENTITY,
             layer: None,
             anonymous: FxHashMap::default(),
@@ -86,6 +89,7 @@ impl<'p> Elaborator<'p> {
             from_outside: FxHashSet::default(),
             parameter_at: FxHashMap::default(),
             names: FxHashSet::default(),
+            spare: Vec::new(),
             steps: 0,
             elements: 0,
             depth: 0,

@@ -13,6 +13,8 @@ use crate::structure::NodeId;
 use rustc_hash::{FxBuildHasher, FxHashMap};
 use std::sync::Arc;
 
+/// Nodes of an instance that room is made for at first, at most.
+const MOST_ROOM: usize = 32;
 /// Subnet instances may nest this deep.
 const DEEPEST_INSTANCE: usize = 100;
 
@@ -36,10 +38,10 @@ impl<'p> Elaborator<'p> {
         let local: Arc<str> = match &element.name {
             Some(name) => {
                 let local = self.name(name)?;
-                let full = self.full(&local);
-                budget::lay_out(ELEMENT_BYTES + NAME_COPIES * full.len());
-                if let Some(full) = self.names.replace(full) {
-                    let message = format!("there is an element `{full}` already");
+                let prefix = Arc::clone(&self.here().prefix);
+                budget::lay_out(ELEMENT_BYTES + NAME_COPIES * (prefix.len() + local.len()));
+                if !self.names.insert((prefix, Arc::clone(&local))) {
+                    let message = format!("there is an element `{}` already", self.full(&local));
                     self.sink.warning(
                         "W007",
                         name.span,
@@ -51,14 +53,15 @@ impl<'p> Elaborator<'p> {
             }
             None => {
                 budget::lay_out(ELEMENT_BYTES + NAME_COPIES * self.here().prefix.len());
-                self.anonymous(element.number)
+                self.anonymous(element.number, &element.unnamed)
             }
         };
-        let mut nodes = Vec::with_capacity(element.nodes.len());
+        let (mut nodes, mut given) = self.spare.pop().unwrap_or_default();
+        nodes.clear();
+        given.clear();
         for name in &element.nodes {
             nodes.push(self.node(name)?);
         }
-        let mut given = Vec::with_capacity(element.parameters.len());
         let (mut angles, mut turned) = ([0.0; 3], [false; 3]);
         let mut failed = false;
         let degrees = self.in_degrees(element.model.span.file);
@@ -116,7 +119,10 @@ impl<'p> Elaborator<'p> {
         };
         match element.subnet {
             Some(subnet) => {
-                self.subnet(&Call { element, subnet, local: &local, nodes: &nodes, given: &given, rotation, layer })
+                let call = Call { element, subnet, local: &local, nodes: &nodes, given: &given, rotation, layer };
+                let result = self.subnet(&call);
+                self.spare.push((nodes, given));
+                result
             }
             None => {
                 let values = layer.map_or_else(|| Ok(Arc::new(Vec::new())), |layer| self.layer(layer))?;
@@ -135,20 +141,30 @@ impl<'p> Elaborator<'p> {
                     },
                 };
                 let (drawing, sink, read) = (&mut self.drawing, &mut *self.sink, super::sugar2::read);
-                match element.built_in {
+                let result = match element.built_in {
                     Some(known) => elements::build_as(known, &instance, drawing, sink, read),
                     None => elements::build(&instance, drawing, sink, read),
-                }
+                };
+                self.spare.push((instance.nodes, instance.arguments.given));
+                result
             }
         }
     }
 
     /// The name of an anonymous line; where a loop comes to it again in one instance, `anonN(2)`, `anonN(3)` and so on.
-    fn anonymous(&mut self, number: usize) -> Arc<str> {
+    fn anonymous(&mut self, number: usize, first: &Arc<str>) -> Arc<str> {
         let at = self.frames.len() - 1;
-        let count = self.frames[at].anonymous.entry(number).or_insert(0);
-        *count += 1;
-        Arc::from(if *count == 1 { format!("anon{number}") } else { format!("anon{number}({count})") })
+        let run = &mut self.frames[at].anonymous;
+        match run.get_mut(&number) {
+            Some(count) => {
+                *count += 1;
+                Arc::from(format!("{first}({count})"))
+            }
+            None => {
+                run.insert(number, 1);
+                Arc::clone(first)
+            }
+        }
     }
 
     /// True when the file writes `ox oy oz` in degrees.
@@ -216,8 +232,8 @@ impl<'p> Elaborator<'p> {
         prefix.push('.');
         let frame = Frame {
             values: vec![Value::Undefined; subnet.variables],
-            nodes: FxHashMap::with_capacity_and_hasher(2 * nodes.len(), FxBuildHasher),
-            prefix,
+            nodes: FxHashMap::with_capacity_and_hasher((nodes.len() + subnet.body.len()).min(MOST_ROOM), FxBuildHasher),
+            prefix: Arc::from(prefix),
             rotation: call.rotation,
             layer,
             anonymous: FxHashMap::default(),

@@ -120,15 +120,18 @@ fn open_loops(drawing: &Drawing, sink: &mut Sink) {
     let mut open = Vec::new();
     for placement in &drawing.placements {
         let placed = drawing.placed_by(placement);
-        let largest = placed.iter().map(|(_, o)| o[0].hypot(o[1])).fold(0.0, f64::max);
         let first = drawing.structure.nodes[placed[0].0.0].position;
         let misses = placed.iter().map(|(node, offset)| {
             let at = drawing.structure.nodes[node.0].position;
             [at[0] - first[0] - offset[0], at[1] - first[1] - offset[1]]
         });
-        let worst = misses.fold([0.0, 0.0], |a: [f64; 2], b| if b[0].hypot(b[1]) > a[0].hypot(a[1]) { b } else { a });
         // Sums of many offsets round off by a few units in the last place of the farthest position.
         let rounding = 1e-12 * (first[0].abs() + first[1].abs());
+        if misses.clone().all(|miss| miss[0].abs() + miss[1].abs() <= rounding) {
+            continue;
+        }
+        let largest = placed.iter().map(|(_, o)| o[0].hypot(o[1])).fold(0.0, f64::max);
+        let worst = misses.fold([0.0, 0.0], |a: [f64; 2], b| if b[0].hypot(b[1]) > a[0].hypot(a[1]) { b } else { a });
         if worst[0].hypot(worst[1]) > OPEN_LOOP * largest + rounding {
             open.push((placement.span, worst));
         }

@@ -209,10 +209,11 @@ impl Parser<'_> {
                 help,
             ));
         };
-        let mut number = 0;
+        let (mut number, mut unnamed) = (0, Arc::default());
         if name.is_none() {
             self.anonymous += 1;
             number = self.anonymous;
+            unnamed = Arc::from(format!("anon{number}"));
         }
         let (nodes, nodes_span) = self.name_list()?;
         let (parameters, _) = self.def_list()?;
@@ -220,7 +221,7 @@ impl Parser<'_> {
         let turns = |name: &str| matches!(name, "ox" | "oy" | "oz");
         let given = || parameters.iter().map(|def| &*def.name.name).filter(|name| !turns(name));
         let built_in = elements::model(&model.name).map(|model| (model, given().all(|name| model.takes(name))));
-        Ok(Element { name, number, model, subnet, built_in, layer_name, layer, nodes, nodes_span, parameters })
+        Ok(Element { name, number, unnamed, model, subnet, built_in, layer_name, layer, nodes, nodes_span, parameters })
     }
 
     // ---- lists ----

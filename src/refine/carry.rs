@@ -39,6 +39,11 @@ pub fn carried(structure: &Structure, from: &Discretized, to: &Discretized, x: &
         slopes.clear();
         slopes.extend(moved.iter().map(|moved: &Moved| slope(along, h, moved.turn, linear)));
         for (k, point) in to.iter().enumerate() {
+            // a node that both meshes have
+            if (k * last).is_multiple_of(new) {
+                put(point, moved[k * last / new]);
+                continue;
+            }
             let s = (k * last) as f64 / new as f64;
             let first = (s as usize).min(last - 1);
             let (ends, slopes) = ([moved[first], moved[first + 1]], [slopes[first], slopes[first + 1]]);

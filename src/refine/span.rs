@@ -142,6 +142,10 @@ pub(super) fn spans(
         let mut points = points.clone();
         points[0] = points[0].beyond(along * *first);
         points[n] = points[n].beyond(along * -*last);
+        let mut lumps = Vec::new();
+        if lumped {
+            options.scheme.parts_into(&bar, n, &mut lumps);
+        }
         Span {
             points,
             length: bar.length,
@@ -149,7 +153,7 @@ pub(super) fn spans(
             mass: if lumped { cubic::mass(&bar, h) } else { Matrix6::zeros() },
             second: cubic::second_mass(&bar, h),
             softer: Matrix6::zeros(),
-            lumps: if lumped { options.scheme.parts(&bar, n) } else { Vec::new() },
+            lumps,
         }
     };
     structure.beams.iter().zip(beams).zip(offsets).map(span).collect()

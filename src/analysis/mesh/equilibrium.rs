@@ -162,12 +162,12 @@ fn outputs(model: &Compiled, point: &OperatingPoint) -> Vec<Output> {
     let system = &model.parts.system;
     let q = &point.q;
     let nodes = || model.parts.nodes.iter().flatten();
-    let shifts = || nodes().map(|p| p.displacement(q, system.model.linear));
+    let shifts: Vec<_> = nodes().map(|p| p.displacement(q, system.model.linear)).collect();
     let size = size(model);
-    let largest = shifts().map(|u| u.norm()).fold(ROUNDING * size / SMALL, f64::max);
+    let largest = shifts.iter().map(|u| u.norm()).fold(ROUNDING * size / SMALL, f64::max);
     let turned = nodes().map(|p| p.rotation(q).abs()).fold(0.0, f64::max);
-    let mut outputs = Vec::new();
-    for (point, u) in nodes().zip(shifts()) {
+    let mut outputs = Vec::with_capacity(3 * shifts.len() + system.electrics.ports);
+    for (point, u) in nodes().zip(shifts) {
         let scale = u.norm().max(SMALL * largest).max(f64::MIN_POSITIVE);
         let turn = point.rotation(q);
         let turns = turn.abs().max(SMALL * turned).max(SMALL * largest / size).max(f64::MIN_POSITIVE);

@@ -21,7 +21,7 @@ use crate::refine::model_order::ModelOrder;
 use std::sync::OnceLock;
 
 /// Points that are laid out at once, at most.
-pub(super) const CHUNK: usize = 16;
+pub(super) const CHUNK: usize = 32;
 /// Bodies of a point, at most: larger ones take their time anyway, and some of them at once the memory.
 const MOST: usize = 2000;
 

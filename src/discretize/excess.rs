@@ -1,0 +1,114 @@
+//! What junctions have of mass and drag twice, and what they lack: made up for once a drawing, whatever its mesh.
+
+use super::beam::drag_per_mass;
+use super::overlap::{Strip, overlap};
+use super::rigid::{Assembly, Lump};
+use crate::structure::{Beam, Structure};
+
+/// Share of the mass that beams bring to a junction which it may have twice.
+const MOST_MASS: f64 = 0.5;
+
+/// Junctions with two beams or more.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Meetings {
+    /// The node, and how many of the strips are its own.
+    nodes: Vec<(usize, usize)>,
+    /// The strips of one junction after the other, and the beam of each.
+    strips: Vec<(Strip, usize)>,
+}
+
+impl Meetings {
+    /// One more: its strips, and the beam of each.
+    pub(super) fn add(&mut self, node: usize, strips: impl Iterator<Item = (Strip, usize)>) {
+        let before = self.strips.len();
+        self.strips.extend(strips);
+        self.nodes.push((node, self.strips.len() - before));
+    }
+
+    /// The node of each, its strips, and the beam of each.
+    pub(super) fn iter(&self) -> impl Iterator<Item = (usize, &[(Strip, usize)])> {
+        let mut left = self.strips.as_slice();
+        self.nodes.iter().map(move |&(node, count)| {
+            let (own, others) = left.split_at(count);
+            left = others;
+            (node, own)
+        })
+    }
+}
+
+/// What is added to the body of a junction's node; of negative amount where more was drawn than is there.
+#[derive(Debug, Clone)]
+pub(super) struct Excess {
+    node: usize,
+    mass: Lump,
+    /// Drag of that mass per mass [1/s].
+    drag_per_mass: f64,
+    /// Drag by itself, where the beams' films differ.
+    drag: Option<Lump>,
+}
+
+impl Excess {
+    /// Adds it to the body of its node.
+    pub(super) fn add_to(&self, rigid: &mut Assembly) {
+        let point = rigid.point(self.node);
+        rigid.add_mass(point, &self.mass, self.drag_per_mass);
+        if let Some(drag) = &self.drag {
+            rigid.add_drag(point, drag);
+        }
+    }
+}
+
+/// Of each junction of a drawing.
+pub(super) fn find(structure: &Structure, meetings: &Meetings, undamped: bool) -> Vec<Excess> {
+    let mut shortest = vec![f64::INFINITY; structure.nodes.len()];
+    let mut brought = vec![0.0; structure.nodes.len()];
+    for beam in &structure.beams {
+        for node in [beam.a, beam.b] {
+            shortest[node.0] = shortest[node.0].min(beam.length);
+            brought[node.0] += 0.5 * beam.material.density * beam.width * beam.thickness * beam.length;
+        }
+    }
+    let mut all = Vec::with_capacity(structure.nodes.len());
+    let mut strips: Vec<Strip> = Vec::new();
+    for (node, meeting) in meetings.iter() {
+        let beams = || meeting.iter().map(|(_, beam)| &structure.beams[*beam]);
+        strips.clear();
+        strips.extend(meeting.iter().map(|(strip, _)| *strip));
+        let mass = weigh(&mut strips, beams().map(|b| b.material.density * b.thickness));
+        if mass <= 0.0 {
+            continue;
+        }
+        let excess = overlap(&strips);
+        // beams shorter than the junction have no such overlap
+        let widest = strips.iter().map(|s| s.width).fold(0.0, f64::max);
+        let room = (shortest[node] / widest).min(1.0);
+        let whole = mass * room;
+        // where junctions of stout beams overlap in turn, no more goes than leaves half of what the beams bring
+        let left = MOST_MASS * brought[node] / (whole * excess.amount).max(f64::MIN_POSITIVE);
+        let mass = scaled(excess, -whole * left.min(1.0));
+        let drag = |beam: &Beam| drag_per_mass(beam, undamped);
+        let first = beams().next().map_or(0.0, drag);
+        if beams().all(|beam| drag(beam) == first) {
+            all.push(Excess { node, mass, drag_per_mass: first, drag: None });
+            continue;
+        }
+        let film = |b: &Beam| if b.material.density > 0.0 { drag(b) * b.material.density * b.thickness } else { 0.0 };
+        let most = weigh(&mut strips, beams().map(film));
+        let twice = scaled(overlap(&strips), -most * room * left.min(1.0));
+        all.push(Excess { node, mass, drag_per_mass: 0.0, drag: Some(twice) });
+    }
+    all
+}
+
+/// Gives strips their shares in the largest of some amounts per area, which it returns.
+fn weigh(strips: &mut [Strip], amounts: impl Iterator<Item = f64> + Clone) -> f64 {
+    let most = amounts.clone().fold(0.0, f64::max);
+    for (strip, amount) in strips.iter_mut().zip(amounts) {
+        strip.weight = if most > 0.0 { amount / most } else { 1.0 };
+    }
+    most
+}
+
+fn scaled(lump: Lump, scale: f64) -> Lump {
+    Lump { amount: lump.amount * scale, first: lump.first * scale, second: lump.second * scale }
+}
