@@ -53,6 +53,7 @@ fn protocol(out: &Path) -> Result<(), Box<dyn std::error::Error>> {
         .build_client(true)
         .build_server(cfg!(feature = "server"))
         .btree_map(".")
+        .extern_path(".google.rpc", "::tonic_types::pb")
         .compile_fds(compiler.file_descriptor_set())?;
     Ok(())
 }

@@ -14,11 +14,13 @@ mod convert_picture;
 mod cosim;
 mod cosim_check;
 mod cosim_netlist;
+mod delivery;
 mod doctor;
 mod draw_motion;
 mod export;
 mod failure;
 mod interrupt;
+mod jobs;
 mod layout;
 mod merge;
 mod merge_error;
@@ -26,11 +28,11 @@ mod model;
 mod modes;
 mod options;
 mod output;
-mod part;
 mod path;
 mod plot;
 mod progress;
 mod pull_in;
+mod remote;
 mod report;
 mod serve;
 mod solver;
@@ -70,6 +72,7 @@ enum Command {
     Cosim(cosim::Cosim),
     Serve(serve::Serve),
     Sweep(sweep::Sweep),
+    Jobs(jobs::Jobs),
     Merge(merge::Merge),
     Chart(chart::Chart),
     Plot(plot::Plot),
@@ -99,6 +102,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Cosim(command) => command.run(),
         Command::Serve(command) => command.run(),
         Command::Sweep(command) => command.run(),
+        Command::Jobs(command) => command.run(),
         Command::Merge(command) => command.run(),
         Command::Chart(command) => command.run(),
         Command::Plot(command) => command.run(),

@@ -1,27 +1,24 @@
 //! `bimorph sweep`: many variants.
 
-use super::access::AccessArgs;
 use super::chance::Chance;
 use super::failure::Failure;
 use super::model::ModelArgs;
-use super::output::{check_folder, print};
-use super::part::Part;
-use super::{interrupt, progress, value};
+use super::output::print;
+use super::remote::{Remote, failure, follow};
+use super::{delivery, interrupt, progress, value};
 use bimorph::compile::CompileOptions;
 use bimorph::jobs::sweep::journal::{self, Journal, Kept};
+use bimorph::jobs::sweep::part::Part;
 use bimorph::jobs::sweep::{
     self, Shard, SweepAnalysis, SweepError, SweepParameter, SweepProgress, SweepSpec, SweepTable,
 };
 use bimorph::netlist::Bundle;
 use bimorph::options::Value;
 use bimorph::options::analysis::{MODES_COUNT, PULL_IN_MAX, TRAN_STOP};
-use bimorph::results::atomic;
-use bimorph::service::client::Client;
 use clap::{Args, ValueEnum};
 use std::io::{self, IsTerminal};
 use std::path::PathBuf;
 use std::sync::OnceLock;
-use std::time::Duration;
 
 /// Run one analysis over a grid of parameter values, or over samples of parameters that vary, on all cores, here or on a server.
 ///
@@ -31,6 +28,9 @@ use std::time::Duration;
 ///
 /// With --out FILE.csv every point is kept in FILE.csv.journal as soon as it is done, until the table is written: after Ctrl-C, a kill or a
 /// full disk the same command with --resume goes on where it stopped, and the table has the bytes that one run would have.
+///
+/// With --to the sweep is a job of a server, which goes on after Ctrl-C, and when the connection is lost: `bimorph jobs` lists it, attaches to it,
+/// and cancels it.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     bimorph sweep bank.net --param w=1.8u:2.2u:21 --port heat=2.2 --signals yoke.y --out w.csv\n  \
@@ -87,16 +87,8 @@ pub(crate) struct Sweep {
     #[arg(long)]
     threads: Option<usize>,
 
-    /// Run on a server: unix:///path, host:port or https://host:port
-    #[arg(long, value_name = "URI")]
-    to: Option<String>,
-
     #[command(flatten)]
-    access: AccessArgs,
-
-    /// Longest wait for an answer of the server [s]
-    #[arg(long, default_value = "30", value_parser = value::number, allow_negative_numbers = true)]
-    deadline: f64,
+    remote: Remote,
 
     /// Write the table to a .csv file [default: standard output]
     #[arg(long, value_name = "FILE")]
@@ -117,42 +109,63 @@ enum Analysis {
 
 impl Sweep {
     pub(crate) fn run(&self) -> Result<(), Failure> {
-        if let Some(out) = &self.out {
-            if out.extension().is_none_or(|e| !e.eq_ignore_ascii_case("csv")) {
-                return Err(Failure::bad("--out", "a .csv file", format!("\"{}\"", out.display())));
-            }
-            check_folder(out)?;
-        }
+        delivery::check(self.out.as_ref())?;
         let spec = self.spec()?;
         let (bundle, options) = (self.model.bundle()?, self.model.options()?);
         warn_of_netlist(&spec, &bundle, &options);
+        if let Some(uri) = &self.remote.to {
+            return self.there(uri, &spec, &bundle, &options);
+        }
         let bar = progress::bar("sweep");
-        let table = match &self.to {
-            None => self.here(&spec, &bundle, &options, &bar),
-            Some(uri) => {
-                if !(self.deadline > 0.0 && self.deadline < 1e6) {
-                    return Err(Failure::bad("--deadline", "a time above 0 s", self.deadline.to_string()));
-                }
-                let deadline = Duration::from_secs_f64(self.deadline);
-                Client::connect_with(uri, &self.access.access(), deadline)
-                    .and_then(|mut client| client.sweep(&spec, &bundle, &options, &mut |p| report(&bar, p)))
-                    .map(|table| (table, None))
-                    .map_err(|e| if interrupt::asked() { Failure::Interrupted } else { e.into() })
-            }
-        };
+        let table = self.here(&spec, &bundle, &options, &bar);
         bar.finish_and_clear();
         let (table, journal) = table?;
-        let part = (spec.shard.count > 1).then(|| Part::of(&spec, &bundle, &options)).transpose()?;
-        let written = self.deliver(&table, part.as_ref())?;
+        let written = self.deliver(&table, &spec, &bundle, &options)?;
         // points that are in no table stay where they are
         if let Some(journal) = journal.filter(|_| written) {
             journal.finish()?;
         }
-        eprintln!("{}", summary(&table, spec.shard));
-        match table.rows.iter().find_map(|row| row.values.as_ref().err()) {
-            Some(first) if table.failed() == table.rows.len() => Err(Failure::AllPoints(first.trim_end().to_owned())),
-            _ => Ok(()),
+        delivery::nothing(&table)
+    }
+
+    /// The sweep on a server, as a job that goes on when this process does not.
+    fn there(&self, uri: &str, spec: &SweepSpec, bundle: &Bundle, options: &CompileOptions) -> Result<(), Failure> {
+        let (mut client, name) = self.remote.submit(uri, spec, bundle, options)?;
+        if self.remote.detach {
+            return print(&format!("{name}\n"));
         }
+        let bar = progress::bar("sweep");
+        let followed = follow(&mut client, uri, &name, &bar);
+        bar.finish_and_clear();
+        let (table, job) = followed?;
+        let written = match failure(uri, &job) {
+            Some(failure) => Err(failure),
+            None => self.deliver(&table, spec, bundle, options).map(drop),
+        };
+        // a table that could not be written is still there
+        if let Err(error @ (Failure::Write { .. } | Failure::Stdout(_))) = written {
+            eprintln!("its rows are on the server: `bimorph jobs attach {name} --to {uri}` has them");
+            return Err(error);
+        }
+        self.remote.forget(&mut client, &name);
+        written?;
+        delivery::nothing(&table)
+    }
+
+    /// Writes the table and says what it has; whether there was anything to write.
+    fn deliver(
+        &self,
+        table: &SweepTable,
+        spec: &SweepSpec,
+        bundle: &Bundle,
+        options: &CompileOptions,
+    ) -> Result<bool, Failure> {
+        let Shard { index, count } = spec.shard;
+        let part = (count > 1).then(|| Part::of(spec, bundle, options)).transpose()?.map(|part| part.to_string());
+        let written = delivery::deliver(self.out.as_deref(), table, part.as_deref())?;
+        let shard = part.map(|_| format!(" (shard {index}/{count})")).unwrap_or_default();
+        eprintln!("{}", delivery::summary(table, &shard));
+        Ok(written)
     }
 
     /// The sweep in this process, each point kept in a journal where there will be a file.
@@ -245,7 +258,7 @@ impl Sweep {
                 name(&self.analysis),
             ));
         }
-        if self.threads.is_some() && self.to.is_some() {
+        if self.threads.is_some() && self.remote.to.is_some() {
             return Err(Failure::bad(
                 "--threads",
                 "a sweep in this process",
@@ -253,21 +266,6 @@ impl Sweep {
             ));
         }
         Ok(())
-    }
-
-    /// Writes the table, where it is one; whether it is.
-    fn deliver(&self, table: &SweepTable, part: Option<&Part>) -> Result<bool, Failure> {
-        // A table in which no point has a result is no result. One of a shard is: its reasons are rows of the whole.
-        if part.is_none() && !table.rows.is_empty() && table.failed() == table.rows.len() {
-            return Ok(false);
-        }
-        let text = part.map_or_else(|| table.to_csv(), |part| table.to_csv_of_part(&part.to_string()));
-        match &self.out {
-            Some(path) => atomic::write(path, |out| out.write_all(text.as_bytes()))
-                .map_err(|source| Failure::Write { path: path.clone(), source })?,
-            None => print(&text)?,
-        }
-        Ok(true)
     }
 }
 
@@ -284,15 +282,4 @@ fn report(bar: &indicatif::ProgressBar, progress: SweepProgress) -> bool {
     bar.set_length(progress.points);
     bar.set_position(progress.done);
     !interrupt::asked()
-}
-
-fn summary(table: &SweepTable, shard: Shard) -> String {
-    let mut text = format!("{} points", table.rows.len());
-    if shard.count > 1 {
-        text += &format!(" (shard {}/{})", shard.index, shard.count);
-    }
-    match table.failed() {
-        0 => text,
-        failed => text + &format!(", {failed} without a result: see the column \"error\""),
-    }
 }

@@ -5,12 +5,15 @@
 //! rows come back in grid order, so the table has the same bits on one thread and on many, and the shards of a sweep put
 //! together are the whole sweep.
 
+mod crew;
 mod design;
 mod distribution;
 mod error;
 mod family;
 pub mod journal;
 pub mod parse;
+pub mod part;
+mod pieces;
 mod point;
 mod samples;
 mod spec;
@@ -18,6 +21,7 @@ mod table;
 mod together;
 mod transient;
 
+pub use crew::{Crew, Pool};
 pub use design::{DESIGNS, Design};
 pub use distribution::{Distribution, Vary, number};
 pub use error::SweepError;
@@ -25,18 +29,13 @@ pub use samples::{Samples, Sampling};
 pub use spec::{Shard, SweepAnalysis, SweepParameter, SweepSpec};
 pub use table::{SweepRow, SweepTable};
 
-use crate::budget::{self, Budget, Stopped};
 use crate::compile::{CompileError, CompileOptions, Drawn, draw};
-use crate::netlist::{Bundle, Source};
-use family::Family;
+use crate::netlist::{Bundle, Setting, Source};
 use journal::Kept;
 use point::Outcome;
-use rayon::prelude::*;
 use std::collections::BTreeMap;
-use std::sync::OnceLock;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use together::Together;
-use transient::Transients;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 /// How far a sweep has come.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -100,79 +99,45 @@ pub fn run_on(
     numbers.retain(|number| !known.contains_key(number));
     let before = known.values().filter(|kept| kept.error.is_some()).count();
     let (done, failed) = (AtomicU64::new(known.len() as u64), AtomicU64::new(before as u64));
-    let stop = AtomicBool::new(false);
-    let (budget, full) = (budget::current(), OnceLock::new());
-    let source = Source::new(bundle);
-    let family = Family::new(spec, &source, options);
-    let counted = |outcome: &point::Outcome| {
-        if let Some(Err(Stopped::Bytes { most, .. } | Stopped::OwnerBytes { most, .. })) =
-            budget.as_ref().map(|budget| budget.take(outcome.bytes()))
-        {
-            let _ = full.set(most);
-            stop.store(true, Ordering::Relaxed);
-        }
+    let each = |outcome: &Outcome| {
         if outcome.values.is_err() {
             failed.fetch_add(1, Ordering::Relaxed);
         }
-        if keep.is_some_and(|keep| !keep(&outcome.kept())) {
-            stop.store(true, Ordering::Relaxed);
-        }
+        let kept = keep.is_none_or(|keep| keep(&outcome.kept()));
         let done = done.fetch_add(1, Ordering::Relaxed) + 1;
-        if !progress(SweepProgress { done, points, failed: failed.load(Ordering::Relaxed) }) {
-            stop.store(true, Ordering::Relaxed);
-        }
+        progress(SweepProgress { done, points, failed: failed.load(Ordering::Relaxed) }) && kept
     };
-    let one = |&number: &usize| -> Option<Vec<point::Outcome>> {
-        if stop.load(Ordering::Relaxed) {
-            return None;
-        }
-        let outcome = point::run(spec, number, &source, options, &family, budget.as_ref().map(Budget::part));
-        counted(&outcome);
-        Some(vec![outcome])
-    };
-    let transients = Transients::new(spec, &source, options);
-    let some = |numbers: &[usize]| -> Option<Vec<point::Outcome>> {
-        transients.run(numbers, budget.as_ref(), &|outcome| {
-            outcome.into_iter().for_each(counted);
-            !stop.load(Ordering::Relaxed)
-        })
-    };
-    let together = Together::new(spec, &source, options, &family);
-    let several = |numbers: &[usize]| -> Option<Vec<point::Outcome>> {
-        if stop.load(Ordering::Relaxed) {
-            return None;
-        }
-        together.run(numbers, budget.as_ref(), &|outcome| {
-            counted(outcome);
-            !stop.load(Ordering::Relaxed)
-        })
-    };
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(spec.threads.unwrap_or(0))
-        .build()
-        .map_err(|error| SweepError::Threads { reason: error.to_string() })?;
-    // no thread goes without while another has many; a row does not depend on who is beside it
-    let at_once = match family.shares() {
-        true => numbers.len().div_ceil(2 * pool.current_num_threads()).clamp(1, together::CHUNK),
-        false => 1,
-    };
-    let outcomes: Option<Vec<Vec<_>>> = pool.install(|| match spec.analysis {
-        SweepAnalysis::Transient { .. } => numbers.par_chunks(transient::CHUNK).map(some).collect(),
-        SweepAnalysis::Static { .. } | SweepAnalysis::Modes { .. } => {
-            numbers.par_chunks(at_once).map(several).collect()
-        }
-        SweepAnalysis::PullIn { .. } => numbers.par_iter().map(one).collect(),
-    });
-    if let Some(&most) = full.get() {
-        return Err(SweepError::TooLarge { most });
+    let found = Mutex::new(Vec::with_capacity(numbers.len()));
+    let take = |outcomes| found.lock().unwrap_or_else(PoisonError::into_inner).extend(outcomes);
+    let crew = Pool::new(spec.threads.unwrap_or(0))?;
+    if !pieces::run((spec, bundle, options), &numbers, &crew, &each, &take)? {
+        return Err(SweepError::Cancelled { done: done.into_inner(), points });
     }
-    match outcomes {
-        Some(outcomes) => {
-            let new = outcomes.into_iter().flatten();
-            let mut all: Vec<Outcome> = known.into_values().map(|kept| kept.outcome(spec)).chain(new).collect();
-            all.sort_by_key(|outcome| outcome.number);
-            Ok(table::assemble(spec, all))
-        }
-        None => Err(SweepError::Cancelled { done: done.into_inner(), points }),
-    }
+    let mut all: Vec<Outcome> = known.into_values().map(|kept| kept.outcome(spec)).collect();
+    all.extend(found.into_inner().unwrap_or_else(PoisonError::into_inner));
+    all.sort_by_key(|outcome| outcome.number);
+    Ok(table::assemble(spec.names().map(str::to_owned).collect(), all))
+}
+
+/// Runs the points `numbers` of a sweep by a crew; `keep` is given each as soon as it is done, from any thread, and answers whether to go on.
+/// Whether all were run.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_by(
+    spec: &SweepSpec,
+    bundle: &Bundle,
+    options: &CompileOptions,
+    numbers: &[usize],
+    crew: &dyn Crew,
+    keep: &(dyn Fn(Kept) -> bool + Sync),
+) -> Result<bool, SweepError> {
+    pieces::run((spec, bundle, options), numbers, crew, &|outcome| keep(outcome.kept()), &drop)
+}
+
+/// The table of points that came one by one, each with the values of its parameters, in any order.
+pub fn table_of(parameters: Vec<String>, rows: Vec<(Vec<Setting>, Kept)>) -> SweepTable {
+    let mut all: Vec<Outcome> = rows.into_iter().map(|(settings, kept)| kept.with(settings)).collect();
+    all.sort_by_key(|outcome| outcome.number);
+    table::assemble(parameters, all)
 }

@@ -1,10 +1,8 @@
 //! Long answers in messages of at most 1 MiB.
 
 use super::convert::analysis::summary_to_wire;
-use super::convert::sweep::row_to_wire;
+use super::pace::{CHUNK_BYTES, HEARTBEAT};
 use super::shared::Shared;
-use super::shutdown::Shutdown;
-use super::sweeps::Sweep;
 use super::turns::Place;
 use super::{proto, status};
 use crate::analysis::AnalysisError;
@@ -12,25 +10,15 @@ use crate::analysis::mesh::{self, fitted_in_time};
 use crate::analysis::step_error::{self, with_step_error};
 use crate::analysis::transient::{TransientOptions, TransientResult, transient};
 use crate::compile::Compiled;
-use prost::Message;
 use proto::transient_event::Kind;
-use std::future::Future;
-use std::pin::Pin;
 use std::sync::Arc;
-use std::task::{Context, Poll};
 use std::time::{Duration, Instant};
 use tokio::runtime::Handle;
-use tokio::sync::{OwnedSemaphorePermit, mpsc};
-use tokio_stream::Stream;
-use tokio_util::sync::WaitForCancellationFutureOwned;
+use tokio::sync::mpsc;
 use tonic::Status;
 
-/// Most bytes of one message of a stream.
-pub(super) const CHUNK_BYTES: usize = 1 << 20;
 /// Samples are sent at least this often, so that a slow run is seen to move.
 const LIVELINESS: Duration = Duration::from_millis(200);
-/// A run without samples to send says at least this often how far it has come, so that clients can tell slow from dead.
-pub(super) const HEARTBEAT: Duration = Duration::from_secs(1);
 
 /// Where the messages of a stream go: one at a time, never waiting for a silent client longer than the idle limit.
 pub(super) struct Outlet<T> {
@@ -176,59 +164,5 @@ impl Pending {
         let t = std::mem::take(&mut self.t);
         let signals = self.columns.iter_mut().map(|column| proto::Column { values: std::mem::take(column) }).collect();
         proto::TransientEvent { kind: Some(Kind::Samples(proto::Samples { t, signals })), progress }
-    }
-}
-
-/// A table on its way: columns first, then rows in as few messages as fit, each made when the one before is taken. A
-/// reader that is slow holds a place and one message, and no thread.
-pub(super) struct TableStream {
-    sweep: Arc<Sweep>,
-    /// Rows sent; none before the first message.
-    sent: Option<usize>,
-    ending: Pin<Box<WaitForCancellationFutureOwned>>,
-    _place: OwnedSemaphorePermit,
-}
-
-impl TableStream {
-    /// The table of a finished sweep.
-    pub(super) fn new(sweep: Arc<Sweep>, place: OwnedSemaphorePermit, shutdown: &Shutdown) -> Self {
-        Self { sweep, sent: None, ending: Box::pin(shutdown.ending.clone().cancelled_owned()), _place: place }
-    }
-
-    fn next(&mut self) -> Option<proto::SweepChunk> {
-        let table = self.sweep.table()?;
-        let mut chunk = proto::SweepChunk::default();
-        let first = self.sent.is_none();
-        if first {
-            chunk.parameters.clone_from(&table.parameters);
-            chunk.results.clone_from(&table.results);
-            chunk.units.clone_from(&table.units);
-        }
-        let mut bytes = chunk.encoded_len();
-        let mut sent = self.sent.unwrap_or(0);
-        for row in table.rows.get(sent..).unwrap_or_default() {
-            let row = row_to_wire(row);
-            bytes += row.encoded_len() + 8;
-            if bytes > CHUNK_BYTES && !chunk.rows.is_empty() {
-                break;
-            }
-            chunk.rows.push(row);
-            sent += 1;
-        }
-        self.sent = Some(sent);
-        (first || !chunk.rows.is_empty()).then_some(chunk)
-    }
-}
-
-impl Stream for TableStream {
-    type Item = Result<proto::SweepChunk, Status>;
-
-    fn poll_next(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<Option<Self::Item>> {
-        let over = self.sent.is_some_and(|sent| self.sweep.table().is_none_or(|table| sent >= table.rows.len()));
-        if !over && self.ending.as_mut().poll(cx).is_ready() {
-            self.sent = Some(usize::MAX);
-            return Poll::Ready(Some(Err(status::stopping())));
-        }
-        Poll::Ready(self.next().map(Ok))
     }
 }

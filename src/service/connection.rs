@@ -11,6 +11,7 @@ use super::limits::Limits;
 use super::presence::{Presence, Who};
 use socket2::{SockRef, TcpKeepalive};
 use std::cmp::Reverse;
+use std::collections::BTreeSet;
 use std::future::Future;
 use std::io;
 use std::pin::Pin;
@@ -96,6 +97,12 @@ impl Connections {
     pub(super) fn open(&self) -> usize {
         let open = self.open.lock().unwrap_or_else(PoisonError::into_inner);
         open.iter().filter(|presence| presence.strong_count() > 0).count()
+    }
+
+    /// Numbers of the connections that are open.
+    pub(super) fn numbers(&self) -> BTreeSet<u64> {
+        let open = self.open.lock().unwrap_or_else(PoisonError::into_inner);
+        open.iter().filter_map(Weak::upgrade).map(|presence| presence.number()).collect()
     }
 
     /// A connection over TCP in a place, once it is known how its client speaks; none when that fails, or takes longer than

@@ -35,6 +35,11 @@ impl Disk {
         }
     }
 
+    /// Whether it is waited for.
+    pub(super) fn waits(&self) -> bool {
+        self.sync
+    }
+
     /// Writes a file, over what it held before. When this returns its bytes outlive the machine; a new name does not yet.
     ///
     /// # Errors

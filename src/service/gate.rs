@@ -24,7 +24,7 @@ pub(super) struct Gate {
     pub(super) most_held: usize,
     pub(super) pause: Duration,
     pub(super) guard: Arc<Guard>,
-    pub(super) accounts: Accounts,
+    pub(super) accounts: Arc<Accounts>,
     pub(super) metrics: Arc<Metrics>,
     /// What requests of this server are called, before their number.
     pub(super) name: String,
@@ -44,7 +44,12 @@ const HEALTH_CALLS: usize = 64;
 const HEALTH_BYTES: usize = 1 << 10;
 
 impl Gate {
-    pub(super) fn new(limits: &Limits, guard: Arc<Guard>, metrics: Arc<Metrics>) -> Arc<Self> {
+    pub(super) fn new(
+        limits: &Limits,
+        guard: Arc<Guard>,
+        metrics: Arc<Metrics>,
+        accounts: &Arc<Accounts>,
+    ) -> Arc<Self> {
         let name = Ids::default().make().map_or_else(|_| "request".to_owned(), |id| id[..8].to_owned());
         Arc::new(Self {
             calls: AtomicUsize::new(0),
@@ -54,7 +59,7 @@ impl Gate {
             most_held: limits.held_bytes,
             pause: limits.request_pause,
             guard,
-            accounts: Accounts::new(limits),
+            accounts: Arc::clone(accounts),
             metrics,
             name,
             requests: AtomicU64::new(1),

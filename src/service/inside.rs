@@ -125,7 +125,8 @@ impl Inside {
                 "Open" open, "Linearize" linearize, "Snapshot" snapshot, "Restore" restore, "Fork" fork,
                 "KeepAlive" keep_alive, "Close" close,
                 "Static" r#static, "Modes" modes, "FrequencyResponse" frequency_response, "PullIn" pull_in,
-                "SubmitSweep" submit_sweep, "CancelSweep" cancel_sweep,
+                "SubmitJob" submit_job, "GetJob" get_job, "ListJobs" list_jobs, "CancelJob" cancel_job,
+                "DeleteJob" delete_job, "SubmitSweep" submit_sweep, "CancelSweep" cancel_sweep,
             )
         };
         wait(self.runtime()?.handle(), answer, waits)
@@ -141,6 +142,8 @@ impl Inside {
         let stream = runtime.block_on(async {
             match name {
                 "Transient" => calls.transient(decoded(request)?).await.map(as_bytes),
+                "WatchJob" => calls.watch_job(decoded(request)?).await.map(as_bytes),
+                "FetchJob" => calls.fetch_job(decoded(request)?).await.map(as_bytes),
                 "WatchSweep" => calls.watch_sweep(decoded(request)?).await.map(as_bytes),
                 "FetchSweep" => calls.fetch_sweep(decoded(request)?).await.map(as_bytes),
                 other => Err(Status::unimplemented(format!("no call \"{other}\" with many answers"))),
@@ -157,7 +160,7 @@ impl Inside {
 
 impl Drop for Inside {
     fn drop(&mut self) {
-        self.calls.0.sweeps.cancel_all();
+        self.calls.0.jobs.suspend();
         if let Some(runtime) = self.runtime.take() {
             runtime.shutdown_background();
         }

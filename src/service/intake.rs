@@ -76,8 +76,8 @@ where
         }
         let stream = STREAMS.iter().any(|name| request.uri().path().ends_with(name));
         let number = call.presence.as_ref().map_or(0, |presence| presence.number());
-        let account = admitted.ok().and_then(|name| self.gate.accounts.of(&name));
-        let client = Client { number, account };
+        let account = admitted.as_ref().ok().and_then(|name| self.gate.accounts.of(name));
+        let client = Client { number, account, name: admitted.unwrap_or_default().into() };
         let received = Arc::clone(&call);
         let request = request.map(|body| Body::new(Received::new(body, received, stream)));
         let answer = CLIENT.scope(client, self.service.call(request)).instrument(span.clone());

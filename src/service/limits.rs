@@ -85,15 +85,21 @@ limits! {
     /// Most processor time of one client within an hour, trials and threads of sweeps among it; what was used comes back evenly. 0: any.
     client_cpu: TimeOrNone = Duration::ZERO;
 
-    /// Most bytes of states and netlists in the folder `state_dir`; a session whose states would be beyond does not open, and an
-    /// accepted state that would be is refused.
+    /// Most bytes of states, netlists and jobs in the folder `state_dir`; a session whose states would be beyond does not open, an
+    /// accepted state that would be is refused, and a job whose rows would be ends.
     state_bytes: Bytes = 1 << 30;
 
     /// Most points of one sweep.
     sweep_points: Count = 1_000_000;
 
-    /// Most sweeps kept, running or finished.
+    /// Most jobs kept, running or finished. All that run share the processors, in turns of their clients.
     sweeps: Count = 16;
+
+    /// Most jobs of one client kept, running or finished; 0: any.
+    client_sweeps: CountOrNone = 0;
+
+    /// A finished job in the folder `state_dir` that nobody asks for is forgotten after so long; without such a folder, after `idle`.
+    sweeps_idle: Time = Duration::from_secs(7 * 24 * 3600);
 
     /// Most samples times signals of one transient.
     transient_values: Count = 100_000_000;
@@ -149,7 +155,7 @@ limits! {
     /// Longest unary call; then `DEADLINE_EXCEEDED`.
     request_timeout: Time = Duration::from_secs(120);
 
-    /// A session without a stream and without a lease, or a finished sweep, untouched for this long is forgotten.
+    /// A session without a stream and without a lease, or a finished job that is not kept on a disk, untouched for this long is forgotten.
     idle: Time = Duration::from_secs(600);
 
     /// A session on an open stream untouched for this long is forgotten: a circuit may be paused for lunch, but a
@@ -203,6 +209,8 @@ impl Limits {
             stream_idle_s: self.stream_idle.as_secs_f64(),
             model_memory_bytes: self.model_memory as u64,
             mode_work: self.mode_work as u64,
+            client_sweeps: self.client_sweeps as u64,
+            sweeps_idle_s: self.sweeps_idle.as_secs_f64(),
         }
     }
 }

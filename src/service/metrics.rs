@@ -6,7 +6,7 @@ use std::time::{Duration, SystemTime};
 use tonic::Code;
 
 /// Calls that are counted by name; the last stands for all others.
-const CALLS: [&str; 26] = [
+const CALLS: [&str; 33] = [
     "Info",
     "Check",
     "Convert",
@@ -25,6 +25,13 @@ const CALLS: [&str; 26] = [
     "FrequencyResponse",
     "PullIn",
     "Transient",
+    "SubmitJob",
+    "GetJob",
+    "ListJobs",
+    "WatchJob",
+    "FetchJob",
+    "CancelJob",
+    "DeleteJob",
     "SubmitSweep",
     "WatchSweep",
     "FetchSweep",
@@ -66,7 +73,7 @@ pub const METRICS: [Metric; 17] = [
     metric("bimorph_held_bytes", "gauge", "Bytes of requests that are held [byte]."),
     metric("bimorph_sessions", "gauge", "Sessions open."),
     metric("bimorph_models", "gauge", "Models kept."),
-    metric("bimorph_sweeps", "gauge", "Sweeps kept, running or finished."),
+    metric("bimorph_sweeps", "gauge", "Jobs kept, running or finished."),
     metric("bimorph_waiting", "gauge", "Computations that wait for a place, by what they are."),
     metric("bimorph_kept_sessions", "gauge", "Sessions in the folder of states."),
     metric("bimorph_kept_bytes", "gauge", "Bytes in the folder of states [byte]."),

@@ -5,7 +5,7 @@
 //! is built with the feature `remote` alone, and shows what [`access`] says; `tls` is for both ends. The rest is the feature `server`: [`server`] listens and stops
 //! (`sockets`, `connection`, `shutdown`), [`guard`] and `tokens` ask who comes, `accounts` what each has, `intake` counts what comes in as `bodies`, `rpc` answers calls (`analyses` those that compute), `stream` is the Newton loop, about
 //! a session that it has `joined`, [`inside`] is all of it without a network,
-//! `models`, `sessions` and `sweeps` keep what clients can name, under `ids` that nobody guesses; a `session` answers each `question`, has its `usage` and its
+//! `models`, `sessions` and `jobs` keep what clients can name, under `ids` that nobody guesses; a `session` answers each `question`, has its `usage` and its
 //! `spectra`, `snapshots` puts it into bytes, `store` and `keeper` hold what outlives the server, on a `disk`, which `waking` goes on with and
 //! [`survey`] looks at, `work` computes, in the `turns` of clients, `chunks` sends what is long, `status` says what went wrong, [`log`]
 //! says it without waiting, [`limits`] is what clients may ask for, and [`settings`] all
@@ -43,6 +43,8 @@ pub mod inside;
 #[cfg(feature = "server")]
 mod intake;
 #[cfg(feature = "server")]
+mod jobs;
+#[cfg(feature = "server")]
 mod joined;
 #[cfg(feature = "server")]
 mod keeper;
@@ -60,12 +62,16 @@ mod models;
 mod overseen;
 #[cfg(feature = "server")]
 mod overseer;
+#[cfg(feature = "server")]
+mod pace;
 #[cfg(all(test, feature = "server"))]
 mod power_cuts;
 #[cfg(feature = "server")]
 mod presence;
 #[cfg(feature = "server")]
 mod question;
+#[cfg(feature = "server")]
+mod room;
 #[cfg(feature = "server")]
 mod rpc;
 #[cfg(feature = "server")]
@@ -98,8 +104,6 @@ mod store;
 mod stream;
 #[cfg(feature = "server")]
 pub mod survey;
-#[cfg(feature = "server")]
-mod sweeps;
 #[cfg(feature = "tls")]
 pub mod tls;
 #[cfg(feature = "server")]

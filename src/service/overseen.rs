@@ -77,7 +77,7 @@ pub(super) fn text(shared: &Shared, gate: &Gate) -> String {
             "bimorph_held_bytes" => gate.held() as u64,
             "bimorph_sessions" => shared.sessions.len() as u64,
             "bimorph_models" => shared.models.len() as u64,
-            "bimorph_sweeps" => shared.sweeps.len() as u64,
+            "bimorph_sweeps" => shared.jobs.len() as u64,
             "bimorph_kept_sessions" => shared.store.as_ref().map_or(0, |store| store.len() as u64),
             "bimorph_kept_bytes" => shared.store.as_ref().map_or(0, |store| store.used() as u64),
             "bimorph_log_lines_dropped_total" => log::dropped(),

@@ -1,29 +1,22 @@
 //! The calls of `service.proto`: check, look up, compute, convert.
 
-use super::analyses::{TransientStream, count};
+use super::analyses::TransientStream;
 use super::answerable::answerable;
-use super::chunks::{HEARTBEAT, TableStream};
-use super::convert::{self, model as text, options as options_wire, sweep as sweeps_wire};
+use super::convert::{self, model as text, options as options_wire};
+use super::jobs::{JobStream, RowStream, SweepStream, TableStream};
 use super::models::check_size;
 use super::question::Question;
 use super::shared::{Calls, Reply};
 use super::stream::TrialStream;
-use super::sweeps::Asked;
 use super::{proto, status};
 use crate::budget::Budget;
 use crate::compile::{CompileError, CompileOptions, compile};
 use crate::device::Token;
 use crate::netlist::Bundle;
 use proto::device_reply::Kind as ReplyKind;
-use proto::sweep_status::State;
-use std::pin::Pin;
 use std::sync::Arc;
 use std::time::Duration;
-use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Request, Response, Status, Streaming};
-
-/// Time between two messages of WatchSweep.
-const WATCH_INTERVAL: Duration = Duration::from_millis(100);
 
 impl Calls {
     /// Bundle and options of a request, within limits.
@@ -192,76 +185,56 @@ impl proto::bimorph_server::Bimorph for Calls {
         self.motion(request.into_inner()).await
     }
 
-    async fn submit_sweep(&self, request: Request<proto::SubmitSweepRequest>) -> Reply<proto::SubmitSweepResponse> {
-        if self.0.shutdown.draining.is_cancelled() {
-            return Err(status::stopping());
-        }
-        let request = request.into_inner();
-        let (bundle, options) = self.netlist(request.bundle, request.options)?;
-        let limits = &self.0.limits;
-        let points = request.spec.as_ref().map_or(0, sweeps_wire::grid_points);
-        if points > limits.sweep_points {
-            return Err(status::limit("sweep_points", limits.sweep_points, points));
-        }
-        count("outputs", request.spec.as_ref().map_or(0, sweeps_wire::outputs), limits)?;
-        let modes = request.spec.as_ref().map_or(0, sweeps_wire::modes);
-        if modes > limits.modes {
-            return Err(status::limit("modes", limits.modes, modes));
-        }
-        let asked = Asked::by(&request.request_id).map_err(status::violation)?;
-        let shared = Arc::clone(&self.0);
-        let job = move || {
-            let asked = asked.map(|asked| asked.with(request.spec.as_ref(), &bundle, &options));
-            let spec = sweeps_wire::spec_from_wire(request.spec).map_err(status::violation)?;
-            shared.sweeps.submit(spec, bundle, options, asked, &shared.limits)
-        };
-        let (sweep, points) = self.0.desk.run(job).await?;
-        Ok(Response::new(proto::SubmitSweepResponse { sweep, points }))
+    async fn submit_job(&self, request: Request<proto::SubmitJobRequest>) -> Reply<proto::Job> {
+        self.submitted_job(request.into_inner()).await
     }
 
-    type WatchSweepStream = Pin<Box<ReceiverStream<Result<proto::SweepStatus, Status>>>>;
+    async fn get_job(&self, request: Request<proto::GetJobRequest>) -> Reply<proto::Job> {
+        self.job_of(&request.get_ref().name)
+    }
 
-    async fn watch_sweep(&self, request: Request<proto::WatchSweepRequest>) -> Reply<Self::WatchSweepStream> {
-        let mut progress = self.0.sweeps.get(&request.get_ref().sweep)?.watch();
-        let shutdown = self.0.shutdown.clone();
-        let (sender, receiver) = tokio::sync::mpsc::channel(1);
-        tokio::spawn(async move {
-            loop {
-                let now = progress.borrow_and_update().clone();
-                let last = now.state() != State::Running;
-                if sender.send(Ok(now)).await.is_err() || last {
-                    return;
-                }
-                tokio::select! {
-                    changed = progress.changed() => if changed.is_err() { return },
-                    () = tokio::time::sleep(HEARTBEAT) => {}
-                    () = sender.closed() => return,
-                    () = shutdown.ending.cancelled() => {
-                        let _ = sender.try_send(Err(status::stopping()));
-                        return;
-                    }
-                }
-                tokio::time::sleep(WATCH_INTERVAL).await;
-            }
-        });
-        Ok(Response::new(Box::pin(ReceiverStream::new(receiver))))
+    async fn list_jobs(&self, request: Request<proto::ListJobsRequest>) -> Reply<proto::ListJobsResponse> {
+        self.listed_jobs(request.get_ref())
+    }
+
+    type WatchJobStream = JobStream;
+
+    async fn watch_job(&self, request: Request<proto::WatchJobRequest>) -> Reply<JobStream> {
+        self.watched_job(&request.get_ref().name)
+    }
+
+    type FetchJobStream = RowStream;
+
+    async fn fetch_job(&self, request: Request<proto::FetchJobRequest>) -> Reply<RowStream> {
+        self.fetched_job(request.get_ref())
+    }
+
+    async fn cancel_job(&self, request: Request<proto::CancelJobRequest>) -> Reply<proto::CancelJobResponse> {
+        self.cancelled_job(&request.get_ref().name).await
+    }
+
+    async fn delete_job(&self, request: Request<proto::DeleteJobRequest>) -> Reply<proto::DeleteJobResponse> {
+        self.deleted_job(&request.get_ref().name).await
+    }
+
+    async fn submit_sweep(&self, request: Request<proto::SubmitSweepRequest>) -> Reply<proto::SubmitSweepResponse> {
+        self.submitted_sweep(request.into_inner()).await
+    }
+
+    type WatchSweepStream = SweepStream;
+
+    async fn watch_sweep(&self, request: Request<proto::WatchSweepRequest>) -> Reply<SweepStream> {
+        self.watched_sweep(&request.get_ref().sweep)
     }
 
     type FetchSweepStream = TableStream;
 
-    async fn fetch_sweep(&self, request: Request<proto::FetchSweepRequest>) -> Reply<Self::FetchSweepStream> {
-        let sweep = self.0.sweeps.get(&request.get_ref().sweep)?;
-        if sweep.table().is_none() {
-            let proto::SweepStatus { done, points, message, .. } = sweep.status();
-            let text = format!("the sweep has no table: {done} of {points} points done {message}");
-            return Err(Status::failed_precondition(text.trim_end()));
-        }
-        Ok(Response::new(TableStream::new(sweep, self.sending()?, &self.0.shutdown)))
+    async fn fetch_sweep(&self, request: Request<proto::FetchSweepRequest>) -> Reply<TableStream> {
+        self.fetched_sweep(&request.get_ref().sweep).await
     }
 
     async fn cancel_sweep(&self, request: Request<proto::CancelSweepRequest>) -> Reply<proto::CancelSweepResponse> {
-        self.0.sweeps.cancel(&request.get_ref().sweep)?;
-        Ok(Response::new(proto::CancelSweepResponse {}))
+        self.cancelled_sweep(&request.get_ref().sweep).await
     }
 }
 

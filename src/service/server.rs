@@ -1,10 +1,12 @@
 //! Runs the service: listen, serve, drain, stop.
 
+use super::accounts::Accounts;
 use super::address::Address;
 use super::connection::Connections;
 use super::gate::Gate;
 use super::guard::Guard;
 use super::intake::Intake;
+use super::jobs::registry::Jobs;
 use super::limits::Limits;
 use super::log::{self, Lines};
 use super::models::Models;
@@ -17,11 +19,12 @@ use super::shared::{Calls, Shared};
 use super::shutdown::{GRACE, Shutdown};
 use super::sockets::Listener;
 use super::store::Store;
-use super::sweeps::Sweeps;
+use super::survey::StoreError;
 use super::work::Work;
 use crate::device::local::LocalDevice;
 use std::future::Future;
 use std::io::IsTerminal;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::net::TcpListener;
@@ -91,6 +94,7 @@ pub async fn run_with(
 
     let told = settings.map(|settings| settings.told()).unwrap_or_default();
     let shared = share(limits, told, (make, store, connections), &signals);
+    wake(&shared, state_dir)?;
     let calls = BimorphServer::new(Calls(Arc::clone(&shared)))
         .max_decoding_message_size(shared.limits.message_bytes)
         .max_encoding_message_size(shared.limits.message_bytes);
@@ -101,7 +105,7 @@ pub async fn run_with(
             .register_encoded_file_descriptor_set(DESCRIPTORS)
             .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
     };
-    let gate = Gate::new(&shared.limits, guard, Arc::clone(&shared.metrics));
+    let gate = Gate::new(&shared.limits, guard, Arc::clone(&shared.metrics), &shared.accounts);
     let reflection = |error: &dyn Fn(&dyn std::error::Error) -> ServeError| {
         let v1 = reflection().build_v1().map_err(|e| error(&e))?;
         let v1alpha = reflection().build_v1alpha().map_err(|e| error(&e))?;
@@ -119,7 +123,7 @@ pub async fn run_with(
             .add_service(v1alpha)
             .serve_with_incoming_shutdown(ReceiverStream::new(incoming), signals.draining.clone().cancelled_owned())
     );
-    let expiry = tokio::spawn(expire(Arc::clone(&shared)));
+    let housekeeping = tokio::spawn(keep_house(Arc::clone(&shared)));
     let overseen = Overseen { shared: Arc::clone(&shared), gate };
     let watching = tokio::spawn(watch_over(health.clone(), overseen.clone()));
     let overseer = overseer.map(|listener| tokio::spawn(overseer::answer(listener, overseen)));
@@ -136,7 +140,7 @@ pub async fn run_with(
     }
     tracing::info!(open = shared.sessions.len(), "stopping");
     signals.draining.cancel();
-    shared.sweeps.cancel_all();
+    shared.jobs.suspend();
     while accepting.join_next().await.is_some() {}
     let mut ended = served;
     for (signal, wait) in [(&signals.ending, shared.limits.drain), (&signals.cutting, GRACE)] {
@@ -149,11 +153,16 @@ pub async fn run_with(
         tracing::warn!("some clients did not let go; their connections are cut");
         ended = tokio::time::timeout(GRACE, &mut serving).await.ok();
     }
-    expiry.abort();
-    if let Some(overseer) = overseer {
-        overseer.abort();
-    }
+    shared.jobs.let_go(GRACE).await;
+    housekeeping.abort();
+    overseer.iter().for_each(tokio::task::JoinHandle::abort);
     ended.unwrap_or(Ok(())).map_err(|error| transport(&error))
+}
+
+/// Goes on with the jobs in the folder, where there is one.
+fn wake(shared: &Shared, folder: Option<PathBuf>) -> Result<(), StoreError> {
+    let woken = shared.jobs.wake(&shared.accounts, &shared.limits);
+    woken.map_err(|reason| StoreError::Folder { path: folder.unwrap_or_default(), reason })
 }
 
 /// Opens every address: those of calls, that of metrics, and all as bound.
@@ -191,7 +200,8 @@ pub(super) fn share(
         make,
         models: Models::default(),
         sessions: Sessions::default(),
-        sweeps: Sweeps::new(),
+        jobs: Jobs::new(&limits, store.clone()),
+        accounts: Arc::new(Accounts::new(&limits)),
         store,
         connections,
         metrics: Arc::default(),
@@ -284,6 +294,20 @@ async fn watch_over(health: HealthReporter, overseen: Overseen) {
     }
 }
 
+/// What is done beside the calls, for as long as the server runs.
+async fn keep_house(shared: Arc<Shared>) {
+    tokio::join!(expire(Arc::clone(&shared)), look_for_clients(shared));
+}
+
+/// Cancels jobs whose clients are gone, for as long as the server runs.
+async fn look_for_clients(shared: Arc<Shared>) {
+    let mut ticks = tokio::time::interval(LOOK);
+    loop {
+        ticks.tick().await;
+        shared.jobs.look_for_clients(&shared.connections);
+    }
+}
+
 /// Forgets what was not used for [`Limits::idle`], for as long as the server runs.
 async fn expire(shared: Arc<Shared>) {
     let idle = shared.limits.idle;
@@ -296,7 +320,9 @@ async fn expire(shared: Arc<Shared>) {
             let forget = shared.limits.stream_idle;
             let _ = tokio::task::spawn_blocking(move || store.expire(forget)).await;
         }
-        let (sessions, sweeps) = (shared.sessions.expire(&shared.limits), shared.sweeps.expire(idle));
+        let sessions = shared.sessions.expire(&shared.limits);
+        let looked = Arc::clone(&shared);
+        let sweeps = tokio::task::spawn_blocking(move || looked.jobs.expire(&looked.limits)).await.unwrap_or(0);
         if sessions + sweeps > 0 {
             tracing::info!(sessions, sweeps, open = shared.sessions.len(), "forgot what was idle");
         }

@@ -241,7 +241,7 @@ impl Session {
         let states = states.map_err(|error| status::device(&error))?;
         let sealed = snapshots::seal(self.model.id(), &states);
         let accepted = token.map_or(0, |token| token.0);
-        keeper.keep(accepted, &sealed).map_err(|error| status::not_kept(&error))?;
+        keeper.keep(accepted, &sealed).map_err(|error| status::not_kept("the state is", &error))?;
         self.accepted.store(accepted, Ordering::Relaxed);
         Ok(true)
     }
@@ -253,7 +253,7 @@ impl Session {
             if self.is_closed() {
                 return Err(status::not_found("session", &self.id));
             }
-            keeper.lease(millis).map_err(|error| status::not_kept(&error))?;
+            keeper.lease(millis).map_err(|error| status::not_kept("the state is", &error))?;
         }
         self.usage.lease(millis);
         Ok(())

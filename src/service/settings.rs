@@ -78,7 +78,7 @@ settings! {
     /// Log as JSON, an object a line, with the id, the name and the client of each request.
     log_json: Flag = false;
 
-    /// Folder for accepted states of sessions, which then outlive the server: a client goes on where it was.
+    /// Folder for accepted states of sessions and for jobs, which then outlive the server: a client goes on where it was.
     state_dir: File = None;
 
     /// Do not wait for the disk when a state is kept: it outlives the end of the server, not that of the machine.

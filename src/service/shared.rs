@@ -1,6 +1,8 @@
 //! What all calls of a server share.
 
+use super::accounts::Accounts;
 use super::connection::Connections;
+use super::jobs::registry::Jobs;
 use super::limits::Limits;
 use super::metrics::Metrics;
 use super::models::Models;
@@ -8,7 +10,6 @@ use super::server::MakeDevice;
 use super::sessions::Sessions;
 use super::shutdown::Shutdown;
 use super::store::Store;
-use super::sweeps::Sweeps;
 use super::work::Work;
 use super::{proto, status};
 use std::sync::Arc;
@@ -23,7 +24,9 @@ pub(super) struct Shared {
     pub(super) make: MakeDevice,
     pub(super) models: Models,
     pub(super) sessions: Sessions,
-    pub(super) sweeps: Sweeps,
+    pub(super) jobs: Jobs,
+    /// What each client has.
+    pub(super) accounts: Arc<Accounts>,
     pub(super) connections: Arc<Connections>,
     pub(super) metrics: Arc<Metrics>,
     /// States that outlive the server.

@@ -107,15 +107,15 @@ pub(super) fn not_found(kind: &str, id: &str) -> Status {
     let way_out = match kind {
         "model" => "compile it again: the same text gives the same id",
         "session" => "open one; sessions end with their stream, by Close, or after a time without use",
-        _ => "submit it again; finished sweeps are forgotten after a time without use",
+        _ => "submit it again; those that have ended are forgotten after a time without use",
     };
     Status::not_found(format!("no {kind} \"{id}\" here; {way_out}"))
 }
 
 /// States that cannot be kept: RESOURCE_EXHAUSTED where there is no room for them, UNAVAILABLE for anything else.
-pub(super) fn not_kept(error: &std::io::Error) -> Status {
+pub(super) fn not_kept(what: &str, error: &std::io::Error) -> Status {
     use std::io::ErrorKind;
-    let text = cut(format!("the state is not kept: {error}"), MESSAGE_BYTES);
+    let text = cut(format!("{what} not kept: {error}"), MESSAGE_BYTES);
     match error.kind() {
         ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge => Status::resource_exhausted(text),
         _ => Status::unavailable(text),

@@ -3,13 +3,14 @@
 //! Each session has two files, `sessions/ID.0` and `ID.1`, written in turn: when one is being written, the other holds what
 //! was accepted before, so that whatever moment the server ends at, one of them is whole. A file holds the last two accepted
 //! states, as a client may not have heard of the last one. Beside them `models/ID` holds each netlist with its options, from
-//! which the model is compiled again. Nobody but the owner can read any of it.
+//! which the model is compiled again; `jobs` has files of its own (`jobs::folder`). Nobody but the owner can read any of it.
 //!
-//! What is here is bounded: two files a session, and `state_bytes` in all.
+//! What is here is bounded: two files a session, and `state_bytes` in all, jobs among them.
 
 use super::disk::{Disk, private};
 use super::kept::Kept;
 use super::proto;
+use super::room::Room;
 use super::survey::{StoreError, Survey};
 use prost::Message;
 use std::collections::BTreeMap;
@@ -17,7 +18,6 @@ use std::fs::{self, DirBuilder, File};
 use std::io;
 use std::os::unix::fs::DirBuilderExt;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -28,8 +28,7 @@ pub(super) struct Store {
     /// Held as long as the server runs.
     _lock: File,
     disk: Disk,
-    most: usize,
-    used: AtomicUsize,
+    room: Room,
     /// Every session that is kept.
     sessions: Mutex<BTreeMap<String, Entry>>,
     /// Held while models are written or removed.
@@ -60,7 +59,7 @@ impl Store {
     /// [`StoreError`].
     pub(super) fn open(folder: &Path, sync: bool, most: usize) -> Result<Self, StoreError> {
         let wrong = |reason| StoreError::Folder { path: folder.to_owned(), reason };
-        for path in [folder.to_owned(), folder.join("sessions"), folder.join("models")] {
+        for path in [folder.to_owned(), folder.join("sessions"), folder.join("models"), folder.join("jobs")] {
             DirBuilder::new().recursive(true).mode(0o700).create(path).map_err(wrong)?;
         }
         let disk = Disk::new(sync);
@@ -83,8 +82,7 @@ impl Store {
             folder: folder.to_owned(),
             _lock: lock,
             disk,
-            most,
-            used: AtomicUsize::new(found.bytes),
+            room: Room::new(most, found.bytes),
             sessions: Mutex::new(sessions),
             files: Mutex::default(),
         })
@@ -137,7 +135,12 @@ impl Store {
 
     /// Bytes of all that is kept.
     pub(super) fn used(&self) -> usize {
-        self.used.load(Ordering::Relaxed)
+        self.room.used()
+    }
+
+    /// Room for what others keep here.
+    pub(super) fn room(&self) -> &Room {
+        &self.room
     }
 
     /// Forgets sessions that nobody asked for in `time`; how many.
@@ -185,7 +188,7 @@ impl Store {
     fn remove(&self, path: &Path) {
         let bytes = size(path);
         if fs::remove_file(path).is_ok() {
-            self.count(bytes, 0);
+            self.room.count(bytes, 0);
         }
     }
 
@@ -231,19 +234,10 @@ impl Store {
     /// that fails.
     pub(super) fn counted(&self, path: &Path, bytes: usize, write: impl FnOnce() -> io::Result<()>) -> io::Result<()> {
         let before = size(path);
-        let used = self.used().saturating_sub(before).saturating_add(bytes);
-        if used > self.most {
-            let text = format!("state_bytes: at most {} in all, got {used}; Info lists the limits", self.most);
-            return Err(io::Error::new(io::ErrorKind::StorageFull, text));
-        }
+        self.room.look(before, bytes)?;
         let written = write();
-        self.count(before, size(path));
+        self.room.count(before, size(path));
         written
-    }
-
-    fn count(&self, before: usize, after: usize) {
-        let change = |used: usize| Some(used.saturating_add(after).saturating_sub(before));
-        let _ = self.used.fetch_update(Ordering::Relaxed, Ordering::Relaxed, change);
     }
 }
 

@@ -37,7 +37,7 @@ pub fn look_at(folder: &Path) -> Result<String, StoreError> {
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
             let above = folder.ancestors().skip(1).map(or_here).find(|path| path.exists());
             probe(above.unwrap_or(Path::new("."))).map_err(wrong)?;
-            return Ok("0 sessions, the folder is made when the server starts".to_owned());
+            return Ok("0 sessions, 0 jobs, the folder is made when the server starts".to_owned());
         }
         Err(error) => return Err(wrong(error)),
     }
@@ -51,7 +51,8 @@ pub fn look_at(folder: &Path) -> Result<String, StoreError> {
         Err(error) if error.kind() == io::ErrorKind::NotFound => Survey::default(),
         found => found.map_err(wrong)?,
     };
-    Ok(format!("{} sessions, {} kB, can be written", found.sessions.len(), found.bytes >> 10))
+    let (sessions, jobs) = (found.sessions.len(), found.jobs);
+    Ok(format!("{sessions} sessions, {jobs} jobs, {} kB, can be written", found.bytes >> 10))
 }
 
 /// The folder that a path without one stands in.
@@ -71,7 +72,9 @@ fn probe(folder: &Path) -> io::Result<()> {
 pub(super) struct Survey {
     /// Sessions with their models.
     pub(super) sessions: BTreeMap<String, String>,
-    /// Bytes of sessions and their models.
+    /// How many jobs there are.
+    pub(super) jobs: usize,
+    /// Bytes of sessions, their models, and jobs.
     pub(super) bytes: usize,
     /// Models of no session.
     pub(super) left: Vec<PathBuf>,
@@ -99,11 +102,24 @@ impl Survey {
                 found.left.push(entry.path());
             }
         }
+        let jobs = match fs::read_dir(folder.join("jobs")) {
+            // a folder of an earlier version
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(found),
+            jobs => jobs?,
+        };
+        for entry in jobs {
+            let entry = entry?;
+            let name = entry.file_name().to_string_lossy().into_owned();
+            if name.split('.').next().is_some_and(is_id) {
+                found.bytes += usize::try_from(entry.metadata()?.len()).unwrap_or(usize::MAX);
+                found.jobs += usize::from(name.ends_with(".job"));
+            }
+        }
         Ok(found)
     }
 }
 
 /// Whether this is a name that [`super::ids`] makes; no other becomes a path.
-fn is_id(text: &str) -> bool {
+pub(super) fn is_id(text: &str) -> bool {
     text.len() == 32 && text.bytes().all(|byte| byte.is_ascii_hexdigit())
 }

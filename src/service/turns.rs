@@ -18,6 +18,8 @@ tokio::task_local! {
 pub(super) struct Client {
     /// The connection; 0 for the server's own.
     pub(super) number: u64,
+    /// What it is called; all of one name are one.
+    pub(super) name: Arc<str>,
     /// What the client has of this server, where that is bounded.
     pub(super) account: Option<Arc<Account>>,
 }

@@ -37,7 +37,7 @@ impl Shared {
         let id = self.sessions.id(&self.limits)?;
         let mut unfinished = Unfinished { store: self.store.as_deref(), id: &id };
         let keeper = self.store.as_ref().map(|store| Keeper::new(store, &id, model.id(), &model.source())).transpose();
-        let keeper = keeper.map_err(|error| status::not_kept(&error))?;
+        let keeper = keeper.map_err(|error| status::not_kept("the state is", &error))?;
         let session = Session::new(id.clone(), keeper, model, self.make, &self.limits)?;
         let said = start(&session)?;
         self.sessions.admit(session, &self.limits)?;

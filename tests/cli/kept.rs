@@ -12,10 +12,10 @@ use std::time::Duration;
 const LONGEST_LIFE: u64 = 4000;
 
 /// Numbers without chance: SplitMix64 (Steele, Lea, Flood 2014).
-struct Numbers(u64);
+pub(crate) struct Numbers(pub(crate) u64);
 
 impl Numbers {
-    fn below(&mut self, most: u64) -> u64 {
+    pub(crate) fn below(&mut self, most: u64) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -25,7 +25,7 @@ impl Numbers {
 }
 
 /// Kills a process that soon does not live any more.
-fn kill_after(id: u32, life: Duration) {
+pub(crate) fn kill_after(id: u32, life: Duration) {
     std::thread::spawn(move || {
         std::thread::sleep(life);
         let _ = Command::new("kill").args(["-KILL", &id.to_string()]).status();

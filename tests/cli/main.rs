@@ -10,8 +10,10 @@ mod export;
 #[cfg(target_os = "linux")]
 mod full;
 mod health;
+mod jobs;
 mod kept;
 mod killed_clients;
+mod killed_jobs;
 mod layouts;
 mod outputs;
 mod overseen;

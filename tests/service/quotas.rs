@@ -18,7 +18,7 @@ const TOKENS: &str = "alice alice-0123456789abcdef\nbob bob-0123456789abcdef\n";
 
 /// Shows a token.
 #[derive(Clone)]
-struct Shows(&'static str);
+pub(crate) struct Shows(&'static str);
 
 impl Interceptor for Shows {
     fn call(&mut self, mut request: Request<()>) -> Result<Request<()>, Status> {
@@ -28,10 +28,10 @@ impl Interceptor for Shows {
     }
 }
 
-type Known = BimorphClient<InterceptedService<Channel, Shows>>;
+pub(crate) type Known = BimorphClient<InterceptedService<Channel, Shows>>;
 
 /// A server with tokens of alice and bob.
-fn server(limits: Limits) -> (tempfile::TempDir, Running) {
+pub(crate) fn server(limits: Limits) -> (tempfile::TempDir, Running) {
     let folder = tempfile::tempdir().expect("a folder");
     let tokens = folder.path().join("tokens");
     std::fs::write(&tokens, TOKENS).expect("written");
@@ -40,7 +40,7 @@ fn server(limits: Limits) -> (tempfile::TempDir, Running) {
 }
 
 /// A client on a connection of its own.
-async fn client(server: &Running, name: &'static str) -> Known {
+pub(crate) async fn client(server: &Running, name: &'static str) -> Known {
     let endpoint = Endpoint::from_shared(server.address.uri()).expect("a uri");
     BimorphClient::with_interceptor(endpoint.connect().await.expect("connects"), Shows(name))
 }

@@ -5,7 +5,7 @@
 use super::point::{Found, Outcome, Value};
 use super::spec::SweepSpec;
 use crate::content::Fnv;
-use crate::netlist::Bundle;
+use crate::netlist::{Bundle, Setting};
 use crate::options::CompileOptions;
 use serde::{Deserialize, Serialize};
 use std::fs::{File, TryLockError};
@@ -87,6 +87,8 @@ pub struct Journal {
 #[derive(Debug)]
 struct Open {
     file: File,
+    /// Bytes of whole lines.
+    good: u64,
     synced: Instant,
 }
 
@@ -137,7 +139,8 @@ impl Journal {
             good += line.len();
         }
         file.set_len(good as u64).and_then(|()| file.seek(SeekFrom::End(0))).map_err(failed)?;
-        let journal = Self { path: path.to_owned(), file: Mutex::new(Open { file, synced: Instant::now() }) };
+        let journal =
+            Self { path: path.to_owned(), file: Mutex::new(Open { file, good: good as u64, synced: Instant::now() }) };
         if good == 0 {
             let head = Head { bimorph: env!("CARGO_PKG_VERSION").to_owned(), sweep: name.to_owned() };
             journal.line(&head)?;
@@ -153,20 +156,48 @@ impl Journal {
         self.line(kept)
     }
 
+    /// Adds points, as text of [`lines`], and waits for the disk, where `sync` says so: all of them, or none.
+    ///
+    /// # Errors
+    /// [`JournalError::Io`].
+    pub fn keep_all(&self, lines: &[u8], sync: bool) -> Result<(), JournalError> {
+        self.write(lines, |_| sync)
+    }
+
+    /// Bytes of whole lines that it has.
+    pub fn len(&self) -> u64 {
+        self.file.lock().unwrap_or_else(PoisonError::into_inner).good
+    }
+
+    /// True without a line, which none is that was opened.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
     fn line(&self, of: &impl Serialize) -> Result<(), JournalError> {
+        let mut line = serde_json::to_vec(of).map_err(|error| self.failed(error.into()))?;
+        line.push(b'\n');
+        self.write(&line, |open| open.synced.elapsed() >= SYNC)
+    }
+
+    fn write(&self, lines: &[u8], sync: impl FnOnce(&Open) -> bool) -> Result<(), JournalError> {
         let mut open = self.file.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut write = || -> io::Result<()> {
-            let mut line = serde_json::to_vec(of)?;
-            line.push(b'\n');
-            // one call: a line is there whole, or is the last
-            open.file.write_all(&line)?;
-            if open.synced.elapsed() >= SYNC {
-                open.file.sync_data()?;
-                open.synced = Instant::now();
-            }
-            Ok(())
-        };
-        write().map_err(|source| JournalError::Io { path: self.path.clone(), source })
+        // one call: a line is there whole, or is the last
+        let mut written = open.file.write_all(lines);
+        if written.is_ok() && sync(&open) {
+            written = open.file.sync_data();
+            open.synced = Instant::now();
+        }
+        match written {
+            Ok(()) => open.good += lines.len() as u64,
+            // half a line would hide those after it
+            Err(_) => drop(open.file.set_len(open.good)),
+        }
+        written.map_err(|source| self.failed(source))
+    }
+
+    fn failed(&self, source: io::Error) -> JournalError {
+        JournalError::Io { path: self.path.clone(), source }
     }
 
     /// Removes the file: its table has been written.
@@ -176,6 +207,19 @@ impl Journal {
     pub fn finish(self) -> Result<(), JournalError> {
         std::fs::remove_file(&self.path).map_err(|source| JournalError::Io { path: self.path, source })
     }
+}
+
+/// Points as the lines of a journal.
+///
+/// # Errors
+/// A number that is no number, which no point has.
+pub fn lines(points: &[Kept]) -> io::Result<Vec<u8>> {
+    let mut lines = Vec::new();
+    for point in points {
+        serde_json::to_writer(&mut lines, point)?;
+        lines.push(b'\n');
+    }
+    Ok(lines)
 }
 
 impl Outcome {
@@ -195,8 +239,13 @@ impl Outcome {
 impl Kept {
     /// The point as it was.
     pub(super) fn outcome(self, spec: &SweepSpec) -> Outcome {
+        let parameters = spec.settings(self.point).into_iter().map(|(_, value)| value).collect();
+        self.with(parameters)
+    }
+
+    /// The same with the values of its parameters.
+    pub(super) fn with(self, parameters: Vec<Setting>) -> Outcome {
         let Self { point: number, values, estimated_error, warning, error } = self;
-        let parameters = spec.settings(number).into_iter().map(|(_, value)| value).collect();
         let value = |(name, unit, value): (String, String, _)| Value { name, unit: unit.into(), value };
         let values = match error {
             Some(error) => Err(error),

@@ -1,7 +1,6 @@
 //! The rows of a sweep, and the same as CSV.
 
 use super::point::Outcome;
-use super::spec::SweepSpec;
 use crate::netlist::Setting;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -35,8 +34,8 @@ pub struct SweepRow {
 }
 
 /// Puts the points into one table. A netlist whose nodes depend on a parameter has more columns than any one point.
-pub(super) fn assemble(spec: &SweepSpec, outcomes: Vec<Outcome>) -> SweepTable {
-    let mut table = SweepTable { parameters: spec.names().map(str::to_owned).collect(), ..SweepTable::default() };
+pub(super) fn assemble(parameters: Vec<String>, outcomes: Vec<Outcome>) -> SweepTable {
+    let mut table = SweepTable { parameters, ..SweepTable::default() };
     let mut columns = BTreeMap::new();
     for value in outcomes.iter().filter_map(|outcome| outcome.values.as_ref().ok()).flat_map(|found| &found.values) {
         if !columns.contains_key(&value.name) {

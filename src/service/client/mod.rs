@@ -5,14 +5,17 @@
 
 mod analyses;
 mod device;
+mod jobs;
 #[cfg(feature = "server")]
 mod line;
 mod link;
+mod persistence;
 #[cfg(feature = "tls")]
 mod secure;
 mod sweeps;
 
 pub use analyses::{Client, ClientError, RemoteTransient};
 pub use device::RemoteDevice;
+pub use jobs::{JobStatus, Submission};
 #[cfg(feature = "server")]
 pub use line::{Line, Lines};

@@ -2,8 +2,10 @@
 
 use super::model::{setting_from_wire, setting_to_wire};
 use super::{Violation, named, number, options, required, samples, voltages};
+use crate::jobs::sweep::journal::Kept;
 use crate::jobs::sweep::parse::linear;
 use crate::jobs::sweep::{Shard, SweepAnalysis, SweepParameter, SweepRow, SweepSpec, SweepTable};
+use crate::netlist::Setting;
 use crate::options::analysis::{MODES_COUNT, PULL_IN_MAX, TRAN_STOP};
 use crate::options::{Described, Value};
 use crate::service::proto;
@@ -142,6 +144,36 @@ pub fn row_to_wire(row: &SweepRow) -> proto::SweepRow {
     proto::SweepRow { point: row.point as u64, parameters, results, error, estimated_error, warning }
 }
 
+/// A row of a job, with the values of its parameters; `columns` are names and units of what it found.
+///
+/// # Errors
+/// As many numbers as there are no columns.
+pub fn job_row_from_wire(
+    row: proto::SweepRow,
+    columns: Option<&proto::JobColumns>,
+) -> Result<(Vec<Setting>, Kept), Violation> {
+    let convert = |value| setting_from_wire("rows.parameters", value);
+    let settings = row.parameters.into_iter().map(convert).collect::<Result<_, _>>()?;
+    let columns = columns.filter(|_| row.error.is_empty());
+    let (names, units) = columns.map_or((&[][..], &[][..]), |columns| (&*columns.results, &*columns.units));
+    if (names.len(), units.len()) != (row.results.len(), row.results.len()) {
+        return Err(Violation::new(
+            "rows.results",
+            format!("expected {} values, got {}", names.len(), row.results.len()),
+        ));
+    }
+    let number = |x: f64| (!x.is_nan()).then_some(x);
+    let values = names.iter().zip(units).zip(row.results);
+    let kept = Kept {
+        point: usize::try_from(row.point).unwrap_or(usize::MAX),
+        values: values.map(|((name, unit), x)| (name.clone(), unit.clone(), number(x))).collect(),
+        estimated_error: row.estimated_error,
+        warning: row.warning,
+        error: (!row.error.is_empty()).then_some(row.error),
+    };
+    Ok((settings, kept))
+}
+
 /// Adds a chunk to a table.
 ///
 /// # Errors
@@ -179,8 +211,6 @@ mod tests {
         let asked = Sampling { vary: vary.to_vec(), count: 7, seed: u64::MAX, design: Design::Sobol, correlations };
         Samples::new(asked).unwrap()
     }
-
-    use crate::netlist::Setting;
 
     /// However many and long the axes are, their product is known without them.
     #[test]

@@ -1,20 +1,22 @@
 //! What the rows of a shard say of themselves, so that only the shards of one sweep are put together, and all of them.
 
-use bimorph::jobs::sweep::{Shard, SweepError, SweepSpec, journal};
-use bimorph::netlist::Bundle;
-use bimorph::options::CompileOptions;
+use super::error::SweepError;
+use super::journal;
+use super::spec::{Shard, SweepSpec};
+use crate::netlist::Bundle;
+use crate::options::CompileOptions;
 use std::fmt;
 use std::str::FromStr;
 
 /// The column that says it.
-pub(super) const COLUMN: &str = "part";
+pub const COLUMN: &str = "part";
 
 /// A part of a sweep: `1/3 of 201 points of 0123456789abcdef0123456789abcdef`.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Part {
+pub struct Part {
     shard: String,
     /// Points of the whole.
-    pub(super) points: usize,
+    pub points: usize,
     /// The name of the whole: the same for the same points and the same program.
     sweep: String,
 }
@@ -24,14 +26,14 @@ impl Part {
     ///
     /// # Errors
     /// [`SweepError::BadSpec`] for a grid that is none.
-    pub(super) fn of(spec: &SweepSpec, bundle: &Bundle, options: &CompileOptions) -> Result<Self, SweepError> {
+    pub fn of(spec: &SweepSpec, bundle: &Bundle, options: &CompileOptions) -> Result<Self, SweepError> {
         let whole = SweepSpec { shard: Shard::default(), ..spec.clone() };
         let shard = format!("{}/{}", spec.shard.index, spec.shard.count);
         Ok(Self { shard, points: whole.grid_points()?, sweep: journal::name(&whole, bundle, options) })
     }
 
     /// Whether both are of one sweep.
-    pub(super) fn is_with(&self, other: &Self) -> bool {
+    pub fn is_with(&self, other: &Self) -> bool {
         (self.points, &self.sweep) == (other.points, &other.sweep)
     }
 }
@@ -43,7 +45,8 @@ impl fmt::Display for Part {
 }
 
 /// It is not written as a part is.
-pub(super) struct NoPart;
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct NoPart;
 
 impl FromStr for Part {
     type Err = NoPart;

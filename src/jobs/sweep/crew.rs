@@ -1,0 +1,44 @@
+//! Who runs the pieces of a sweep. What comes of a point does not depend on it.
+
+use super::error::SweepError;
+use rayon::prelude::*;
+
+/// Who runs the pieces of a sweep: on which threads, and when.
+pub trait Crew: Sync {
+    /// How many pieces it may run at once.
+    fn size(&self) -> usize;
+
+    /// Runs the pieces 0 to `count`, each once, on any thread, and comes back when all are over. A crew that is told to stop leaves out the
+    /// rest.
+    fn run(&self, count: usize, piece: &(dyn Fn(usize) + Sync));
+}
+
+/// Threads of its own, all at work at once.
+#[derive(Debug)]
+pub struct Pool(rayon::ThreadPool);
+
+impl Pool {
+    /// So many threads; 0: one for each core.
+    ///
+    /// # Errors
+    /// [`SweepError::Threads`].
+    pub fn new(threads: usize) -> Result<Self, SweepError> {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        pool.map(Self).map_err(|error| SweepError::Threads { reason: error.to_string() })
+    }
+
+    /// Its threads, for another who says when they work.
+    pub fn threads(&self) -> &rayon::ThreadPool {
+        &self.0
+    }
+}
+
+impl Crew for Pool {
+    fn size(&self) -> usize {
+        self.0.current_num_threads()
+    }
+
+    fn run(&self, count: usize, piece: &(dyn Fn(usize) + Sync)) {
+        self.0.install(|| (0..count).into_par_iter().for_each(piece));
+    }
+}

@@ -1,0 +1,246 @@
+//! Jobs that outlive the server: a folder with three files for each, `jobs/ID.job` what was asked, `jobs/ID.rows` the journal of its rows,
+//! and `jobs/ID.end` how it ended. A job is there when its first file is; whatever moment the server ends at, a row that was given out is in
+//! the journal, and a job without its last file goes on. All of it counts among the bytes of the folder of states.
+
+use super::super::disk::private;
+use super::super::snapshots::checksum;
+use super::super::store::Store;
+use super::super::survey::is_id;
+use super::asked::Asked;
+use crate::jobs::sweep::journal::{self, Journal, JournalError, Kept};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
+use std::fs;
+use std::io;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// What the first file of a job begins with.
+const HEAD: &[u8; 16] = b"bimorph jobs 1\r\n";
+
+/// How a job ended.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) struct End {
+    /// Code of gRPC; 0: with all of its rows.
+    pub(super) code: i32,
+    /// Why.
+    pub(super) message: String,
+    pub(super) rows: u64,
+    pub(super) failed: u64,
+    /// When, since 1970 [ms].
+    pub(super) ended_ms: u64,
+    /// Bytes of its journal: with fewer it has not ended.
+    pub(super) bytes: u64,
+}
+
+/// What a folder has of a job.
+pub(super) struct Found {
+    pub(super) id: String,
+    pub(super) asked: Asked,
+    /// The request as it came.
+    pub(super) request: Vec<u8>,
+    /// How it ended, as far as that is known.
+    pub(super) end: Option<End>,
+    pub(super) file: JobFile,
+}
+
+/// The files of one job.
+#[derive(Debug)]
+pub(super) struct JobFile {
+    store: Arc<Store>,
+    id: String,
+    sweep: String,
+    journal: Option<Journal>,
+    /// Bytes that are counted.
+    bytes: AtomicUsize,
+}
+
+/// Begins the files of a new job. When this returns it is on the disk.
+///
+/// # Errors
+/// What the system said, or the bound; then nothing of it is left.
+pub(super) fn begin(store: &Arc<Store>, id: &str, asked: &Asked, request: &[u8]) -> io::Result<JobFile> {
+    let file = JobFile::of(store, id, &asked.sweep);
+    let head = head(asked, request)?;
+    file.take(head.len())?;
+    let written = || {
+        let (path, unfinished) = (file.path("job"), file.path("new"));
+        store.disk().write(&unfinished, &head)?;
+        store.disk().rename(&unfinished, &path)?;
+        store.disk().keep_names(&folder(store))
+    };
+    match written() {
+        Ok(()) => Ok(file),
+        Err(error) => {
+            file.remove();
+            Err(error)
+        }
+    }
+}
+
+/// Every job of a folder. What was left of others is removed.
+///
+/// # Errors
+/// A folder that cannot be read.
+pub(super) fn find(store: &Arc<Store>) -> io::Result<Vec<Found>> {
+    let mut ids = BTreeSet::new();
+    for entry in fs::read_dir(folder(store))? {
+        let name = entry?.file_name().to_string_lossy().into_owned();
+        ids.extend(name.split('.').next().filter(|id| is_id(id)).map(str::to_owned));
+    }
+    let mut found = Vec::new();
+    for id in ids {
+        let file = JobFile::of(store, &id, "");
+        let counted = ["job", "rows", "end", "new"].iter().map(|end| file.size(end)).sum::<u64>();
+        file.bytes.store(usize::try_from(counted).unwrap_or(usize::MAX), Ordering::Relaxed);
+        match fs::read(file.path("job")).ok().and_then(|bytes| read_head(&bytes)) {
+            Some((asked, request)) => {
+                let end = fs::read(file.path("end")).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok());
+                let file = JobFile { sweep: asked.sweep.clone(), ..file };
+                found.push(Found { id, asked, request, end, file });
+            }
+            // never answered, or damaged: there is nothing that could go on
+            None => file.remove(),
+        }
+    }
+    Ok(found)
+}
+
+fn folder(store: &Store) -> PathBuf {
+    store.folder.join("jobs")
+}
+
+fn head(asked: &Asked, request: &[u8]) -> io::Result<Vec<u8>> {
+    let asked = serde_json::to_vec(asked)?;
+    let mut out = Vec::with_capacity(48 + asked.len() + request.len());
+    out.extend(HEAD);
+    out.extend([0; 16]);
+    out.extend((asked.len() as u64).to_le_bytes());
+    out.extend(asked);
+    out.extend(request);
+    let sum = checksum(&out[32..]);
+    out[16..32].copy_from_slice(&sum.to_le_bytes());
+    Ok(out)
+}
+
+/// None for a file that is not whole.
+fn read_head(bytes: &[u8]) -> Option<(Asked, Vec<u8>)> {
+    let (head, rest) = bytes.split_at_checked(32)?;
+    if !head.starts_with(HEAD) || head[16..] != checksum(rest).to_le_bytes() {
+        return None;
+    }
+    let (length, rest) = rest.split_at_checked(8)?;
+    let length = usize::try_from(u64::from_le_bytes(length.try_into().ok()?)).ok()?;
+    let (asked, request) = rest.split_at_checked(length)?;
+    Some((serde_json::from_slice(asked).ok()?, request.to_vec()))
+}
+
+impl JobFile {
+    fn of(store: &Arc<Store>, id: &str, sweep: &str) -> Self {
+        let (store, id, sweep) = (Arc::clone(store), id.to_owned(), sweep.to_owned());
+        Self { store, id, sweep, journal: None, bytes: AtomicUsize::new(0) }
+    }
+
+    fn path(&self, end: &str) -> PathBuf {
+        folder(&self.store).join(format!("{}.{end}", self.id))
+    }
+
+    fn size(&self, end: &str) -> u64 {
+        fs::metadata(self.path(end)).map_or(0, |found| found.len())
+    }
+
+    fn take(&self, bytes: usize) -> io::Result<()> {
+        self.store.room().take(bytes)?;
+        self.bytes.fetch_add(bytes, Ordering::Relaxed);
+        Ok(())
+    }
+
+    fn give_back(&self, bytes: usize) {
+        self.store.room().count(bytes, 0);
+        self.bytes.fetch_sub(bytes, Ordering::Relaxed);
+    }
+
+    /// Bytes of its journal on the disk.
+    pub(super) fn row_bytes(&self) -> u64 {
+        self.size("rows")
+    }
+
+    /// Opens its journal, which is made where there is none; the rows that it has. A last row that is cut off was given to nobody, and is
+    /// not there.
+    ///
+    /// # Errors
+    /// What the system said.
+    pub(super) fn open(&mut self) -> io::Result<Vec<Kept>> {
+        let path = self.path("rows");
+        let before = self.size("rows");
+        // nobody else may read it
+        drop(private().open(&path)?);
+        let (journal, rows) = Journal::open(&path, &self.sweep, true).map_err(io_error)?;
+        let bytes = journal.len();
+        if bytes > before {
+            self.take(usize::try_from(bytes - before).unwrap_or(usize::MAX))?;
+            self.store.disk().keep_names(&folder(&self.store))?;
+        } else {
+            self.give_back(usize::try_from(before - bytes).unwrap_or(usize::MAX));
+        }
+        self.journal = Some(journal);
+        Ok(rows)
+    }
+
+    /// Adds rows to the open journal. When this returns they are on the disk, or, where nobody waits for the disk, with the system.
+    ///
+    /// # Errors
+    /// What the system said, or the bound; then none of them is there.
+    pub(super) fn append(&self, rows: &[Kept]) -> io::Result<()> {
+        let lines = journal::lines(rows)?;
+        self.take(lines.len())?;
+        let Some(journal) = &self.journal else { return Err(io::Error::other("its journal is closed")) };
+        journal
+            .keep_all(&lines, self.store.disk().waits())
+            .map_err(io_error)
+            .inspect_err(|_| self.give_back(lines.len()))
+    }
+
+    /// Keeps how it ended. When this returns it is on the disk.
+    ///
+    /// # Errors
+    /// What the system said, or the bound.
+    pub(super) fn end(&self, end: &End) -> io::Result<()> {
+        let end = End { bytes: self.journal.as_ref().map_or_else(|| self.row_bytes(), Journal::len), ..end.clone() };
+        let (bytes, path, unfinished) = (serde_json::to_vec(&end)?, self.path("end"), self.path("new"));
+        let before = usize::try_from(self.size("end")).unwrap_or(usize::MAX);
+        self.take(bytes.len())?;
+        let written = self.store.disk().write(&unfinished, &bytes);
+        let written = written.and_then(|()| self.store.disk().rename(&unfinished, &path));
+        match written.and_then(|()| self.store.disk().keep_names(&folder(&self.store))) {
+            Ok(()) => self.give_back(before),
+            Err(error) => {
+                let _ = fs::remove_file(unfinished);
+                self.give_back(bytes.len());
+                return Err(error);
+            }
+        }
+        Ok(())
+    }
+
+    /// Closes its journal.
+    pub(super) fn close(&mut self) {
+        self.journal = None;
+    }
+
+    /// Removes all of it, the first file first: without it there is no job.
+    pub(super) fn remove(&self) {
+        for end in ["job", "rows", "end", "new"] {
+            let _ = fs::remove_file(self.path(end));
+        }
+        self.store.room().count(self.bytes.swap(0, Ordering::Relaxed), 0);
+    }
+}
+
+fn io_error(error: JournalError) -> io::Error {
+    match error {
+        JournalError::Io { source, .. } => source,
+        other => io::Error::other(other.to_string()),
+    }
+}

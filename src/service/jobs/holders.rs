@@ -1,0 +1,38 @@
+//! Whose job it is, as far as connections tell: those by which it was asked for.
+
+use std::collections::{BTreeSet, VecDeque};
+use std::time::{Duration, Instant};
+
+/// Connections of its client that a job remembers; of more, the last.
+const MOST: usize = 64;
+
+/// Connections by which a job was asked for.
+#[derive(Debug, Default)]
+pub(super) struct Holders {
+    connections: VecDeque<u64>,
+    /// Since when all of them are closed.
+    gone: Option<Instant>,
+}
+
+impl Holders {
+    /// It was asked for by one.
+    pub(super) fn take(&mut self, connection: u64) {
+        self.gone = None;
+        if !self.connections.contains(&connection) {
+            self.connections.push_back(connection);
+            if self.connections.len() > MOST {
+                self.connections.pop_front();
+            }
+        }
+    }
+
+    /// For how long all of them have been closed, as far as those tell that are open; none: one is open. A process that asks itself always
+    /// is there.
+    pub(super) fn are_gone(&mut self, open: &BTreeSet<u64>) -> Option<Duration> {
+        if self.connections.iter().any(|number| *number == 0 || open.contains(number)) {
+            self.gone = None;
+            return None;
+        }
+        Some(self.gone.get_or_insert_with(Instant::now).elapsed())
+    }
+}

@@ -1,0 +1,327 @@
+//! One job: what it found so far, where it stands, and its files.
+//!
+//! A row is finished when it is on the disk, where there is one: it is told of, counted and given out then, and not before. Rows that come while
+//! the disk is waited for go there together.
+
+use super::super::{proto, status};
+use super::asked::{Asked, now_ms};
+use super::folder::{End, JobFile};
+use super::holders::Holders;
+use super::rows::{Reading, Rows};
+use super::standing::{Standing, Stop, state_of};
+use super::wire;
+use crate::budget::Budget;
+use crate::jobs::sweep::journal::Kept;
+use crate::jobs::sweep::{self, SweepSpec, SweepTable};
+use proto::job_metadata::State;
+use std::collections::BTreeSet;
+use std::io;
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::time::{Duration, Instant};
+use tokio::runtime::Handle;
+use tokio::sync::watch;
+use tokio_util::sync::CancellationToken;
+use tonic::{Code, Status};
+
+/// Pause between two waits for the disk: rows that come meanwhile go there together.
+const BATCH: Duration = Duration::from_millis(20);
+/// One job, running or finished.
+#[derive(Debug)]
+pub(super) struct Job {
+    pub(super) id: String,
+    pub(super) asked: Asked,
+    pub(super) spec: SweepSpec,
+    pub(super) budget: Budget,
+    provenance: proto::Provenance,
+    standing: watch::Sender<Standing>,
+    /// None: on the disk alone.
+    rows: Mutex<Option<Rows>>,
+    waiting: Mutex<Waiting>,
+    /// Where it is kept; none: nowhere, or not any more.
+    file: Mutex<Option<JobFile>>,
+    kept: bool,
+    stop: OnceLock<Stop>,
+    pub(super) stopped: CancellationToken,
+    used: Mutex<Instant>,
+    holders: Mutex<Holders>,
+    table: OnceLock<SweepTable>,
+}
+
+/// Rows on their way to the disk.
+#[derive(Debug, Default)]
+struct Waiting {
+    rows: Vec<Kept>,
+    /// Whether somebody takes them there.
+    carried: bool,
+}
+
+fn held<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Job {
+    /// With the rows that it has; none: they are on the disk alone.
+    pub(super) fn new(
+        id: String,
+        (asked, spec, options): (Asked, SweepSpec, Option<proto::CompileOptions>),
+        budget: Budget,
+        file: Option<JobFile>,
+        (rows, standing): (Option<Rows>, Standing),
+    ) -> Arc<Self> {
+        let provenance = wire::provenance(&asked, &spec, options);
+        Arc::new(Self {
+            id,
+            asked,
+            spec,
+            budget,
+            provenance,
+            standing: watch::Sender::new(standing),
+            rows: Mutex::new(rows),
+            waiting: Mutex::default(),
+            kept: file.is_some(),
+            file: Mutex::new(file),
+            stop: OnceLock::new(),
+            stopped: CancellationToken::new(),
+            used: Mutex::new(Instant::now()),
+            holders: Mutex::default(),
+            table: OnceLock::new(),
+        })
+    }
+
+    /// Where it stands, now and later.
+    pub(super) fn watch(&self) -> watch::Receiver<Standing> {
+        self.standing.subscribe()
+    }
+
+    /// Where it stands.
+    pub(super) fn standing(&self) -> Standing {
+        self.standing.borrow().clone()
+    }
+
+    /// Whether it has ended.
+    pub(super) fn has_ended(&self) -> bool {
+        self.standing.borrow().end.is_some()
+    }
+
+    /// Somebody asks for it, by a connection.
+    pub(super) fn touch(&self, connection: u64) {
+        *held(&self.used) = Instant::now();
+        held(&self.holders).take(connection);
+    }
+
+    /// Since it was last asked for.
+    pub(super) fn idle(&self) -> Duration {
+        held(&self.used).elapsed()
+    }
+
+    /// Cancels it where its client is gone for longer than it asked for; a process that asks itself never is.
+    pub(super) fn look_for_client(&self, open: &BTreeSet<u64>) {
+        let Some(release) = self.asked.release().filter(|_| !self.has_ended()) else { return };
+        if held(&self.holders).are_gone(open).is_some_and(|time| time >= release) {
+            self.stop(Stop::Released(release));
+        }
+    }
+
+    /// Stops it; the first reason holds.
+    pub(super) fn stop(&self, why: Stop) {
+        // before its points are stopped: what comes of them from here on is not theirs
+        let _ = self.stop.set(why);
+        self.budget.cancel();
+        self.stopped.cancel();
+    }
+
+    /// Keeps on the disk that it was cancelled, for a server that ends before its points have.
+    ///
+    /// # Errors
+    /// What the system said.
+    pub(super) fn keep_cancelled(&self) -> io::Result<()> {
+        let file = held(&self.file);
+        let standing = self.standing();
+        let end = self.ending(&standing, Code::Cancelled, "cancelled".to_owned());
+        file.as_ref().filter(|_| standing.end.is_none()).map_or(Ok(()), |file| file.end(&end))
+    }
+
+    /// Its first point is begun.
+    pub(super) fn begin(&self) {
+        self.standing.send_if_modified(|standing| {
+            let waits = standing.state == State::Waiting && standing.end.is_none();
+            standing.state = if waits { State::Running } else { standing.state };
+            waits
+        });
+    }
+
+    /// A point is done; whether to go on.
+    pub(super) fn found(self: &Arc<Self>, kept: Kept, runtime: &Handle) -> bool {
+        if self.stop.get().is_some() {
+            return false;
+        }
+        if !self.kept {
+            self.publish(vec![kept]);
+            return true;
+        }
+        let mut waiting = held(&self.waiting);
+        waiting.rows.push(kept);
+        if !std::mem::replace(&mut waiting.carried, true) {
+            let job = Arc::clone(self);
+            runtime.spawn_blocking(move || job.carry());
+        }
+        true
+    }
+
+    /// Takes rows to the disk as long as some come.
+    fn carry(&self) {
+        loop {
+            self.settle();
+            std::thread::sleep(BATCH);
+            let mut waiting = held(&self.waiting);
+            if waiting.rows.is_empty() {
+                waiting.carried = false;
+                return;
+            }
+        }
+    }
+
+    /// Takes all rows to the disk that came until now. Waits for it.
+    pub(super) fn settle(&self) {
+        let file = held(&self.file);
+        let rows = std::mem::take(&mut held(&self.waiting).rows);
+        let Some(file) = file.as_ref().filter(|_| !rows.is_empty()) else { return };
+        match file.append(&rows) {
+            Ok(()) => self.publish(rows),
+            Err(error) => {
+                tracing::warn!(%error, job = self.id, "its rows cannot be kept");
+                self.stop(Stop::Disk(error));
+            }
+        }
+    }
+
+    fn publish(&self, found: Vec<Kept>) {
+        let mut rows = held(&self.rows);
+        let rows = rows.get_or_insert_default();
+        found.into_iter().for_each(|kept| rows.push(kept));
+        let (all, failed) = (rows.len(), rows.failed());
+        self.standing.send_modify(|standing| (standing.rows, standing.failed) = (all, failed));
+    }
+
+    /// Points that have a row.
+    pub(super) fn points(&self) -> BTreeSet<usize> {
+        held(&self.rows).iter().flat_map(Rows::points).collect()
+    }
+
+    fn ending(&self, standing: &Standing, code: Code, message: String) -> End {
+        let Standing { rows, failed, .. } = *standing;
+        End { code: code as i32, message, rows, failed, ended_ms: now_ms(), bytes: 0 }
+    }
+
+    /// It is over: with all of its rows, for the reason that it was stopped for, or for what `why` says.
+    pub(super) fn finish(&self, why: Option<Status>) {
+        self.settle();
+        let standing = self.standing();
+        let stop = self.stop.get();
+        let failure = match (stop, why) {
+            _ if standing.rows == self.asked.points => None,
+            (Some(Stop::Suspended), _) if self.kept => {
+                self.standing.send_modify(|standing| standing.suspended = true);
+                return;
+            }
+            (Some(stop), _) => Some(stop.told()),
+            (None, Some(status)) => Some(status),
+            (None, None) => Some(status::fault()),
+        };
+        let failure = failure.unwrap_or_else(|| Status::new(Code::Ok, ""));
+        self.end(self.ending(&standing, failure.code(), failure.message().to_owned()));
+    }
+
+    /// It has ended so. What it was told of is on the disk before, as far as there is room for it.
+    pub(super) fn end(&self, end: End) {
+        // held until it is told, so that nobody keeps another end after this one
+        let mut file = held(&self.file);
+        if let Some(file) = file.as_mut() {
+            if let Err(error) = file.end(&end) {
+                tracing::warn!(%error, job = self.id, "its end cannot be kept: after a restart it goes on");
+            }
+            file.close();
+        }
+        *held(&self.used) = Instant::now();
+        self.standing.send_modify(|standing| {
+            standing.state = state_of(end.code);
+            standing.end = Some(end);
+        });
+    }
+
+    /// Comes back when nothing of it is computed any more.
+    pub(super) async fn quiet(&self) {
+        let over = |standing: &Standing| standing.end.is_some() || standing.suspended;
+        // the sender is there as long as the job
+        let _ = self.watch().wait_for(over).await;
+    }
+
+    /// Lets go of its files, which another server may take up.
+    pub(super) fn let_go(&self) {
+        drop(held(&self.file).take());
+    }
+
+    /// Stops and removes it, with its files.
+    pub(super) fn delete(&self) {
+        self.stop(Stop::Deleted);
+        if let Some(file) = held(&self.file).take() {
+            file.remove();
+        }
+        self.standing.send_modify(|standing| standing.gone = true);
+    }
+
+    /// Reads its rows from the disk, where they are there alone.
+    ///
+    /// # Errors
+    /// Files that cannot be read, or do not have what they had.
+    pub(super) fn load(&self) -> Result<(), Status> {
+        let mut file = held(&self.file);
+        let mut rows = held(&self.rows);
+        let (Some(file), None) = (file.as_mut(), rows.as_ref()) else { return Ok(()) };
+        let lost = |what: String| Status::data_loss(format!("the rows of job \"{}\" cannot be read: {what}", self.id));
+        let read = file.open().map_err(|error| lost(error.to_string()))?;
+        file.close();
+        let expected = self.standing().rows;
+        if (read.len() as u64) < expected {
+            return Err(lost(format!("there are {} of {expected}", read.len())));
+        }
+        let mut found = Rows::default();
+        read.into_iter().for_each(|kept| found.push(kept));
+        *rows = Some(found);
+        Ok(())
+    }
+
+    /// The next rows of a stream.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub(super) fn chunk(&self, reading: &mut Reading, end: u64) -> Result<proto::JobRows, Status> {
+        self.load()?;
+        Ok(held(&self.rows).get_or_insert_default().chunk(&self.spec, reading, end))
+    }
+
+    /// The whole table, of a job that has all of its rows.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub(super) fn make_table(&self) -> Result<(), Status> {
+        self.load()?;
+        self.table.get_or_init(|| {
+            let with =
+                |kept: Kept| (self.spec.settings(kept.point).into_iter().map(|(_, value)| value).collect(), kept);
+            let rows = held(&self.rows).iter().flat_map(Rows::found).map(with).collect();
+            sweep::table_of(self.spec.names().map(str::to_owned).collect(), rows)
+        });
+        Ok(())
+    }
+
+    /// The table, once it was made.
+    pub(super) fn table(&self) -> Option<&SweepTable> {
+        self.table.get()
+    }
+
+    /// As it travels.
+    pub(super) fn to_wire(&self) -> proto::Job {
+        wire::job(&self.id, &self.asked, &self.provenance, (&self.standing(), self.kept))
+    }
+}

@@ -1,0 +1,304 @@
+//! The jobs of a server: those that run, and those that have ended and may still be asked for.
+
+use super::super::accounts::Accounts;
+use super::super::connection::Connections;
+use super::super::convert::Violation;
+use super::super::ids::Ids;
+use super::super::limits::Limits;
+use super::super::store::Store;
+use super::super::turns::client;
+use super::super::work::{allowance, of_client};
+use super::super::{convert, proto, status};
+use super::asked::Asked;
+use super::folder::{self, Found, JobFile};
+use super::job::Job;
+use super::pages::{Page, token};
+use super::rows::Rows;
+use super::running::Crews;
+use super::standing::{Standing, Stop, state_of};
+use crate::budget::{Allowance, Budget};
+use crate::jobs::sweep::{self, SweepError, SweepSpec};
+use crate::netlist::Bundle;
+use crate::options::CompileOptions;
+use prost::Message;
+use proto::job_metadata::State;
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+use tonic::{Code, Status};
+
+/// What a job computes.
+pub(super) struct Task {
+    pub(super) spec: SweepSpec,
+    pub(super) bundle: Bundle,
+    pub(super) options: CompileOptions,
+}
+
+impl Task {
+    /// As it was asked for.
+    ///
+    /// # Errors
+    /// What of it means nothing.
+    pub(super) fn of(request: proto::SubmitJobRequest) -> Result<Self, Violation> {
+        let proto::SubmitJobRequest { bundle, options, task, .. } = request;
+        let spec = task.map(|proto::submit_job_request::Task::Sweep(spec)| spec);
+        Ok(Self {
+            bundle: convert::model::bundle_from_wire(bundle)?,
+            options: convert::options::options_from_wire(options)?,
+            spec: convert::sweep::spec_from_wire(spec)?,
+        })
+    }
+}
+
+/// The jobs of a server.
+pub(in super::super) struct Jobs {
+    kept: Mutex<BTreeMap<String, Arc<Job>>>,
+    /// Held by who takes in a job, until it is on the disk.
+    taking_in: Mutex<()>,
+    sequence: AtomicU64,
+    ids: Ids,
+    crews: Arc<Crews>,
+    store: Option<Arc<Store>>,
+}
+
+impl Jobs {
+    /// None yet; with a folder, those that are in it are there after [`Self::wake`]. Within a runtime.
+    pub(in super::super) fn new(limits: &Limits, store: Option<Arc<Store>>) -> Self {
+        let crews = Arc::new(Crews::new(limits));
+        Self {
+            kept: Mutex::default(),
+            taking_in: Mutex::default(),
+            sequence: AtomicU64::new(1),
+            ids: Ids::default(),
+            crews,
+            store,
+        }
+    }
+
+    fn kept(&self) -> MutexGuard<'_, BTreeMap<String, Arc<Job>>> {
+        self.kept.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Jobs kept, running or finished.
+    pub(in super::super) fn len(&self) -> usize {
+        self.kept().len()
+    }
+
+    /// Starts a job, which is on the disk when this returns. What the same client asked for before, by the same name, is not started again.
+    ///
+    /// # Errors
+    /// INVALID_ARGUMENT, or RESOURCE_EXHAUSTED where there is no room.
+    pub(super) fn submit(
+        &self,
+        asked: Asked,
+        task: Task,
+        request: &proto::SubmitJobRequest,
+        limits: &Limits,
+    ) -> Result<Arc<Job>, Status> {
+        let Task { spec, bundle, options } = task;
+        let asked = asked.with(&spec, &bundle, &options);
+        if let Some(before) = already(&self.kept(), &asked)? {
+            return Ok(before);
+        }
+        let violation = |error: SweepError| status::bad_request(&error.to_string(), [spec_violation(&error)]);
+        let points = spec.grid_points().map_err(violation)?;
+        if points > limits.sweep_points {
+            return Err(status::limit("sweep_points", limits.sweep_points, points));
+        }
+        let points = spec.point_numbers().map_err(violation)?.len() as u64;
+        sweep::check_names(&spec, &bundle, &options).map_err(violation)?;
+        let budget = Budget::new(of_client(allowance(limits)));
+        let id = self.ids.make()?;
+        let _taking_in = self.taking_in.lock().unwrap_or_else(PoisonError::into_inner);
+        {
+            let kept = self.kept();
+            if let Some(before) = already(&kept, &asked)? {
+                return Ok(before);
+            }
+            room(&kept, &asked.owner, limits)?;
+        }
+        let sequence = self.sequence.fetch_add(1, Ordering::Relaxed);
+        let asked = Asked { sequence, points, ..asked };
+        let file = self.store.as_ref().map(|store| -> std::io::Result<JobFile> {
+            let mut file = folder::begin(store, &id, &asked, &request.encode_to_vec())?;
+            file.open().inspect_err(|_| file.remove())?;
+            Ok(file)
+        });
+        let file = file.transpose().map_err(|error| status::not_kept("the job is", &error))?;
+        let parts = (asked, spec, request.options.clone());
+        let standing = Standing { state: State::Waiting, ..Standing::default() };
+        let job = Job::new(id.clone(), parts, budget, file, (Some(Rows::default()), standing));
+        job.touch(client().number);
+        self.kept().insert(id, Arc::clone(&job));
+        self.crews.start(&job, bundle, options);
+        Ok(job)
+    }
+
+    /// Takes in what the folder has, and goes on with what has not ended.
+    ///
+    /// # Errors
+    /// A folder that cannot be read.
+    pub(in super::super) fn wake(&self, accounts: &Accounts, limits: &Limits) -> std::io::Result<()> {
+        let Some(store) = &self.store else { return Ok(()) };
+        for found in folder::find(store)? {
+            self.sequence.fetch_max(found.asked.sequence.saturating_add(1), Ordering::Relaxed);
+            let id = found.id.clone();
+            if let Err(error) = self.wake_one(found, accounts, limits) {
+                tracing::warn!(job = id, error, "it cannot be read, and is left alone");
+            }
+        }
+        Ok(())
+    }
+
+    fn wake_one(&self, found: Found, accounts: &Accounts, limits: &Limits) -> Result<(), String> {
+        let Found { id, asked, request, end, mut file } = found;
+        let request = proto::SubmitJobRequest::decode(&*request).map_err(|error| error.to_string())?;
+        let wire_options = request.options.clone();
+        let Task { spec, bundle, options } = Task::of(request).map_err(|violation| violation.description)?;
+        let purse = accounts.of(&asked.owner).map(|account| Arc::clone(&account.purse));
+        let budget = Budget::new(Allowance { purse, ..allowance(limits) });
+        // what it was told of is there: its rows are read when somebody asks for them
+        if let Some(end) = end.clone().filter(|end| end.bytes == file.row_bytes()) {
+            let (state, rows, failed) = (state_of(end.code), end.rows, end.failed);
+            let standing = Standing { state, rows, failed, end: Some(end), ..Standing::default() };
+            let job = Job::new(id.clone(), (asked, spec, wire_options), budget, Some(file), (None, standing));
+            self.kept().insert(id, job);
+            return Ok(());
+        }
+        let mut rows = Rows::default();
+        file.open().map_err(|error| error.to_string())?.into_iter().for_each(|kept| rows.push(kept));
+        let standing =
+            Standing { state: State::Waiting, rows: rows.len(), failed: rows.failed(), ..Standing::default() };
+        let other = (asked.version != env!("CARGO_PKG_VERSION")).then(|| {
+            let text = format!(
+                "version {} began it and this is {}, whose numbers may differ; submit it again",
+                asked.version,
+                env!("CARGO_PKG_VERSION")
+            );
+            Status::failed_precondition(text)
+        });
+        let job = Job::new(id.clone(), (asked, spec, wire_options), budget, Some(file), (Some(rows), standing));
+        let cancelled = end.filter(|end| end.code != Code::Ok as i32);
+        self.kept().insert(id, Arc::clone(&job));
+        match cancelled.map(|end| Status::new(Code::from_i32(end.code), end.message)).or(other) {
+            Some(why) => job.finish(Some(why)),
+            None => self.crews.start(&job, bundle, options),
+        }
+        Ok(())
+    }
+
+    /// The job of that id, asked for by the connection at hand.
+    ///
+    /// # Errors
+    /// NOT_FOUND.
+    pub(super) fn get(&self, id: &str, kind: &str) -> Result<Arc<Job>, Status> {
+        let job = self.kept().get(id).cloned().ok_or_else(|| status::not_found(kind, id))?;
+        job.touch(client().number);
+        Ok(job)
+    }
+
+    /// A page of the jobs of the client at hand, and the token of the next one.
+    pub(super) fn list(&self, page: &Page) -> (Vec<Arc<Job>>, String) {
+        let owner = client().name;
+        let kept = self.kept();
+        let own = kept.values().filter(|job| *job.asked.owner == *owner && job.asked.sequence < page.before);
+        let mut jobs: Vec<_> = own.cloned().collect();
+        drop(kept);
+        jobs.sort_by_key(|job| std::cmp::Reverse(job.asked.sequence));
+        let more = jobs.len() > page.size;
+        jobs.truncate(page.size);
+        let next = jobs.last().filter(|_| more).map(|job| token(job.asked.sequence));
+        (jobs, next.unwrap_or_default())
+    }
+
+    /// Stops a job; its rows stay. It is on the disk that it is to stop when this returns.
+    pub(super) fn cancel(job: &Job) {
+        if let Err(error) = job.keep_cancelled() {
+            tracing::warn!(%error, job = job.id, "that it is cancelled cannot be kept yet");
+        }
+        job.stop(Stop::Cancelled);
+    }
+
+    /// Stops and forgets a job.
+    pub(super) fn delete(&self, job: &Job) {
+        self.kept().remove(&job.id);
+        job.delete();
+    }
+
+    /// Stops all that run: those in a folder go on with the next server.
+    pub(in super::super) fn suspend(&self) {
+        let jobs: Vec<_> = self.kept().values().cloned().collect();
+        jobs.iter().filter(|job| !job.has_ended()).for_each(|job| job.stop(Stop::Suspended));
+    }
+
+    /// Comes back when all that were suspended have stopped, and lets go of the folder.
+    pub(in super::super) async fn let_go(&self, patience: Duration) {
+        let jobs: Vec<_> = self.kept().values().cloned().collect();
+        let quiet = async {
+            for job in &jobs {
+                job.quiet().await;
+            }
+        };
+        if tokio::time::timeout(patience, quiet).await.is_err() {
+            tracing::warn!("some points of jobs did not stop in time");
+        }
+        jobs.iter().for_each(|job| job.let_go());
+    }
+
+    /// Cancels jobs whose clients are gone for longer than they asked for.
+    pub(in super::super) fn look_for_clients(&self, connections: &Connections) {
+        let jobs: Vec<_> = self.kept().values().filter(|job| job.asked.release().is_some()).cloned().collect();
+        if !jobs.is_empty() {
+            let open = connections.numbers();
+            jobs.iter().for_each(|job| job.look_for_client(&open));
+        }
+    }
+
+    /// Forgets finished jobs that nobody asked for during the time that the limits give; how many. Waits for the disk.
+    pub(in super::super) fn expire(&self, limits: &Limits) -> usize {
+        let time = if self.store.is_some() { limits.sweeps_idle } else { limits.idle };
+        let is_old = |job: &&Arc<Job>| job.has_ended() && job.idle() >= time;
+        let old: Vec<_> = self.kept().values().filter(is_old).cloned().collect();
+        old.iter().for_each(|job| self.delete(job));
+        old.len()
+    }
+}
+
+/// Room for one more job of a client.
+fn room(kept: &BTreeMap<String, Arc<Job>>, owner: &str, limits: &Limits) -> Result<(), Status> {
+    let way_out = "one more; delete one that is no longer needed";
+    if kept.len() >= limits.sweeps {
+        return Err(status::limit("sweeps", limits.sweeps, way_out));
+    }
+    let own = kept.values().filter(|job| job.asked.owner == owner).count();
+    match limits.client_sweeps {
+        0 => Ok(()),
+        most if own >= most => Err(status::limit("client_sweeps", most, way_out)),
+        _ => Ok(()),
+    }
+}
+
+/// Among those that are kept, the one that its client asked for by the same name.
+fn already(kept: &BTreeMap<String, Arc<Job>>, asked: &Asked) -> Result<Option<Arc<Job>>, Status> {
+    let mut same = kept.values().filter_map(|job| job.asked.is(asked).map(|same| (job, same)));
+    if asked.share {
+        let lives = |job: &&Arc<Job>| !matches!(job.standing().state, State::Cancelled | State::Failed);
+        return Ok(same.filter(|(_, same)| *same).map(|(job, _)| job).find(lives).cloned());
+    }
+    match same.next() {
+        Some((_, false)) => {
+            let text = "expected a name of its own, got that of another sweep; choose them at random";
+            Err(status::violation(Violation::new("request_id", text)))
+        }
+        found => Ok(found.map(|(job, _)| Arc::clone(job))),
+    }
+}
+
+fn spec_violation(error: &SweepError) -> Violation {
+    let field = match error {
+        SweepError::BadSpec { what, .. } => format!("spec.{what}"),
+        _ => "spec".to_owned(),
+    };
+    Violation::new(field, error.to_string())
+}

@@ -1,0 +1,171 @@
+//! Jobs take turns: a piece of one after a piece of another.
+//!
+//! As many pieces are computed at once as there are places (`analyses`), on threads that all jobs share. Of those that wait for a place
+//! each client gets one before any gets its second, whatever it has submitted, and so do the jobs of one client among themselves. Which
+//! pieces are computed beside each other changes no row.
+
+use super::super::limits::Limits;
+use super::super::status;
+use super::super::turns::Turns;
+use super::super::work::caught;
+use super::job::Job;
+use crate::content::Fnv;
+use crate::jobs::sweep::{self, Crew, Pool, SweepError};
+use crate::netlist::Bundle;
+use crate::options::CompileOptions;
+use std::sync::{Arc, OnceLock};
+use tokio::runtime::Handle;
+use tokio_util::sync::CancellationToken;
+use tonic::Status;
+
+/// The threads of all jobs, and their turns.
+pub(super) struct Crews {
+    turns: Arc<Turns>,
+    places: usize,
+    pool: OnceLock<Result<Pool, SweepError>>,
+    runtime: Handle,
+}
+
+/// The turns of one job.
+struct Taken<'a> {
+    crews: &'a Crews,
+    pool: &'a Pool,
+    client: u64,
+    stopped: &'a CancellationToken,
+    /// Told of each piece that is begun.
+    begin: &'a (dyn Fn() + Sync),
+}
+
+impl Crews {
+    /// As many places as analyses have. Within a runtime.
+    pub(super) fn new(limits: &Limits) -> Self {
+        let places = limits.analyses.max(1);
+        Self { turns: Turns::new(places), places, pool: OnceLock::new(), runtime: Handle::current() }
+    }
+
+    /// Computes what a job has no row of yet, on a thread of its own.
+    pub(super) fn start(self: &Arc<Self>, job: &Arc<Job>, bundle: Bundle, options: CompileOptions) {
+        let (crews, job) = (Arc::clone(self), Arc::clone(job));
+        self.runtime.spawn_blocking(move || {
+            let outcome = caught(&job.budget, || crews.run(&job, &bundle, &options));
+            job.finish(match outcome {
+                Some(Ok(Ok(_))) => None,
+                Some(Ok(Err(error @ SweepError::TooLarge { .. }))) => {
+                    Some(Status::resource_exhausted(error.to_string()))
+                }
+                Some(Ok(Err(error))) => Some(Status::unavailable(error.to_string())),
+                Some(Err(why)) => Some(status::stopped(why)),
+                None => Some(status::fault()),
+            });
+        });
+    }
+
+    fn run(&self, job: &Arc<Job>, bundle: &Bundle, options: &CompileOptions) -> Result<bool, SweepError> {
+        let pool = self.pool.get_or_init(|| Pool::new(self.places)).as_ref().map_err(Clone::clone)?;
+        let mut client = Fnv::default();
+        client.text(&job.asked.owner);
+        // the upper half only tells more clients apart than there are
+        let client = client.value() as u64;
+        let crew = Taken { crews: self, pool, client, stopped: &job.stopped, begin: &|| job.begin() };
+        let known = job.points();
+        let mut numbers = job.spec.point_numbers()?;
+        numbers.retain(|number| !known.contains(number));
+        sweep::run_by(&job.spec, bundle, options, &numbers, &crew, &|kept| job.found(kept, &self.runtime))
+    }
+}
+
+impl Crew for Taken<'_> {
+    fn size(&self) -> usize {
+        self.crews.places
+    }
+
+    fn run(&self, count: usize, piece: &(dyn Fn(usize) + Sync)) {
+        self.pool.threads().in_place_scope(|scope| {
+            for number in 0..count {
+                let place = self.crews.runtime.block_on(async {
+                    tokio::select! {
+                        place = self.crews.turns.place(self.client) => Some(place),
+                        () = self.stopped.cancelled() => None,
+                    }
+                });
+                let Some(place) = place.filter(|_| !self.stopped.is_cancelled()) else { return };
+                (self.begin)();
+                scope.spawn(move |_| {
+                    piece(number);
+                    drop(place);
+                });
+            }
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    //! Clients take turns by pieces, counted: who has much to do keeps nobody waiting who has little.
+    use super::*;
+    use std::sync::Mutex;
+
+    /// One place. While it is taken, two jobs of one client and one of another queue up for it. From then on every second piece is the
+    /// other's until it is done, and the two of one client alternate.
+    #[test]
+    fn clients_take_turns_by_pieces() {
+        let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(1).build().expect("a runtime");
+        let crews = {
+            let _within = runtime.enter();
+            Crews::new(&Limits { analyses: 1, ..Limits::default() })
+        };
+        let (pool, order, stopped) =
+            (Pool::new(1).expect("a thread"), Mutex::new(String::new()), CancellationToken::new());
+        let jobs = [(1, 'a', 40), (1, 'b', 40), (2, 'c', 10)];
+        let run = |client: u64, job: char, count: usize| {
+            let crew = Taken { crews: &crews, pool: &pool, client, stopped: &stopped, begin: &|| {} };
+            crew.run(count, &|_| {
+                let mut order = order.lock().expect("no panic");
+                order.push(job);
+                // a piece takes until all that have more to do wait for the next place
+                let more = jobs.iter().filter(|(_, job, count)| order.matches(*job).count() < *count).count();
+                while crews.turns.waiting() < more {
+                    std::thread::yield_now();
+                }
+            });
+        };
+        std::thread::scope(|scope| {
+            let place = runtime.block_on(crews.turns.place(9));
+            for (client, job, count) in jobs {
+                let run = &run;
+                scope.spawn(move || run(client, job, count));
+            }
+            while crews.turns.waiting() < 3 {
+                std::thread::yield_now();
+            }
+            drop(place);
+        });
+        let order = order.into_inner().expect("no panic");
+        let last = order.rfind('c').expect("it ran");
+        assert!(last <= 20, "ten pieces of the other client among the first {}: {order}", last + 1);
+        let ahead = |order: &str| order.matches('a').count().abs_diff(order.matches('b').count());
+        assert!((0..=order.len()).all(|end| ahead(&order[..end]) <= 1), "{order}");
+        assert_eq!(order.len(), 90);
+    }
+
+    /// A crew that is told to stop begins nothing more, also while it waits for its turn.
+    #[test]
+    fn a_crew_that_is_stopped_comes_back() {
+        let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(1).build().expect("a runtime");
+        let _within = runtime.enter();
+        let crews = Crews::new(&Limits { analyses: 1, ..Limits::default() });
+        let (pool, stopped) = (Pool::new(1).expect("a thread"), CancellationToken::new());
+        let place = std::thread::scope(|scope| {
+            let place = scope.spawn(|| runtime.block_on(crews.turns.place(9))).join().expect("no panic");
+            let crew = Taken { crews: &crews, pool: &pool, client: 1, stopped: &stopped, begin: &|| {} };
+            let waits = scope.spawn(move || crew.run(5, &|_| panic!("nothing is begun")));
+            while crews.turns.waiting() < 1 {
+                std::thread::yield_now();
+            }
+            stopped.cancel();
+            waits.join().expect("it comes back");
+            place
+        });
+        drop(place);
+    }
+}

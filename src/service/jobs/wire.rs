@@ -1,0 +1,55 @@
+//! A job as clients are told of it.
+
+use super::super::proto;
+use super::asked::Asked;
+use super::standing::Standing;
+use crate::jobs::sweep::SweepSpec;
+
+/// A job, which outlives the server or not.
+pub(super) fn job(
+    id: &str,
+    asked: &Asked,
+    provenance: &proto::Provenance,
+    (standing, kept): (&Standing, bool),
+) -> proto::Job {
+    let end = standing.end.as_ref();
+    let metadata = proto::JobMetadata {
+        state: standing.state.into(),
+        points: asked.points,
+        rows: standing.rows,
+        failed: standing.failed,
+        submitted: Some(timestamp(asked.submitted_ms)),
+        ended: end.map(|end| timestamp(end.ended_ms)),
+        request_id: asked.request.clone(),
+        release_after_s: asked.release_after_s,
+        kept,
+        provenance: Some(provenance.clone()),
+    };
+    let result = end.map(|end| match end.code {
+        0 => proto::job::Result::Response(proto::JobResponse { rows: standing.rows, failed: standing.failed }),
+        code => {
+            let (message, details) = (end.message.clone(), Vec::new());
+            proto::job::Result::Error(tonic_types::Status { code, message, details })
+        }
+    });
+    proto::Job { name: format!("jobs/{id}"), metadata: Some(metadata), done: end.is_some(), result }
+}
+
+/// What the rows of a job come from.
+pub(super) fn provenance(asked: &Asked, spec: &SweepSpec, options: Option<proto::CompileOptions>) -> proto::Provenance {
+    proto::Provenance {
+        version: asked.version.clone(),
+        netlist: asked.netlist.clone(),
+        model: asked.model.clone(),
+        options,
+        sweep: asked.sweep.clone(),
+        part: asked.part.clone(),
+        seed: spec.samples.as_ref().map(|samples| samples.asked.seed),
+    }
+}
+
+fn timestamp(ms: u64) -> prost_types::Timestamp {
+    // 300 million years
+    let seconds = i64::try_from(ms / 1000).unwrap_or(i64::MAX);
+    prost_types::Timestamp { seconds, nanos: i32::try_from(ms % 1000).unwrap_or(0) * 1_000_000 }
+}
