@@ -54,6 +54,13 @@ async fn next<T>(
     }
 }
 
+/// Why there is nothing more, if anybody is still to be told.
+fn say_last<T>(sender: &mpsc::Sender<Result<T, Status>>, why: Option<Status>) {
+    if let Some(why) = why {
+        let _ = sender.try_send(Err(why));
+    }
+}
+
 /// Where a job stands, as `say` has it, until it has ended.
 pub(super) fn watch<T: Send + 'static>(job: Arc<Job>, shutdown: &Shutdown, say: fn(&Job) -> T) -> Answers<T> {
     let (sender, receiver) = mpsc::channel(1);
@@ -68,7 +75,7 @@ pub(super) fn watch<T: Send + 'static>(job: Arc<Job>, shutdown: &Shutdown, say: 
                 return;
             }
             if let Next::Over(why) = next(&mut standing, &sender, &shutdown).await {
-                why.map(|why| sender.try_send(Err(why)));
+                say_last(&sender, why);
                 return;
             }
             tokio::time::sleep(WATCH_INTERVAL).await;
@@ -121,7 +128,7 @@ pub(super) fn rows(
                 Next::Told => tokio::time::sleep(GATHERING).await,
                 Next::Quiet => quiet = true,
                 Next::Over(why) => {
-                    why.map(|why| sender.try_send(Err(why)));
+                    say_last(&sender, why);
                     return;
                 }
             }
