@@ -27,11 +27,14 @@ def generate() -> None:
         if (PACKAGE / "service_pb2_grpc.py").exists():
             return
         raise RuntimeError(f"no .proto files in {PROTO}, and no generated code in {PACKAGE}")
+    import grpc_tools
     from grpc_tools import protoc
 
+    # google/protobuf comes with the compiler; google/rpc with googleapis-common-protos, of which no code is made here
+    known = Path(grpc_tools.__file__).parent / "_proto"
     PACKAGE.mkdir(parents=True, exist_ok=True)
     options = [f"--python_out={OUT}", f"--pyi_out={OUT}", f"--grpc_python_out={OUT}"]
-    code = protoc.main(["protoc", f"-I{PROTO}", *options, *map(str, sources)])
+    code = protoc.main(["protoc", f"-I{PROTO}", f"-I{known}", *options, *map(str, sources)])
     if code != 0:
         raise RuntimeError(f"protoc failed with code {code}")
     (PACKAGE / "__init__.py").write_text('"""Generated messages and stubs of the protocol."""\n')

@@ -103,13 +103,13 @@ def test_results_as_tables(plate: bimorph.Model) -> None:
 
 
 def test_a_sweep_goes_on_without_its_client(client: bimorph.Client) -> None:
-    """A submitted sweep is found again by its id, has the table of a sweep that was waited for, and is gone once it was cancelled."""
+    """A submitted sweep is found again by its id, has the table of a sweep that was waited for, and is gone once it was deleted."""
     netlist, axis = bimorph.Netlist.text(PLATE, "plate.net"), [1.0 + 0.01 * i for i in range(50)]
     whole = client.sweep(netlist, {"k": axis}, bimorph.Modes(count=1))
     started = client.submit(netlist, {"k": axis}, bimorph.Modes(count=1))
     found = client.attach(started.id)
     assert found.wait() == whole and found.status().state == "done" and found.status().points == 50
-    found.cancel()
+    found.delete()
     with pytest.raises(bimorph.NotFound):
         client.attach(started.id)
     assert repr(whole) == "<Table of f1 over k: 50 points>"

@@ -68,7 +68,7 @@ def test_a_sweep_goes_on(way: Cut, kind: str) -> None:
     assert cuts > 0
     assert [row.point for row in table.rows] == list(range(400))
     assert all(row.results["pull_in"] > 0 for row in table.rows)
-    sweep.cancel()
+    sweep.delete()
 
 
 def test_a_run_that_is_cut_off_is_no_run(way: Cut) -> None:

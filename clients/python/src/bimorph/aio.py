@@ -230,7 +230,7 @@ class Model:
 
 
 class Sweep(_Block[_sweep_handle.Sweep]):
-    """:class:`bimorph.Sweep` for asyncio: iterated over, it gives its rows, once it is done."""
+    """:class:`bimorph.Sweep` for asyncio: iterated over, it gives its rows as they are finished."""
 
     def __init__(self, sync: _sweep_handle.Sweep) -> None:
         super().__init__(sync)
@@ -241,6 +241,11 @@ class Sweep(_Block[_sweep_handle.Sweep]):
     wait = _awaited(_sweep_handle.Sweep.wait)
     table = _awaited(_sweep_handle.Sweep.table)
     cancel = _awaited(_sweep_handle.Sweep.cancel)
+    delete = _awaited(_sweep_handle.Sweep.delete)
+
+    def rows(self, first: int = 0) -> AsyncIterator[Row]:
+        """Its rows as they are finished, from the one numbered ``first`` on."""
+        return _items(lambda: self.sync.rows(first))
 
     def watch(self) -> AsyncIterator[_sweep_handle.SweepStatus]:
         """How far it has come, until it ends."""
@@ -263,6 +268,7 @@ class Client(_Block[_client.Client]):
     sweep = _awaited(_client.Client.sweep)
     submit = _awaited_as(Sweep, _client.Client.submit, lambda sweep: sweep.__exit__(None, None, None))
     attach = _awaited_as(Sweep, _client.Client.attach)
+    sweeps = _awaited(_client.Client.sweeps)
     resume = _awaited_as(Session, _client.Client.resume, _session.Session.leave)
 
 

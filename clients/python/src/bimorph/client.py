@@ -22,9 +22,9 @@ from .netlist import Netlist
 from .options import Options
 from .session import Session, resumed
 from .stopping import apart
-from .sweep_handle import Sweep
+from .sweep_handle import Sweep, SweepStatus, status_of
 from .ticket import Ticket
-from .v1 import model_pb2, sweep_pb2
+from .v1 import jobs_pb2, model_pb2
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -171,20 +171,28 @@ class Client:
         include: Iterable[str | os.PathLike[str]] = (),
         samples: sweeps.Samples | None = None,
         shard: tuple[int, int] = (0, 1),
+        share: bool = False,
+        release_after: float | None = None,
         **options: Unpack[Options],
     ) -> Sweep:
-        """Starts a :meth:`sweep` and comes back at once: ``wait()`` has its table, and its ``id`` finds it again (:meth:`attach`)."""
-        request = sweep_pb2.SubmitSweepRequest(
+        """Starts a :meth:`sweep` and comes back at once: ``wait()`` has its table, and its ``id`` finds it again (:meth:`attach`), on a server
+        with a folder for states also when that was started anew.
+
+        With ``share`` it is the one that computes the same, if this client has one there, running or done. ``release_after`` [s] lets the
+        server cancel it when it has had no connection of this client for so long; None: it runs on.
+        """
+        request = jobs_pb2.SubmitJobRequest(
             bundle=self._bundle(netlist, include),
             options=options_to_wire(set or {}, options),
-            spec=sweeps.to_wire(parameters, analysis, shard, samples),
+            sweep=sweeps.to_wire(parameters, analysis, shard, samples),
             # an answer that is lost starts no second sweep
-            request_id=uuid.uuid4().hex,
+            request_id="" if share else uuid.uuid4().hex,
+            share=share,
+            release_after_s=release_after or 0.0,
         )
-        vary = tuple(samples.vary) if samples else ()
         with apart():
-            submitted = self._channel.persist(lambda heard: self._channel.call("SubmitSweep", request))
-        return Sweep(self._channel, submitted.sweep, vary)
+            job = self._channel.persist(lambda heard: self._channel.call("SubmitJob", request))
+        return Sweep(self._channel, job.name, share)
 
     def attach(self, sweep: str) -> Sweep:
         """A sweep of this server by its ``id``.
@@ -194,6 +202,17 @@ class Client:
         found = Sweep(self._channel, sweep)
         found.status()
         return found
+
+    def sweeps(self) -> list[SweepStatus]:
+        """The sweeps that this client has on the server, the last one first: the owner of a token or of a certificate sees its own; all who
+        come by a Unix socket are one client, and all who show nothing."""
+        found, token = list[SweepStatus](), ""
+        while True:
+            page = self._channel.call("ListJobs", jobs_pb2.ListJobsRequest(page_token=token))
+            found += map(status_of, page.jobs)
+            token = page.next_page_token
+            if not token:
+                return found
 
     def _bundle(self, netlist: str | os.PathLike[str] | Netlist, include: Iterable[str | os.PathLike[str]]) -> Any:
         if not isinstance(netlist, Netlist) and Path(netlist).suffix.lower() in LAYOUTS:

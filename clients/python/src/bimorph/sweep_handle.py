@@ -1,25 +1,30 @@
-"""A sweep that runs on a server while clients come and go."""
+"""A sweep that runs on a server while clients come and go: a job of the protocol."""
 
 from __future__ import annotations
 
 import contextlib
-import itertools
+import datetime
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from types import TracebackType
+from typing import Any, NamedTuple
 
 from .channel import Channel
-from .errors import BimorphError, Unavailable
+from .errors import BimorphError, NoResult, Unavailable
 from .stopping import apart
 from .sweep import Row, Table
-from .v1 import sweep_pb2
+from .v1 import jobs_pb2
 
 _STATES = {
-    sweep_pb2.SweepStatus.STATE_RUNNING: "running",
-    sweep_pb2.SweepStatus.STATE_DONE: "done",
-    sweep_pb2.SweepStatus.STATE_FAILED: "failed",
-    sweep_pb2.SweepStatus.STATE_CANCELLED: "cancelled",
+    jobs_pb2.JobMetadata.STATE_WAITING: "waiting",
+    jobs_pb2.JobMetadata.STATE_RUNNING: "running",
+    jobs_pb2.JobMetadata.STATE_DONE: "done",
+    jobs_pb2.JobMetadata.STATE_CANCELLED: "cancelled",
+    jobs_pb2.JobMetadata.STATE_FAILED: "failed",
 }
+
+_ATTEMPTS = 6
+"""Streams in a row that break without a row, after which the rows are given up."""
 
 
 @dataclass(frozen=True)
@@ -27,26 +32,68 @@ class SweepStatus:
     """How far a sweep has come."""
 
     state: str
-    """"running", "done", "failed" or "cancelled"."""
+    """"waiting" for its first turn, "running", "done", "cancelled" or "failed"."""
     done: int
-    """Points finished, failed ones among them."""
+    """Points finished, failed ones among them: so many rows are there."""
     points: int
     """Points of the sweep."""
     failed: int
     """Points without a result."""
     message: str
-    """Why it has no table."""
+    """Why it ended without all of its rows."""
+    id: str = ""
+    """Its name on the server."""
+    netlist: str = ""
+    """Root file of its netlist."""
+    version: str = ""
+    """Version of the program that its rows come from."""
+    submitted: datetime.datetime | None = None
+    """When it was submitted."""
+    ended: datetime.datetime | None = None
+    """When it ended; None: it goes on."""
+    kept: bool = False
+    """Whether it outlives the server."""
+
+    @property
+    def over(self) -> bool:
+        """Whether it has ended, one way or another."""
+        return self.ended is not None
+
+
+def status_of(job: Any) -> SweepStatus:
+    """As it travels."""
+    about = job.metadata
+    return SweepStatus(
+        _STATES.get(about.state, "running"),
+        about.rows,
+        about.points,
+        about.failed,
+        job.error.message,
+        job.name,
+        about.provenance.netlist,
+        about.provenance.version,
+        _time(about, "submitted"),
+        _time(about, "ended"),
+        about.kept,
+    )
+
+
+def _time(about: Any, name: str) -> datetime.datetime | None:
+    if not about.HasField(name):
+        return None
+    time: datetime.datetime = getattr(about, name).ToDatetime(datetime.UTC)
+    return time
 
 
 class Sweep:
     """A sweep on a server: :meth:`Client.submit` starts one, :meth:`Client.attach` finds one again by its ``id``, also from another process.
 
-    It runs whether or not anybody waits for it. The end of a ``with`` block cancels it and lets the server forget it.
+    It runs whether or not anybody waits for it. The end of a ``with`` block ends it and lets the server forget it, unless it is shared.
     """
 
-    def __init__(self, channel: Channel, id: str, vary: tuple[str, ...] = ()) -> None:
+    def __init__(self, channel: Channel, id: str, shared: bool = False) -> None:
         self._channel = channel
-        self._vary = vary
+        self._shared = shared
         self.id = id
         """Its name on the server."""
 
@@ -55,74 +102,51 @@ class Sweep:
 
     def status(self) -> SweepStatus:
         """Where it stands now."""
-        for status in self.watch():
-            return status
-        raise BimorphError(f"server {self._channel.address}: no word of sweep {self.id}")
+        return status_of(self._channel.call("GetJob", jobs_pb2.GetJobRequest(name=self.id)))
 
     def wait(self, progress: Callable[[int, int], object] | None = None) -> Table:
-        """Its table, once it is done; ``progress`` is told (points done, points). A network that fails meanwhile costs it nothing: it is
-        asked for again.
+        """Its table, once it is done; ``progress`` is told (points done, points). A network that fails meanwhile costs it nothing: the rows
+        go on where they were.
 
-        Raises :class:`BimorphError` when it ends without one.
+        Raises :class:`BimorphError` when it ends without all of its rows.
         """
-        self._follow(progress)
-        return self.table()
+        points = self._persistent_status().points
+        rows: list[_Found] = []
+        parameters: list[str] = []
+        for chunk in self._chunks(0):
+            rows.extend(chunk.found)
+            parameters = chunk.parameters
+            if progress is not None:
+                progress(len(rows), points)
+        return _table(parameters, rows)
 
-    def rows(self) -> Iterator[Row]:
-        """The rows of its table one by one, once it is done, as they come: no more of them are held than a message has. A network that
-        fails meanwhile costs it nothing.
+    def rows(self, first: int = 0) -> Iterator[Row]:
+        """Its rows as they are finished, from the one numbered ``first`` on: rows are numbered in that order, and keep their numbers. No more
+        of them are held than a message has. A network that fails meanwhile costs it nothing.
 
-        Raises :class:`BimorphError` when it ends without a table.
+        Raises :class:`BimorphError` after the last row when it ends without all of them.
         """
-        self._follow(None)
-        given = 0
-        while True:
-            try:
-                rows = (item for item in self._fetch() if isinstance(item, Row))
-                for row in itertools.islice(rows, given, None):
-                    yield row
-                    given += 1
-                return
-            except Unavailable as error:
-                failure = error
-            # the rest: where nothing answers, this raises
-            if self._channel.persist(lambda heard: self.status()).points <= given:
-                raise failure
+        for chunk in self._chunks(first):
+            for found in chunk.found:
+                yield found.row
 
     def table(self) -> Table:
-        """What it found; only of a sweep that is done."""
+        """What it found; only of a sweep that is done.
 
-        def whole(heard: Callable[[], None]) -> Table:
-            rows, head = [], _Head()
-            for item in self._fetch():
-                if isinstance(item, Row):
-                    rows.append(item)
-                else:
-                    head = item
-            return Table(head.parameters, head.results, head.units, rows)
-
-        table = self._channel.persist(whole)
-        if any(name not in table.parameters for name in self._vary):
-            raise BimorphError("the server is of an earlier version, which knows no samples")
-        return table
-
-    def _follow(self, progress: Callable[[int, int], object] | None) -> None:
-        def follow(heard: Callable[[], None]) -> None:
-            status = None
-            for status in self.watch():
-                heard()
-                if progress is not None:
-                    progress(status.done, status.points)
-                if status.state in ("failed", "cancelled"):
-                    raise BimorphError(f"the sweep ended after {status.done} points: {status.message}")
-            if status is None or status.state != "done":
-                raise Unavailable(f"server {self._channel.address}: the stream ended before the sweep did")
-
-        self._channel.persist(follow)
+        Raises :class:`NoResult` for one that goes on, and :class:`BimorphError` for one that ended otherwise: :meth:`rows` has what there is.
+        """
+        status = self._persistent_status()
+        if not status.over:
+            raise NoResult(f"the sweep has no table yet: {status.done} of {status.points} points done")
+        return self.wait()
 
     def cancel(self) -> None:
+        """Ends it, if it still runs. The rows that it has stay."""
+        self._channel.call("CancelJob", jobs_pb2.CancelJobRequest(name=self.id))
+
+    def delete(self) -> None:
         """Ends it, if it still runs, and lets the server forget it."""
-        self._channel.call("CancelSweep", sweep_pb2.CancelSweepRequest(sweep=self.id))
+        self._channel.call("DeleteJob", jobs_pb2.DeleteJobRequest(name=self.id))
 
     def __enter__(self) -> Sweep:
         return self
@@ -130,36 +154,80 @@ class Sweep:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        with contextlib.suppress(BimorphError), apart():
-            self.cancel()
+        if not self._shared:
+            with contextlib.suppress(BimorphError), apart():
+                self.delete()
 
     def watch(self) -> Iterator[SweepStatus]:
         """How far it has come, until it ends."""
-        for status in self._channel.stream("WatchSweep", sweep_pb2.WatchSweepRequest(sweep=self.id)):
-            state = _STATES.get(status.state, "running")
-            yield SweepStatus(state, status.done, status.points, status.failed, status.message)
+        for job in self._channel.stream("WatchJob", jobs_pb2.WatchJobRequest(name=self.id)):
+            yield status_of(job)
 
-    def _fetch(self) -> Iterator[_Head | Row]:
-        """What the columns of the table are, and every row."""
-        points, rows, head = self.status().points, 0, _Head()
-        for chunk in self._channel.stream("FetchSweep", sweep_pb2.FetchSweepRequest(sweep=self.id)):
-            if chunk.parameters or chunk.results:
-                head = _Head(list(chunk.parameters), list(chunk.results), dict(zip(chunk.results, chunk.units)))
-                yield head
-            for row in chunk.rows:
-                values = [v.number if v.WhichOneof("value") == "number" else v.text for v in row.parameters]
-                present = {name: x for name, x in zip(head.results, row.results) if x == x}
-                estimate = row.estimated_error if row.HasField("estimated_error") else None
-                rows += 1
-                yield Row(row.point, dict(zip(head.parameters, values)), present, row.error, estimate, row.warning)
-        if rows != points:
-            raise Unavailable(f"server {self._channel.address}: the table ended after {rows} of {points} points")
+    def _persistent_status(self) -> SweepStatus:
+        return self._channel.persist(lambda heard: self.status())
+
+    def _chunks(self, first: int) -> Iterator[_Chunk]:
+        """Rows as they come, from one on; where the network fails, from the next one on."""
+        breaks = 0
+        while True:
+            try:
+                for chunk in self._fetch(first):
+                    first += len(chunk.found)
+                    breaks = 0 if chunk.found else breaks
+                    yield chunk
+                return
+            except Unavailable as error:
+                failure = error
+            breaks += 1
+            if breaks >= _ATTEMPTS:
+                raise failure
+            # where nothing answers, this raises
+            self._persistent_status()
+
+    def _fetch(self, first: int) -> Iterator[_Chunk]:
+        """Rows from one on, as one stream has them."""
+        parameters: list[str] = []
+        columns: list[tuple[tuple[str, str], ...]] = []
+        for chunk in self._channel.stream("FetchJob", jobs_pb2.FetchJobRequest(name=self.id, first_row=first)):
+            parameters = list(chunk.parameters) or parameters
+            columns += (tuple(zip(told.results, told.units)) for told in chunk.columns)
+            found = [_found(row.row, parameters, columns[row.columns] if row.row.results else ()) for row in chunk.rows]
+            yield _Chunk(parameters, found)
+            if chunk.HasField("job"):
+                status = status_of(chunk.job)
+                if status.state != "done":
+                    raise BimorphError(f"the sweep ended after {status.done} of {status.points} points: {status.message}")
+                return
+        raise Unavailable(f"server {self._channel.address}: the stream ended before the sweep did")
 
 
-@dataclass(frozen=True)
-class _Head:
-    """Columns of a table."""
+class _Found(NamedTuple):
+    """A row, and the names and units of all of its columns."""
 
-    parameters: list[str] = field(default_factory=list)
-    results: list[str] = field(default_factory=list)
-    units: dict[str, str] = field(default_factory=dict)
+    row: Row
+    columns: tuple[tuple[str, str], ...]
+
+
+class _Chunk(NamedTuple):
+    """Rows that came together."""
+
+    parameters: list[str]
+    found: list[_Found]
+
+
+def _found(row: Any, parameters: list[str], columns: tuple[tuple[str, str], ...]) -> _Found:
+    values = [v.number if v.WhichOneof("value") == "number" else v.text for v in row.parameters]
+    present = {name: x for (name, _), x in zip(columns, row.results, strict=True) if x == x}
+    estimate = row.estimated_error if row.HasField("estimated_error") else None
+    found = Row(row.point, dict(zip(parameters, values)), present, row.error, estimate, row.warning)
+    return _Found(found, columns)
+
+
+def _table(parameters: list[str], found: list[_Found]) -> Table:
+    """In grid order; columns as the first points have them."""
+    found.sort(key=lambda one: one.row.point)
+    units: dict[str, str] = {}
+    for columns in dict.fromkeys(one.columns for one in found):
+        for name, unit in columns:
+            units.setdefault(name, unit)
+    return Table(parameters, list(units), units, [one.row for one in found])
