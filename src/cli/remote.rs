@@ -69,6 +69,8 @@ impl Remote {
             }
             seconds => seconds.map(Duration::from_secs_f64),
         };
+        // from here on whoever is interrupted is told what the job is called
+        interrupt::asked();
         let mut client = self.reach.client(uri)?;
         let how = Submission { share: self.share, release_after };
         let name = client.submit(spec, bundle, options, how)?;

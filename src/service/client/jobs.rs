@@ -113,7 +113,12 @@ impl Client {
             release_after_s: how.release_after.map_or(0.0, |time| time.as_secs_f64()),
         };
         let job = self.persist(|client, _| client.call(client.link.rpc.clone().submit_job(request.clone())));
-        job.map(|job| job.name)
+        job.map(|job| job.name).map_err(|error| match &*error.code {
+            "Unimplemented" => {
+                ClientError { message: "it is of an earlier version, which has no jobs".to_owned(), ..error }
+            }
+            _ => error,
+        })
     }
 
     /// Where a job stands.

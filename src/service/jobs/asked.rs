@@ -15,6 +15,9 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 /// Longest name that a client gives to its request [byte].
 const LONGEST_REQUEST: usize = 64;
 
+/// Longest name of a netlist that is told again and again [character].
+const LONGEST_TITLE: usize = 200;
+
 /// What is known of a job from its first moment: what a folder keeps of it beside the request itself.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Asked {
@@ -98,7 +101,7 @@ impl Asked {
         // a grid that is none has none, and is refused
         let part = (spec.shard.count > 1).then(|| Part::of(spec, bundle, options).ok()).flatten();
         self.part = part.map(|part| part.to_string()).unwrap_or_default();
-        self.netlist.clone_from(&bundle.root);
+        self.netlist = bundle.root.chars().take(LONGEST_TITLE).collect();
         self
     }
 

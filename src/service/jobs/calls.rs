@@ -49,11 +49,11 @@ impl Calls {
 
     pub(in super::super) async fn submitted_job(&self, request: proto::SubmitJobRequest) -> Reply<proto::Job> {
         let job = self.started(request).await?;
-        Ok(Response::new(job.to_wire()))
+        Ok(Response::new(job.to_wire_whole()))
     }
 
     pub(in super::super) fn job_of(&self, name: &str) -> Reply<proto::Job> {
-        Ok(Response::new(self.0.jobs.get(id(name)?, "job")?.to_wire()))
+        Ok(Response::new(self.0.jobs.get(id(name)?, "job")?.to_wire_whole()))
     }
 
     pub(in super::super) fn listed_jobs(&self, request: &proto::ListJobsRequest) -> Reply<proto::ListJobsResponse> {

@@ -32,7 +32,7 @@ pub(super) struct Job {
     pub(super) asked: Asked,
     pub(super) spec: SweepSpec,
     pub(super) budget: Budget,
-    provenance: proto::Provenance,
+    options: Option<proto::CompileOptions>,
     standing: watch::Sender<Standing>,
     /// None: on the disk alone.
     rows: Mutex<Option<Rows>>,
@@ -68,13 +68,12 @@ impl Job {
         file: Option<JobFile>,
         (rows, standing): (Option<Rows>, Standing),
     ) -> Arc<Self> {
-        let provenance = wire::provenance(&asked, &spec, options);
         Arc::new(Self {
             id,
             asked,
             spec,
             budget,
-            provenance,
+            options,
             standing: watch::Sender::new(standing),
             rows: Mutex::new(rows),
             waiting: Mutex::default(),
@@ -320,8 +319,16 @@ impl Job {
         self.table.get()
     }
 
-    /// As it travels.
+    /// As it travels, without the options of the model, which may be long.
     pub(super) fn to_wire(&self) -> proto::Job {
-        wire::job(&self.id, &self.asked, &self.provenance, (&self.standing(), self.kept))
+        let provenance = wire::provenance(&self.asked, &self.spec);
+        wire::job(&self.id, &self.asked, provenance, (&self.standing(), self.kept))
+    }
+
+    /// As it travels, with all that it comes from.
+    pub(super) fn to_wire_whole(&self) -> proto::Job {
+        let provenance =
+            proto::Provenance { options: self.options.clone(), ..wire::provenance(&self.asked, &self.spec) };
+        wire::job(&self.id, &self.asked, provenance, (&self.standing(), self.kept))
     }
 }

@@ -43,10 +43,12 @@ impl Crews {
         Self { turns: Turns::new(places), places, pool: OnceLock::new(), runtime: Handle::current() }
     }
 
-    /// Computes what a job has no row of yet, on a thread of its own.
+    /// Computes what a job has no row of yet. A thread of its own waits for its turns, not one of those on which calls are answered: jobs
+    /// that wait, however many, are in nobody's way.
     pub(super) fn start(self: &Arc<Self>, job: &Arc<Job>, bundle: Bundle, options: CompileOptions) {
-        let (crews, job) = (Arc::clone(self), Arc::clone(job));
-        self.runtime.spawn_blocking(move || {
+        let (crews, running) = (Arc::clone(self), Arc::clone(job));
+        let run = move || {
+            let job = running;
             let outcome = caught(&job.budget, || crews.run(&job, &bundle, &options));
             job.finish(match outcome {
                 Some(Ok(Ok(_))) => None,
@@ -57,7 +59,10 @@ impl Crews {
                 Some(Err(why)) => Some(status::stopped(why)),
                 None => Some(status::fault()),
             });
-        });
+        };
+        if let Err(error) = std::thread::Builder::new().name("job".to_owned()).spawn(run) {
+            job.finish(Some(Status::unavailable(format!("the system gives no thread for it: {error}"))));
+        }
     }
 
     fn run(&self, job: &Arc<Job>, bundle: &Bundle, options: &CompileOptions) -> Result<bool, SweepError> {

@@ -5,11 +5,11 @@ use super::asked::Asked;
 use super::standing::Standing;
 use crate::jobs::sweep::SweepSpec;
 
-/// A job, which outlives the server or not.
+/// A job, which outlives the server or not. What clients are told again and again is without the options, which may be long.
 pub(super) fn job(
     id: &str,
     asked: &Asked,
-    provenance: &proto::Provenance,
+    provenance: proto::Provenance,
     (standing, kept): (&Standing, bool),
 ) -> proto::Job {
     let end = standing.end.as_ref();
@@ -23,7 +23,7 @@ pub(super) fn job(
         request_id: asked.request.clone(),
         release_after_s: asked.release_after_s,
         kept,
-        provenance: Some(provenance.clone()),
+        provenance: Some(provenance),
     };
     let result = end.map(|end| match end.code {
         0 => proto::job::Result::Response(proto::JobResponse { rows: standing.rows, failed: standing.failed }),
@@ -35,13 +35,13 @@ pub(super) fn job(
     proto::Job { name: format!("jobs/{id}"), metadata: Some(metadata), done: end.is_some(), result }
 }
 
-/// What the rows of a job come from.
-pub(super) fn provenance(asked: &Asked, spec: &SweepSpec, options: Option<proto::CompileOptions>) -> proto::Provenance {
+/// What the rows of a job come from, but for the options.
+pub(super) fn provenance(asked: &Asked, spec: &SweepSpec) -> proto::Provenance {
     proto::Provenance {
         version: asked.version.clone(),
         netlist: asked.netlist.clone(),
         model: asked.model.clone(),
-        options,
+        options: None,
         sweep: asked.sweep.clone(),
         part: asked.part.clone(),
         seed: spec.samples.as_ref().map(|samples| samples.asked.seed),

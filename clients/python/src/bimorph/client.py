@@ -195,11 +195,11 @@ class Client:
         return Sweep(self._channel, job.name, share)
 
     def attach(self, sweep: str) -> Sweep:
-        """A sweep of this server by its ``id``.
+        """A sweep of this server by its ``id``, with or without ``jobs/``.
 
         Raises :class:`NotFound` for one that the server does not have (any more).
         """
-        found = Sweep(self._channel, sweep)
+        found = Sweep(self._channel, sweep if "/" in sweep else f"jobs/{sweep}")
         found.status()
         return found
 
