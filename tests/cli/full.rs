@@ -1,6 +1,6 @@
 //! Disks that are full: what was accepted stays, what cannot be kept is told, and bytes are counted as files have them.
 
-use crate::bench::{Bench, CANTILEVER};
+use crate::bench::{Bench, CANTILEVER, PLATE};
 use crate::overseen::{block_on, get, value};
 use crate::stepping::Killed;
 use bimorph::service::proto;
@@ -50,6 +50,66 @@ fn a_disk_that_is_full() {
         server.again().await;
         assert_eq!(server.attach(&other).await.step(2, next.token).await.expect("goes on").0, third);
     });
+}
+
+/// A job whose rows find the disk full ends with that for its error and the rows that have a place, which are there after a kill; the
+/// server computes others, and counts bytes as files have them.
+#[test]
+fn a_job_on_a_disk_that_is_full() {
+    block_on(async {
+        let mut server = Killed::start("--metrics 127.0.0.1:0").await;
+        let metrics = server.line("metrics on http://").trim_end_matches("/metrics").to_owned();
+        let name = server.wire.submit_job(gaps(500_000)).await.expect("starts").into_inner().name;
+        let fetch = proto::FetchJobRequest { name: name.clone(), first_row: 0, only_finished: false };
+        let mut stream = server.wire.fetch_job(fetch).await.expect("a stream").into_inner();
+        let mut rows = 0;
+        let full = loop {
+            let chunk = stream.message().await.expect("goes on").expect("goes on");
+            if rows == 0 && !chunk.rows.is_empty() {
+                limit_files(server.id(), "60000");
+            }
+            rows += chunk.rows.len() as u64;
+            if let Some(job) = chunk.job {
+                break job;
+            }
+        };
+        let Some(proto::job::Result::Error(error)) = &full.result else { panic!("{full:?}") };
+        assert_eq!(error.code, tonic::Code::ResourceExhausted as i32);
+        assert!(error.message.contains("its rows are not kept: File too large"), "{}", error.message);
+        assert!(rows > 0 && full.metadata.as_ref().is_some_and(|about| about.rows == rows));
+        let small = server.wire.submit_job(gaps(5)).await.expect("the server goes on").into_inner().name;
+        let watch = proto::WatchJobRequest { name: small.clone() };
+        let mut watched = server.wire.watch_job(watch).await.expect("a stream").into_inner();
+        while watched.message().await.expect("goes on").is_some_and(|job| !job.done) {}
+        let used = value(&get(&metrics, "/metrics").1, "bimorph_kept_bytes");
+        assert_eq!(used, bytes(&server.bench.path("states")) as f64);
+        server.again().await;
+        let kept =
+            server.wire.get_job(proto::GetJobRequest { name: name.clone() }).await.expect("is kept").into_inner();
+        assert_eq!((kept.result, kept.metadata.map(|about| about.rows)), (full.result, Some(rows)));
+        for name in [name, small] {
+            server.wire.delete_job(proto::DeleteJobRequest { name }).await.expect("deleted");
+        }
+        assert_eq!(bytes(&server.bench.path("states")), 0);
+    });
+}
+
+/// Pull-in of the plate at so many gaps.
+fn gaps(count: u32) -> proto::SubmitJobRequest {
+    let linear = proto::Linear { low: 1.5e-6, high: 2.5e-6, count };
+    let values = Some(proto::sweep_parameter::Values::Linear(linear));
+    let pull_in = proto::SweepPullIn { port: "drive".into(), max_v: 30.0 };
+    let spec = proto::SweepSpec {
+        parameters: vec![proto::SweepParameter { name: "gap".into(), values }],
+        analysis: Some(proto::sweep_spec::Analysis::PullIn(pull_in)),
+        ..Default::default()
+    };
+    let bundle = bimorph::netlist::Bundle::from_text("plate.net", PLATE);
+    proto::SubmitJobRequest {
+        bundle: Some(bimorph::service::convert::model::bundle_to_wire(&bundle)),
+        task: Some(proto::submit_job_request::Task::Sweep(spec)),
+        ..Default::default()
+    }
 }
 
 /// Files of a process may not grow beyond so many bytes from now on: prlimit(1).

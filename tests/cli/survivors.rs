@@ -110,3 +110,46 @@ fn a_fork_needs_no_model_that_is_named() {
         server.wire.fork(proto::ForkRequest { session }).await.expect("forks");
     });
 }
+
+/// The same of a job that was not finished: what it lacks is computed where programs are allowed again, and it is told why not until then.
+#[test]
+fn programs_are_not_run_to_go_on() {
+    let text = "-- a cantilever\np1 = material {Youngsmodulus=160e9, density=2300, h=2u}\nanchor {node 'a'; material=p1}\n\
+                beam2d {node 'a', node 'b'; material=p1, l=100u, w=2u}\n";
+    block_on(async {
+        let mut server = Killed::start("--limit program_bytes=1M").await;
+        let bundle = Some(bundle_to_wire(&Bundle::from_text("a.net", text)));
+        let modes = proto::sweep_spec::Analysis::Modes(proto::SweepModes { count: 1, ..Default::default() });
+        let spec = proto::SweepSpec { analysis: Some(modes), ..Default::default() };
+        let task = Some(proto::submit_job_request::Task::Sweep(spec));
+        let request = proto::SubmitJobRequest { bundle, task, ..Default::default() };
+        let name = server.wire.submit_job(request).await.expect("starts").into_inner().name;
+        let first = ended(&mut server, &name).await;
+        assert_eq!(first.metadata.as_ref().map(|about| (about.rows, about.failed)), Some((1, 0)));
+        server.kill();
+        let id = name.strip_prefix("jobs/").expect("a name");
+        fs::remove_file(server.bench.path(&format!("states/jobs/{id}.end"))).expect("removed");
+        File::create(server.bench.path(&format!("states/jobs/{id}.rows"))).expect("cut");
+        server.revive("").await;
+        let refused = ended(&mut server, &name).await;
+        let Some(proto::job::Result::Error(error)) = refused.result else { panic!("{refused:?}") };
+        assert!(
+            error.code == Code::ResourceExhausted as i32 && error.message.starts_with("program_bytes"),
+            "{error:?}"
+        );
+        server.kill();
+        server.revive("--limit program_bytes=1M").await;
+        assert_eq!(ended(&mut server, &name).await.result, first.result);
+    });
+}
+
+/// A job as it ended.
+async fn ended(server: &mut Killed, name: &str) -> proto::Job {
+    let watch = proto::WatchJobRequest { name: name.to_owned() };
+    let mut watched = server.wire.watch_job(watch).await.expect("it is kept").into_inner();
+    let mut last = None;
+    while let Some(job) = watched.message().await.expect("goes on") {
+        last = Some(job);
+    }
+    last.filter(|job| job.done).expect("it ended")
+}

@@ -248,6 +248,15 @@ impl Job {
         });
     }
 
+    /// This server does not go on with it. That is not kept: another one may.
+    pub(super) fn refuse(&self, why: &Status) {
+        let end = self.ending(&self.standing(), why.code(), why.message().to_owned());
+        self.standing.send_modify(|standing| {
+            standing.state = state_of(end.code);
+            standing.end = Some(end);
+        });
+    }
+
     /// Comes back when nothing of it is computed any more.
     pub(super) async fn quiet(&self) {
         let over = |standing: &Standing| standing.end.is_some() || standing.suspended;

@@ -5,6 +5,7 @@ use super::super::connection::Connections;
 use super::super::convert::Violation;
 use super::super::ids::Ids;
 use super::super::limits::Limits;
+use super::super::models::check_size;
 use super::super::store::Store;
 use super::super::turns::client;
 use super::super::work::{allowance, of_client};
@@ -170,20 +171,14 @@ impl Jobs {
         file.open().map_err(|error| error.to_string())?.into_iter().for_each(|kept| rows.push(kept));
         let standing =
             Standing { state: State::Waiting, rows: rows.len(), failed: rows.failed(), ..Standing::default() };
-        let other = (asked.version != env!("CARGO_PKG_VERSION")).then(|| {
-            let text = format!(
-                "version {} began it and this is {}, whose numbers may differ; submit it again",
-                asked.version,
-                env!("CARGO_PKG_VERSION")
-            );
-            Status::failed_precondition(text)
-        });
-        let job = Job::new(id.clone(), (asked, spec, wire_options), budget, Some(file), (Some(rows), standing));
         let cancelled = end.filter(|end| end.code != Code::Ok as i32);
+        let why_not = goes_on(&asked, &bundle, limits).err().filter(|_| standing.rows < asked.points);
+        let job = Job::new(id.clone(), (asked, spec, wire_options), budget, Some(file), (Some(rows), standing));
         self.kept().insert(id, Arc::clone(&job));
-        match cancelled.map(|end| Status::new(Code::from_i32(end.code), end.message)).or(other) {
-            Some(why) => job.finish(Some(why)),
-            None => self.crews.start(&job, bundle, options),
+        match (cancelled, why_not) {
+            (Some(end), _) => job.finish(Some(Status::new(Code::from_i32(end.code), end.message))),
+            (None, Some(why)) => job.refuse(&why),
+            (None, None) => self.crews.start(&job, bundle, options),
         }
         Ok(())
     }
@@ -263,6 +258,18 @@ impl Jobs {
         old.iter().for_each(|job| self.delete(job));
         old.len()
     }
+}
+
+/// Whether this server may go on with a job that another one began.
+fn goes_on(asked: &Asked, bundle: &Bundle, limits: &Limits) -> Result<(), Status> {
+    let own = env!("CARGO_PKG_VERSION");
+    if asked.version != own {
+        let text =
+            format!("version {} began it and this is {own}, whose numbers may differ; submit it again", asked.version);
+        return Err(Status::failed_precondition(text));
+    }
+    // programs are not run where none are allowed, whoever allowed them before
+    check_size(bundle, limits)
 }
 
 /// Room for one more job of a client.
