@@ -5,7 +5,7 @@ help:
 	@echo "make demo    build, run the bank in ngspice here and through a server, compare, draw (out/demo)"
 	@echo "make test    everything that must hold: format, lints, tests, documentation, Python, ngspice decks"
 	@echo "make soak    a thousand sessions for a minute, ten thousand in turn, two hundred kills, a hundred killed clients, hundreds of failures of the network: what a server bears (some minutes)"
-	@echo "make fuzz    any text as netlist, any bytes as layout, ten minutes each (FUZZ_MINUTES)"
+	@echo "make fuzz    any text as netlist, any bytes as layout, as messages to a server and as snapshots, ten minutes each (FUZZ_MINUTES)"
 	@echo "make bench   measure (criterion)"
 	@echo "make pictures draw the scenes and the figures of docs/paper.md (docs/pictures)"
 	@echo "make charts  draw the charts of the README from counted work (docs/pictures); scripts/charts --time measures"
@@ -28,6 +28,7 @@ soak:
 fuzz:
 	@scripts/setup build
 	cargo test --release --workspace --test fuzz --test fuzz_layouts -- --ignored --nocapture --test-threads=1
+	cargo test --release --test service -- --ignored --nocapture --test-threads=1 fuzz::
 
 bench:
 	@scripts/setup build

@@ -38,13 +38,15 @@ use std::sync::OnceLock;
     bimorph sweep switch.net --param gap=1u:3u:201 --analysis pullin --shard 0/4 --out part0.csv\n  \
     bimorph sweep bank.net --param wh=1.8u:2.2u:16 --analysis tran --stop 100u --port heat=2.2 --signals yoke.y\n  \
     bimorph sweep bank.net --vary wh=normal:2u:0.05u --samples 1000 --seed 7 --analysis modes --out mc.csv\n  \
+    bimorph sweep bank.net --param wh=1.8u:2.2u:5 --param heat.v=0:3:31 --signals yoke.y --out hv.csv\n  \
     bimorph sweep bank.net --param wh=1.8u:2.2u:201 --out w.csv --resume\n  \
     bimorph sweep bank.net --param w=1.8u:2.2u:21 --to unix:///tmp/bimorph.sock")]
 pub(crate) struct Sweep {
     #[command(flatten)]
     model: ModelArgs,
 
-    /// An axis of the grid: LOW:HIGH:COUNT, ends included, or a list A,B,C. Repeatable; the last varies fastest
+    /// An axis of the grid: LOW:HIGH:COUNT, ends included, or a list A,B,C, of a netlist parameter or, as PORT.v, of the voltage of a
+    /// port. Repeatable; the last varies fastest
     #[arg(long = "param", value_name = "NAME=LOW:HIGH:COUNT", required_unless_present = "vary")]
     parameters: Vec<String>,
 

@@ -9,6 +9,7 @@
 use super::bodies::{Answering, Received};
 use super::gate::{Gate, OPEN, REQUEST_ID};
 use super::metrics::{self};
+use super::status;
 use super::turns::{CLIENT, Client};
 use std::convert::Infallible;
 use std::future::Future;
@@ -83,6 +84,7 @@ where
         let answer = CLIENT.scope(client, self.service.call(request)).instrument(span.clone());
         Box::pin(async move {
             let mut response = answer.await?;
+            status::say_undecodable(response.headers_mut());
             response.headers_mut().insert(REQUEST_ID, id);
             call.hear(response.headers());
             Ok(response.map(|body| Body::new(Answering { body, call, span })))

@@ -9,6 +9,7 @@ use crate::budget::Stopped;
 use crate::compile::CompileError;
 use crate::device::DeviceError;
 use crate::netlist::{Diagnostics, Severity};
+use tonic::codegen::http::HeaderMap;
 use tonic::{Code, Status};
 use tonic_types::{ErrorDetails, StatusExt};
 
@@ -147,6 +148,31 @@ fn cut(mut text: String, most: usize) -> String {
         text.push_str(" …");
     }
     text
+}
+
+/// What `tonic` begins with where a request is no message of the protocol, and calls a fault of the server.
+const UNDECODABLE: &str = "failed to decode Protobuf message";
+
+/// A request that is no message of the protocol is the client's fault: INVALID_ARGUMENT.
+pub(super) fn say_undecodable(headers: &mut HeaderMap) {
+    if headers.get("grpc-status").is_none_or(|code| code != "13") {
+        return;
+    }
+    let told = Status::from_header_map(headers).filter(|status| status.message().starts_with(UNDECODABLE));
+    if let Some(told) = told {
+        let _ = undecodable(&told).add_header(headers);
+    }
+}
+
+/// The same for a message of a stream.
+pub(super) fn undecodable(told: &Status) -> Status {
+    match told.message().strip_prefix(UNDECODABLE) {
+        Some(why) if told.code() == Code::Internal => {
+            let text = format!("expected a message of the protocol (proto/bimorph), got other bytes{why}");
+            Status::invalid_argument(text)
+        }
+        _ => told.clone(),
+    }
 }
 
 #[cfg(test)]

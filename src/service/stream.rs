@@ -128,7 +128,7 @@ impl Stream for TrialStream {
                     Some(Ok(request)) => this.take(request),
                     Some(Err(error)) => {
                         this.finished = true;
-                        return Poll::Ready(Some(Err(error)));
+                        return Poll::Ready(Some(Err(status::undecodable(&error))));
                     }
                     None => {
                         this.finished = true;

@@ -2,6 +2,7 @@
 //! one of them.
 
 mod lanes;
+mod ports;
 mod together;
 
 use bimorph::analysis::transient::{TransientOptions, transient};

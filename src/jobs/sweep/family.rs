@@ -6,7 +6,7 @@
 //! the drawing has other beams) searches its own, as a point alone does. Which mesh a point gets depends on the
 //! grid and on the point alone, not on other points, on shards or on threads.
 
-use super::spec::{SweepSpec, at};
+use super::spec::{SweepAnalysis, SweepSpec, at};
 use crate::analysis::AnalysisError;
 use crate::analysis::mesh::given::{Judged, judged};
 use crate::analysis::mesh::{self, Request};
@@ -15,6 +15,7 @@ use crate::discretize::DiscretizeError;
 use crate::netlist::{Setting, Source};
 use crate::refine::model_order::ModelOrder;
 use crate::structure::Beam;
+use std::borrow::Cow;
 use std::sync::OnceLock;
 
 /// Shares of the tolerance for which meshes are searched, from coarse to fine.
@@ -25,20 +26,23 @@ pub(super) struct Family<'a> {
     spec: &'a SweepSpec,
     source: &'a Source,
     options: &'a CompileOptions,
+    /// The analysis at the middle of the grid, for which meshes are searched.
+    analysis: Cow<'a, SweepAnalysis>,
     first: OnceLock<Option<Compiled>>,
     meshes: [OnceLock<Option<Vec<usize>>>; SHARES.len()],
 }
 
 impl<'a> Family<'a> {
     pub(super) fn new(spec: &'a SweepSpec, source: &'a Source, options: &'a CompileOptions) -> Self {
-        Self { spec, source, options, first: OnceLock::new(), meshes: Default::default() }
+        let analysis = spec.analysis_at(&middle(spec));
+        Self { spec, source, options, analysis, first: OnceLock::new(), meshes: Default::default() }
     }
 
     /// The result of a point on the first shared mesh that holds for it; none where it needs its own.
     pub(super) fn solve(&self, drawn: &Drawn, request: &Request<'_>) -> Result<Option<Judged>, AnalysisError> {
         let Some(first) = self.like(drawn) else { return Ok(None) };
         for (mesh, share) in self.meshes.iter().zip(SHARES) {
-            let Some(segments) = mesh.get_or_init(|| search(first, share, request)) else { continue };
+            let Some(segments) = mesh.get_or_init(|| self.search(first, share)) else { continue };
             let order = ModelOrder { segments: segments.clone(), estimated_error: None, modes_in_band: 0, passes: 0 };
             let refused = |error: DiscretizeError| AnalysisError::NotConverged { detail: error.to_string() };
             let judged = judged(&drawn.clone().on(order).map_err(refused)?, request)?;
@@ -50,9 +54,9 @@ impl<'a> Family<'a> {
     }
 
     /// The variant that meshes are searched for and the first of these meshes, where they fit this one.
-    pub(super) fn first_mesh(&self, drawn: &Drawn, request: &Request<'_>) -> Option<(&Compiled, &Vec<usize>)> {
+    pub(super) fn first_mesh(&self, drawn: &Drawn) -> Option<(&Compiled, &Vec<usize>)> {
         let first = self.like(drawn)?;
-        let segments = self.meshes[0].get_or_init(|| search(first, SHARES[0], request)).as_ref()?;
+        let segments = self.meshes[0].get_or_init(|| self.search(first, SHARES[0])).as_ref()?;
         Some((first, segments))
     }
 
@@ -71,19 +75,19 @@ impl<'a> Family<'a> {
         alike(&first.structure.beams, &drawn.structure.beams).then_some(first)
     }
 
+    /// The mesh that holds a share of the tolerance for one variant.
+    fn search(&self, first: &Compiled, share: f64) -> Option<Vec<usize>> {
+        let mut sharper = first.clone();
+        sharper.options.tol *= share;
+        let order = mesh::order(&sharper, &self.analysis.request()?).ok()?;
+        order.estimated_error.is_some_and(|error| error <= sharper.options.tol).then_some(order.segments)
+    }
+
     /// The middle of the grid.
     fn middle(&self) -> Option<Compiled> {
         let options = at(self.options, &middle(self.spec));
         draw(self.source, &options).ok()?.compile().ok()
     }
-}
-
-/// The mesh that holds a share of the tolerance for one variant.
-fn search(first: &Compiled, share: f64, request: &Request<'_>) -> Option<Vec<usize>> {
-    let mut sharper = first.clone();
-    sharper.options.tol *= share;
-    let order = mesh::order(&sharper, request).ok()?;
-    order.estimated_error.is_some_and(|error| error <= sharper.options.tol).then_some(order.segments)
 }
 
 /// The middle of a grid, with the median of what is drawn.

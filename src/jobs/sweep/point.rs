@@ -2,7 +2,7 @@
 
 use super::error::SweepError;
 use super::family::Family;
-use super::spec::{SweepAnalysis, SweepSpec, at};
+use super::spec::{SweepAnalysis, SweepSpec, VOLTS, at};
 use crate::analysis::mesh::given::{Answer, Judged, judged, searched};
 use crate::analysis::mesh::{self, Request};
 use crate::analysis::signal::Signal;
@@ -92,6 +92,11 @@ pub(super) fn check_names(spec: &SweepSpec, source: &Source, options: &CompileOp
         // the points will say it
         Err(_) => return Ok(()),
     };
+    let ports = || drawn.structure.ports.iter().map(|port| port.name.as_str());
+    if let Some(none) = spec.ports().find(|name| !ports().any(|port| port == *name)) {
+        let known = ports().map(|port| format!("{port}{VOLTS}")).collect::<Vec<_>>().join(", ");
+        return refused("parameters", format!("voltages of ports ({known})"), format!("\"{none}{VOLTS}\""));
+    }
     let outputs = match &spec.analysis {
         SweepAnalysis::Static { outputs, .. } => outputs,
         SweepAnalysis::Transient { outputs, .. } => {
@@ -134,16 +139,12 @@ fn solve(
 ) -> Result<Found, String> {
     let drawn = draw(source, &at(options, settings)).map_err(|error| brief(&error))?;
     let said = |error: AnalysisError| error.to_string();
-    let request = match &spec.analysis {
-        SweepAnalysis::Static { voltages, .. } => Request::Static { voltages },
-        SweepAnalysis::Modes { count, voltages } => {
-            // where it does not compile the point says so below
-            budget::modes(*count, || drawn.clone().compile().map_or(0, |compiled| compiled.unknowns()));
-            Request::Modes { count: *count, voltages }
-        }
-        SweepAnalysis::PullIn { port, max } => Request::PullIn { port: port.as_deref(), max: *max },
-        SweepAnalysis::Transient { .. } => return Err("a transient is no request for a mesh".to_owned()),
-    };
+    let analysis = spec.analysis_at(settings);
+    let request = analysis.request().ok_or("a transient is no request for a mesh")?;
+    if let Request::Modes { count, .. } = request {
+        // where it does not compile the point says so below
+        budget::modes(count, || drawn.clone().compile().map_or(0, |compiled| compiled.unknowns()));
+    }
     let shared = family.solve(&drawn, &request).map_err(said)?;
     let judged = match shared {
         Some(judged) => judged,

@@ -2,9 +2,14 @@
 
 use super::error::{SweepError, bad};
 use super::samples::Samples;
+use crate::analysis::mesh::Request;
 use crate::compile::CompileOptions;
 use crate::netlist::Setting;
+use std::borrow::Cow;
 use std::collections::HashSet;
+
+/// What stands behind the name of a port in the name of an axis of its voltages: `heat.v`. No netlist parameter has a point in its name.
+pub(super) const VOLTS: &str = ".v";
 
 /// What to sweep.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,7 +29,7 @@ pub struct SweepSpec {
 /// One axis of the grid.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SweepParameter {
-    /// A netlist parameter.
+    /// A netlist parameter, or a port with [`VOLTS`] behind it: its voltage [V].
     pub name: String,
     /// The values it takes, in order. SI.
     pub values: Vec<Setting>,
@@ -64,6 +69,37 @@ pub enum SweepAnalysis {
         /// Port voltages held during the run, by name [V].
         voltages: Vec<(String, f64)>,
     },
+}
+
+impl SweepAnalysis {
+    /// Voltages at which ports are held; none where there are none to hold.
+    fn voltages(&self) -> Option<&Vec<(String, f64)>> {
+        match self {
+            Self::Static { voltages, .. } | Self::Modes { voltages, .. } | Self::Transient { voltages, .. } => {
+                Some(voltages)
+            }
+            Self::PullIn { .. } => None,
+        }
+    }
+
+    fn voltages_mut(&mut self) -> Option<&mut Vec<(String, f64)>> {
+        match self {
+            Self::Static { voltages, .. } | Self::Modes { voltages, .. } | Self::Transient { voltages, .. } => {
+                Some(voltages)
+            }
+            Self::PullIn { .. } => None,
+        }
+    }
+
+    /// What it asks of a mesh; none for a transient.
+    pub(super) fn request(&self) -> Option<Request<'_>> {
+        match self {
+            Self::Static { voltages, .. } => Some(Request::Static { voltages }),
+            Self::Modes { count, voltages } => Some(Request::Modes { count: *count, voltages }),
+            Self::PullIn { port, max } => Some(Request::PullIn { port: port.as_deref(), max: *max }),
+            Self::Transient { .. } => None,
+        }
+    }
 }
 
 /// One of `count` equal parts of a grid: the points whose number modulo `count` is `index`.
@@ -123,7 +159,48 @@ impl SweepSpec {
                 return Err(bad("parameters".into(), "each name once", &format!("\"{name}\" twice")));
             }
         }
+        self.check_ports()?;
         Ok((index..self.grid_points()?).step_by(count).collect())
+    }
+
+    /// Ports whose voltages vary.
+    pub(super) fn ports(&self) -> impl Iterator<Item = &str> {
+        self.names().filter_map(|name| name.strip_suffix(VOLTS))
+    }
+
+    /// Refuses voltages that are none, or are said twice.
+    fn check_ports(&self) -> Result<(), SweepError> {
+        for port in self.ports() {
+            let what = || format!("parameter \"{port}{VOLTS}\"");
+            let Some(held) = self.analysis.voltages() else {
+                return Err(bad(
+                    what(),
+                    "a netlist parameter: pull-in raises a port by itself",
+                    "the voltage of a port",
+                ));
+            };
+            if held.iter().any(|(name, _)| name == port) {
+                return Err(bad(what(), "a port that is not held at a voltage besides", &format!("\"{port}\" twice")));
+            }
+        }
+        let words = |axis: &&SweepParameter| axis.values.iter().any(|value| matches!(value, Setting::Text(_)));
+        match self.parameters.iter().filter(|axis| axis.name.ends_with(VOLTS)).find(words) {
+            Some(axis) => Err(bad(format!("parameter \"{}\"", axis.name), "voltages [V]", "a word")),
+            None => Ok(()),
+        }
+    }
+
+    /// The analysis at a point: with the voltages that vary, besides those that are held.
+    pub(super) fn analysis_at(&self, settings: &[(String, Setting)]) -> Cow<'_, SweepAnalysis> {
+        let mut analysis = Cow::Borrowed(&self.analysis);
+        for (name, value) in settings {
+            if let (Some(port), Setting::Number(volts)) = (name.strip_suffix(VOLTS), value)
+                && let Some(held) = analysis.to_mut().voltages_mut()
+            {
+                held.push((port.to_owned(), *volts));
+            }
+        }
+        analysis
     }
 
     /// Values of every parameter at one point of the grid.
@@ -154,6 +231,6 @@ pub(super) fn at(options: &CompileOptions, settings: &[(String, Setting)]) -> Co
     let mut options = options.clone();
     let swept: HashSet<&str> = settings.iter().map(|(name, _)| name.as_str()).collect();
     options.set.retain(|(name, _)| !swept.contains(name.as_str()));
-    options.set.extend_from_slice(settings);
+    options.set.extend(settings.iter().filter(|(name, _)| !name.ends_with(VOLTS)).cloned());
     options
 }

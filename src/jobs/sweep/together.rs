@@ -7,7 +7,7 @@
 
 use super::family::Family;
 use super::point::{self, Found, Outcome, brief};
-use super::spec::{SweepAnalysis, SweepSpec, at};
+use super::spec::{SweepSpec, at};
 use super::transient::guarded;
 use crate::analysis::PortVoltages;
 use crate::analysis::mesh::Request;
@@ -135,11 +135,8 @@ impl<'a> Together<'a> {
         if !self.family.shares() || matches!(self.lanes.get(), Some(None)) {
             return none();
         }
-        let request = match &self.spec.analysis {
-            SweepAnalysis::Static { voltages, .. } => Request::Static { voltages },
-            SweepAnalysis::Modes { count, voltages } => Request::Modes { count: *count, voltages },
-            _ => return none(),
-        };
+        let request = self.spec.analysis.request().filter(|request| !matches!(request, Request::PullIn { .. }));
+        let Some(request) = request.filter(|_| self.spec.ports().next().is_none()) else { return none() };
         let prepare = |&number: &usize| guarded(budget, &mut || self.prepare(number, &request)).ok().flatten();
         let prepared: Vec<Option<Compiled>> = numbers.iter().map(prepare).collect();
         let variants: Vec<&Compiled> = prepared.iter().flatten().collect();
@@ -156,7 +153,7 @@ impl<'a> Together<'a> {
     /// A point on the first mesh that points share, where it has a part in it.
     fn prepare(&self, number: usize, request: &Request<'_>) -> Result<Option<Compiled>, String> {
         let drawn = draw(self.source, &at(self.options, &self.spec.settings(number))).map_err(|error| brief(&error))?;
-        let Some((first, segments)) = self.family.first_mesh(&drawn, request) else { return Ok(None) };
+        let Some((first, segments)) = self.family.first_mesh(&drawn) else { return Ok(None) };
         let order = ModelOrder { segments: segments.clone(), estimated_error: None, modes_in_band: 0, passes: 0 };
         let lanes = self.lanes.get_or_init(|| Lanes::new(&first.with_order(order.clone()).ok()?, request));
         if lanes.is_none() {

@@ -69,7 +69,6 @@ impl<'a> Transients<'a> {
         budget: Option<&Budget>,
         finished: &(dyn Fn(Option<&Outcome>) -> bool + Sync),
     ) -> Option<Vec<Outcome>> {
-        let options = self.transient();
         let within = |job: &mut dyn FnMut() -> Result<Found, String>| guarded(budget, job);
         let go_on = || finished(None);
         let prepare = |&number: &usize| guarded(budget, &mut || self.prepare(&self.spec.settings(number), &go_on));
@@ -77,23 +76,30 @@ impl<'a> Transients<'a> {
         let variants: Vec<(usize, &Compiled)> =
             prepared.iter().enumerate().filter_map(|(k, p)| Some((k, &p.as_ref().ok()?.compiled))).collect();
         let compiled: Vec<&Compiled> = variants.iter().map(|(_, compiled)| *compiled).collect();
-        let side_by_side = guarded(budget, &mut || {
-            side_by_side::ends(&compiled, &options, &mut || finished(None)).map_err(|error| error.to_string())
+        // lanes have one voltage for all
+        let same = self.spec.ports().next().is_none();
+        let side_by_side = same.then(|| {
+            let options = self.transient(&[]);
+            guarded(budget, &mut || {
+                side_by_side::ends(&compiled, &options, &mut || finished(None)).map_err(|error| error.to_string())
+            })
         });
         let mut ends: Vec<Option<RunEnd>> = vec![None; numbers.len()];
-        if let Ok((found, _)) = side_by_side {
+        if let Some(Ok((found, _))) = side_by_side {
             for ((k, _), end) in variants.iter().zip(found) {
                 ends[*k] = end;
             }
         }
         let mut outcomes = Vec::with_capacity(numbers.len());
         for ((&number, prepared), end) in numbers.iter().zip(&prepared).zip(ends) {
+            let settings = self.spec.settings(number);
+            let options = self.transient(&settings);
             let values = match (prepared, end) {
                 (Err(error), _) => Err(error.clone()),
-                (Ok(point), Some(end)) => self.found(point, end),
-                (Ok(point), None) => within(&mut || self.found(point, alone(&point.compiled, &options)?)),
+                (Ok(point), Some(end)) => self.found(point, &options, end),
+                (Ok(point), None) => within(&mut || self.found(point, &options, alone(&point.compiled, &options)?)),
             };
-            let parameters = self.spec.settings(number).into_iter().map(|(_, value)| value).collect();
+            let parameters = settings.into_iter().map(|(_, value)| value).collect();
             let outcome = Outcome { number, parameters, values };
             if !finished(Some(&outcome)) {
                 return None;
@@ -103,8 +109,9 @@ impl<'a> Transients<'a> {
         Some(outcomes)
     }
 
-    fn transient(&self) -> TransientOptions<'static> {
-        let SweepAnalysis::Transient { stop, outputs, voltages } = &self.spec.analysis else {
+    /// The run of a point.
+    fn transient(&self, settings: &[(String, Setting)]) -> TransientOptions<'static> {
+        let SweepAnalysis::Transient { stop, outputs, voltages } = &*self.spec.analysis_at(settings) else {
             return TransientOptions::default();
         };
         TransientOptions {
@@ -120,6 +127,7 @@ impl<'a> Transients<'a> {
     /// A point on its mesh.
     fn prepare(&self, settings: &[(String, Setting)], go_on: &dyn Fn() -> bool) -> Result<Prepared, String> {
         let drawn = draw(self.source, &at(self.options, settings)).map_err(|error| brief(&error))?;
+        let options = self.transient(settings);
         let shared = if self.spec.grid_points().is_ok_and(|n| n > 1) {
             self.mesh.get_or_init(|| self.search(go_on)).as_ref()
         } else {
@@ -128,31 +136,24 @@ impl<'a> Transients<'a> {
         match shared.filter(|shared| alike(&shared.beams, &drawn.structure.beams)) {
             Some(shared) => {
                 let compiled = drawn.on(shared.order.clone()).map_err(|error| error.to_string())?;
-                Ok(self.prepared(compiled, (shared.step_error, "in the middle of the grid")))
+                Ok(prepared(compiled, &options, (shared.step_error, "in the middle of the grid")))
             }
             None => {
                 let compiled = drawn.compile().map_err(|error| brief(&error))?;
-                let (compiled, _) =
-                    mesh::fitted_in_time(&compiled, &self.transient()).map_err(|error| error.to_string())?;
-                let step_error = self.steps(&compiled, go_on);
-                Ok(self.prepared(compiled, (step_error, "by the end of the run")))
+                let (compiled, _) = mesh::fitted_in_time(&compiled, &options).map_err(|error| error.to_string())?;
+                let step_error = steps(&compiled, options.clone(), go_on);
+                Ok(prepared(compiled, &options, (step_error, "by the end of the run")))
             }
         }
     }
 
-    fn prepared(&self, compiled: Compiled, step_error: (Option<f64>, &'static str)) -> Prepared {
-        let told = mesh::told_of_run(&compiled, None, &self.transient().voltages);
-        Prepared { step_error, told: told.iter().map(|d| format!("{}: {}", d.code, d.message)).collect(), compiled }
-    }
-
     /// The mesh that is fine enough at every probe.
     fn search(&self, go_on: &dyn Fn() -> bool) -> Option<Shared> {
-        let options = self.transient();
         let mut shared: Option<Shared> = None;
         for settings in probes(self.spec) {
             let drawn = draw(self.source, &at(self.options, &settings));
             let Some(compiled) = drawn.ok().and_then(|drawn| drawn.compile().ok()) else { continue };
-            let Ok(order) = mesh::order_in_time(&compiled, &options) else { continue };
+            let Ok(order) = mesh::order_in_time(&compiled, &self.transient(&settings)) else { continue };
             match &mut shared {
                 None => shared = Some(Shared { beams: compiled.structure.beams.clone(), order, step_error: None }),
                 Some(shared) if alike(&shared.beams, &compiled.structure.beams) => {
@@ -166,22 +167,16 @@ impl<'a> Transients<'a> {
             }
         }
         let mut shared = shared?;
-        let drawn = draw(self.source, &at(self.options, &middle(self.spec))).ok();
+        let settings = middle(self.spec);
+        let drawn = draw(self.source, &at(self.options, &settings)).ok();
         let middle = drawn.filter(|drawn| alike(&shared.beams, &drawn.structure.beams));
         let middle = middle.and_then(|drawn| drawn.on(shared.order.clone()).ok());
-        shared.step_error = middle.and_then(|compiled| self.steps(&compiled, go_on));
+        shared.step_error = middle.and_then(|compiled| steps(&compiled, self.transient(&settings), go_on));
         Some(shared)
     }
 
-    /// How far the steps of a run of this variant may be off.
-    fn steps(&self, compiled: &Compiled, go_on: &dyn Fn() -> bool) -> Option<f64> {
-        let options = TransientOptions { points: JUDGED, ..self.transient() };
-        step_error::step_error(&options, compiled, &mut |_| go_on())
-    }
-
-    fn found(&self, point: &Prepared, end: RunEnd) -> Result<Found, String> {
+    fn found(&self, point: &Prepared, options: &TransientOptions<'_>, end: RunEnd) -> Result<Found, String> {
         let Prepared { compiled, step_error: (step_error, place), told } = point;
-        let options = self.transient();
         let mut values = Vec::with_capacity(end.values.len());
         for (name, value) in options.signals.iter().zip(end.values) {
             if !value.is_finite() {
@@ -194,13 +189,25 @@ impl<'a> Transients<'a> {
         let beyond = mesh::beyond(self.options.tol, estimated_error);
         let beyond = beyond.map(|message| format!("{}: {message}", mesh::WARNING));
         let steps = match step_error {
-            Some(error) => step_error::beyond(&options, *error, place),
-            None => Some(step_error::unknown(&options)),
+            Some(error) => step_error::beyond(options, *error, place),
+            None => Some(step_error::unknown(options)),
         };
         let told = told.iter().cloned();
         let warnings: Vec<String> = beyond.into_iter().chain(told).chain(steps).chain(end.warnings).collect();
         Ok(Found { values, estimated_error, warning: warnings.join("; ") })
     }
+}
+
+/// A point on its mesh, with what its run leaves out.
+fn prepared(compiled: Compiled, options: &TransientOptions<'_>, step_error: (Option<f64>, &'static str)) -> Prepared {
+    let told = mesh::told_of_run(&compiled, None, &options.voltages);
+    Prepared { step_error, told: told.iter().map(|d| format!("{}: {}", d.code, d.message)).collect(), compiled }
+}
+
+/// How far the steps of a run of this variant may be off.
+fn steps(compiled: &Compiled, run: TransientOptions<'_>, go_on: &dyn Fn() -> bool) -> Option<f64> {
+    let options = TransientOptions { points: JUDGED, ..run };
+    step_error::step_error(&options, compiled, &mut |_| go_on())
 }
 
 /// A run of its own.

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     import pandas
+    import pyarrow
     from matplotlib.axes import Axes
 
 _SHOWN = 20
@@ -23,6 +24,18 @@ def frame(columns: Mapping[str, Any], index: tuple[str, Any] | None = None) -> p
     if index is None:
         return pandas.DataFrame(dict(columns))
     return pandas.DataFrame(dict(columns), index=pandas.Index(index[1], name=index[0]))
+
+
+def arrow(columns: Mapping[str, Sequence[Any]], units: Mapping[str, str], about: Mapping[str, str]) -> pyarrow.Table:
+    """A table of Arrow with units in the metadata of fields, and what else there is to say in that of the table."""
+    try:
+        import pyarrow
+    except ImportError:
+        raise ImportError("to_arrow() needs pyarrow: pip install pyarrow") from None
+    arrays = {name: pyarrow.array(values) for name, values in columns.items()}
+    unit = {name: {"unit": units[name]} if name in units else None for name in arrays}
+    fields = [pyarrow.field(name, array.type, metadata=unit[name]) for name, array in arrays.items()]
+    return pyarrow.table(list(arrays.values()), schema=pyarrow.schema(fields, metadata=dict(about)))
 
 
 def axes(given: Axes | None) -> Axes:

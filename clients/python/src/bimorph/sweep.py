@@ -14,6 +14,7 @@ from .v1 import analysis_pb2, model_pb2, sweep_pb2
 
 if TYPE_CHECKING:
     import pandas
+    import pyarrow
 
 
 @dataclass(frozen=True)
@@ -183,16 +184,29 @@ class Table:
         ``warning`` and ``error``. A result that has the name of a parameter is called with its unit, ``f1 [Hz]``.
 
         Raises :class:`ValueError` for a parameter with one of the three names."""
+        return showing.frame(self._columns(math.nan), ("point", [row.point for row in self.rows]))
+
+    def to_arrow(self) -> pyarrow.Table:
+        """The columns of :meth:`to_pandas` behind the number of the point, null where a point has no such number; the unit of a result stands
+        in the metadata of its field, the number of columns that are parameters in that of the table. For Parquet:
+        ``pyarrow.parquet.write_table(table.to_arrow(), "mc.parquet")``.
+
+        Raises :class:`ValueError` for a parameter with one of the names of the last columns."""
+        units = {(self._heading(name) if name in self.parameters else name): self.units[name] for name in self.results}
+        columns = {"point": [row.point for row in self.rows], **self._columns(None)}
+        return showing.arrow(columns, {**units, "estimated_error": "1"}, {"parameters": str(len(self.parameters))})
+
+    def _columns(self, none: float | None) -> dict[str, list[Any]]:
+        """Every column but the number of the point; ``none`` where a point has no such number."""
         last = ("estimated_error", "warning", "error")
-        taken = [name for name in self.parameters if name in last]
+        taken = [name for name in self.parameters if name in ("point", *last)]
         if taken:
             raise ValueError(f"parameter {taken[0]!r} has the name of another column: rename it, or read `rows`")
         columns: dict[str, list[Any]] = {name: [row.parameters[name] for row in self.rows] for name in self.parameters}
         for name in self.results:
             called = self._heading(name) if name in self.parameters else name
-            columns[called] = [row.results.get(name, math.nan) for row in self.rows]
-        columns |= {name: [getattr(row, name) for row in self.rows] for name in last}
-        return showing.frame(columns, ("point", [row.point for row in self.rows]))
+            columns[called] = [row.results.get(name, none) for row in self.rows]
+        return columns | {name: [getattr(row, name) for row in self.rows] for name in last}
 
     def __repr__(self) -> str:
         failed = sum(1 for row in self.rows if row.error)
