@@ -140,10 +140,11 @@ impl Sweep {
         let followed = follow(&mut client, uri, &name, &bar);
         bar.finish_and_clear();
         let (table, job) = followed?;
-        let written = match failure(uri, &job) {
-            Some(failure) => Err(failure),
-            None => self.deliver(&table, spec, bundle, options).map(drop),
-        };
+        if let Some(failure) = failure(uri, &job) {
+            eprintln!("the rows that it has stay on the server: `bimorph jobs delete {name} --to {uri}` forgets them");
+            return Err(failure);
+        }
+        let written = self.deliver(&table, spec, bundle, options).map(drop);
         // a table that could not be written is still there
         if let Err(error @ (Failure::Write { .. } | Failure::Stdout(_))) = written {
             eprintln!("its rows are on the server: `bimorph jobs attach {name} --to {uri}` has them");

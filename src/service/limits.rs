@@ -92,7 +92,8 @@ limits! {
     /// Most points of one sweep.
     sweep_points: Count = 1_000_000;
 
-    /// Most jobs kept, running or finished. All that run share the processors, in turns of their clients.
+    /// Most jobs kept, running or finished; with a folder `state_dir` most that run or wait, and 64 times as many in all. All that run
+    /// share the processors, in turns of their clients.
     sweeps: Count = 16;
 
     /// Most jobs of one client kept, running or finished; 0: any.

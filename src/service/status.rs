@@ -150,29 +150,34 @@ fn cut(mut text: String, most: usize) -> String {
     text
 }
 
-/// What `tonic` begins with where a request is no message of the protocol, and calls a fault of the server.
-const UNDECODABLE: &str = "failed to decode Protobuf message";
+/// What `tonic` begins with where bytes are no message of the protocol, or none are there, and calls a fault of the server.
+const UNDECODABLE: [&str; 4] = [
+    "failed to decode Protobuf message",
+    "Missing request message",
+    "protocol error: received message with",
+    "Unexpected EOF decoding stream",
+];
 
 /// A request that is no message of the protocol is the client's fault: INVALID_ARGUMENT.
 pub(super) fn say_undecodable(headers: &mut HeaderMap) {
     if headers.get("grpc-status").is_none_or(|code| code != "13") {
         return;
     }
-    let told = Status::from_header_map(headers).filter(|status| status.message().starts_with(UNDECODABLE));
-    if let Some(told) = told {
+    if let Some(told) = Status::from_header_map(headers) {
         let _ = undecodable(&told).add_header(headers);
     }
 }
 
 /// The same for a message of a stream.
 pub(super) fn undecodable(told: &Status) -> Status {
-    match told.message().strip_prefix(UNDECODABLE) {
-        Some(why) if told.code() == Code::Internal => {
-            let text = format!("expected a message of the protocol (proto/bimorph), got other bytes{why}");
-            Status::invalid_argument(text)
-        }
-        _ => told.clone(),
+    let text = told.message();
+    if told.code() == Code::Internal && UNDECODABLE.iter().any(|begin| text.starts_with(begin)) {
+        return Status::invalid_argument(cut(
+            format!("expected messages of the protocol (proto/bimorph): {text}"),
+            MESSAGE_BYTES,
+        ));
     }
+    told.clone()
 }
 
 #[cfg(test)]

@@ -158,6 +158,10 @@ fn messages(seed: u64, mut done: impl FnMut(usize) -> bool) {
             let not_here = answer.as_ref().is_err_and(|status| status.code() == Code::NotFound);
             assert!(answer.is_ok() || not_here, "{call}: {answer:?}");
         }
+        for none in [vec![], vec![vec![0xff]]] {
+            let status = answered(&channel, "Describe", none).await.expect_err("no message of the protocol");
+            assert_eq!(status.code(), Code::InvalidArgument, "{status:?}");
+        }
         while !done(count) {
             let (call, first) = &sound[maker.below(sound.len())];
             let other = sound[maker.below(sound.len())].1.clone();

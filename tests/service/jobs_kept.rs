@@ -139,14 +139,46 @@ fn a_journal_that_was_cut_goes_on() {
         });
         running.stop().expect("stops");
     }
-    // a journal that is damaged within is a job's own trouble: the others are served
+    // a file that cannot be understood is its job's own trouble: the others are served, and nothing of it is taken away
+    let sound = std::fs::read(file(&jobs, id, "job")).expect("what was asked");
     std::fs::write(file(&jobs, id, "job"), b"damaged").expect("written");
-    let running = server(folder.path());
+    let mut running = server(folder.path());
     block_on(async {
         let mut wire = running.client().await;
         let gone = wire.get_job(proto::GetJobRequest { name: name.clone() }).await.expect_err("is no job");
         assert_eq!(gone.code(), Code::NotFound);
         assert!(wire.submit_job(request(2)).await.is_ok());
+    });
+    running.stop().expect("stops");
+    std::fs::write(file(&jobs, id, "job"), sound).expect("written");
+    let running = server(folder.path());
+    block_on(async {
+        let mut wire = running.client().await;
+        let (rows, _) = rest(&mut fetch(&mut wire, &name, 0).await.expect("a stream"), 0).await.expect("ends");
+        assert_eq!(rows.len(), whole.len(), "its rows are there again");
+    });
+}
+
+/// Jobs that have ended in a folder are in nobody's way, and have their rows whenever they are asked for, though no memory holds them.
+#[test]
+fn ended_jobs_make_room() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let running = start_kept(folder.path(), Limits { sweeps: 1, ..Limits::default() }, LOCAL);
+    block_on(async {
+        let mut wire = running.client().await;
+        let mut names = Vec::new();
+        for points in 2..6 {
+            let name = wire.submit_job(request(points)).await.expect("there is room").into_inner().name;
+            ended(&mut wire, &name).await;
+            names.push(name);
+        }
+        for _ in 0..2 {
+            for (name, points) in names.iter().zip(2..6) {
+                let (rows, last) =
+                    rest(&mut fetch(&mut wire, name, 0).await.expect("a stream"), 0).await.expect("ends");
+                assert_eq!((rows.len(), meta(&last.expect("told")).state()), (points, State::Done));
+            }
+        }
     });
 }
 

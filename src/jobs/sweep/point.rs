@@ -16,6 +16,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// What columns of a static sweep are called.
 const OUTPUTS: &str = "NODE.x, NODE.y, NODE.rz, BEAM.T, PORT.i or PORT.q";
+/// Ports that a refusal names.
+const MOST_TOLD: usize = 20;
 /// The code of the diagnostic for a setting that names no parameter.
 const NO_PARAMETER: &str = "E048";
 
@@ -93,8 +95,9 @@ pub(super) fn check_names(spec: &SweepSpec, source: &Source, options: &CompileOp
         Err(_) => return Ok(()),
     };
     let ports = || drawn.structure.ports.iter().map(|port| port.name.as_str());
-    if let Some(none) = spec.ports().find(|name| !ports().any(|port| port == *name)) {
-        let known = ports().map(|port| format!("{port}{VOLTS}")).collect::<Vec<_>>().join(", ");
+    let names: HashSet<&str> = ports().collect();
+    if let Some(none) = spec.ports().find(|name| !names.contains(name)) {
+        let known = ports().take(MOST_TOLD).map(|port| format!("{port}{VOLTS}")).collect::<Vec<_>>().join(", ");
         return refused("parameters", format!("voltages of ports ({known})"), format!("\"{none}{VOLTS}\""));
     }
     let outputs = match &spec.analysis {

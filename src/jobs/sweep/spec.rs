@@ -29,7 +29,7 @@ pub struct SweepSpec {
 /// One axis of the grid.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SweepParameter {
-    /// A netlist parameter, or a port with [`VOLTS`] behind it: its voltage [V].
+    /// A netlist parameter, or a port with `.v` behind it: its voltage [V].
     pub name: String,
     /// The values it takes, in order. SI.
     pub values: Vec<Setting>,
@@ -170,16 +170,18 @@ impl SweepSpec {
 
     /// Refuses voltages that are none, or are said twice.
     fn check_ports(&self) -> Result<(), SweepError> {
+        let held = self.analysis.voltages();
+        let names: HashSet<&str> = held.into_iter().flatten().map(|(name, _)| name.as_str()).collect();
         for port in self.ports() {
             let what = || format!("parameter \"{port}{VOLTS}\"");
-            let Some(held) = self.analysis.voltages() else {
+            if held.is_none() {
                 return Err(bad(
                     what(),
                     "a netlist parameter: pull-in raises a port by itself",
                     "the voltage of a port",
                 ));
-            };
-            if held.iter().any(|(name, _)| name == port) {
+            }
+            if names.contains(port) {
                 return Err(bad(what(), "a port that is not held at a voltage besides", &format!("\"{port}\" twice")));
             }
         }

@@ -90,7 +90,10 @@ impl Asked {
         let mut hash = Fnv::default();
         hash.model(bundle, options);
         self.model = format!("{:032x}", hash.value());
-        hash.text(&self.version);
+        if self.share {
+            // a request that is sent again means the job that it began, whichever version answers
+            hash.text(&self.version);
+        }
         hash.bytes(&self.release_after_s.to_bits().to_le_bytes());
         hash.bytes(&convert::sweep::spec_to_wire(spec).encode_to_vec());
         self.content = format!("{:032x}", hash.value());

@@ -9,6 +9,7 @@ use super::asked::Asked;
 use super::job::Job;
 use super::pages::Page;
 use super::registry::{Jobs, Task};
+use super::standing::Stop;
 use super::streams::{self, JobStream, RowStream};
 use proto::submit_job_request::Task as Wire;
 use std::sync::Arc;
@@ -42,7 +43,12 @@ impl Calls {
         let job = move || {
             let task = Task::of(request.clone()).map_err(status::violation)?;
             check_size(&task.bundle, &shared.limits)?;
-            shared.jobs.submit(asked, task, &request, &shared.limits)
+            let job = shared.jobs.submit(asked, task, &request, &shared.limits)?;
+            if shared.shutdown.draining.is_cancelled() {
+                // it came after those that run were told
+                job.stop(Stop::Suspended);
+            }
+            Ok(job)
         };
         self.0.desk.run(job).await
     }
@@ -82,11 +88,7 @@ impl Calls {
     pub(in super::super) async fn cancelled_job(&self, name: &str) -> Reply<proto::CancelJobResponse> {
         let job = self.0.jobs.get(id(name)?, "job")?;
         // it may wait for the disk
-        let cancel = move || {
-            Jobs::cancel(&job);
-            Ok(())
-        };
-        self.0.desk.run(cancel).await?;
+        self.0.desk.run(move || Jobs::cancel(&job)).await?;
         Ok(Response::new(proto::CancelJobResponse {}))
     }
 

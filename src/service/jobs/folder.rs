@@ -34,6 +34,9 @@ pub(super) struct End {
     pub(super) bytes: u64,
 }
 
+/// What was asked, and the request as it came.
+type Head = (Asked, Vec<u8>);
+
 /// What a folder has of a job.
 pub(super) struct Found {
     pub(super) id: String,
@@ -94,14 +97,14 @@ pub(super) fn find(store: &Arc<Store>) -> io::Result<Vec<Found>> {
         let file = JobFile::of(store, &id, "");
         let counted = ["job", "rows", "end", "new"].iter().map(|end| file.size(end)).sum::<u64>();
         file.bytes.store(usize::try_from(counted).unwrap_or(usize::MAX), Ordering::Relaxed);
-        match fs::read(file.path("job")).ok().and_then(|bytes| read_head(&bytes)) {
-            Some((asked, request)) => {
-                let end = fs::read(file.path("end")).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok());
+        match file.read() {
+            Ok(Some(((asked, request), end))) => {
                 let file = JobFile { sweep: asked.sweep.clone(), ..file };
                 found.push(Found { id, asked, request, end, file });
             }
-            // never answered, or damaged: there is nothing that could go on
-            None => file.remove(),
+            // never answered: there is nothing that could go on
+            Ok(None) => file.remove(),
+            Err(error) => tracing::warn!(job = id, %error, "it cannot be read, and is left alone"),
         }
     }
     Ok(found)
@@ -125,7 +128,7 @@ fn head(asked: &Asked, request: &[u8]) -> io::Result<Vec<u8>> {
 }
 
 /// None for a file that is not whole.
-fn read_head(bytes: &[u8]) -> Option<(Asked, Vec<u8>)> {
+fn read_head(bytes: &[u8]) -> Option<Head> {
     let (head, rest) = bytes.split_at_checked(32)?;
     if !head.starts_with(HEAD) || head[16..] != checksum(rest).to_le_bytes() {
         return None;
@@ -148,6 +151,20 @@ impl JobFile {
 
     fn size(&self, end: &str) -> u64 {
         fs::metadata(self.path(end)).map_or(0, |found| found.len())
+    }
+
+    /// What was asked, and how it ended; none where it was never answered.
+    fn read(&self) -> io::Result<Option<(Head, Option<End>)>> {
+        let there = |end: &str| match fs::read(self.path(end)) {
+            Ok(bytes) => Ok(Some(bytes)),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+            Err(error) => Err(error),
+        };
+        let Some(bytes) = there("job")? else { return Ok(None) };
+        let strange = || io::Error::new(io::ErrorKind::InvalidData, "it is damaged, or of another version");
+        let head = read_head(&bytes).ok_or_else(strange)?;
+        let end = there("end")?.map(|bytes| serde_json::from_slice(&bytes)).transpose()?;
+        Ok(Some((head, end)))
     }
 
     fn take(&self, bytes: usize) -> io::Result<()> {
@@ -202,15 +219,16 @@ impl JobFile {
             .inspect_err(|_| self.give_back(lines.len()))
     }
 
-    /// Keeps how it ended. When this returns it is on the disk.
+    /// Keeps how it ended. When this returns it is on the disk. Its few bytes may go beyond the bound: what is full must be able to end.
     ///
     /// # Errors
-    /// What the system said, or the bound.
+    /// What the system said.
     pub(super) fn end(&self, end: &End) -> io::Result<()> {
         let end = End { bytes: self.journal.as_ref().map_or_else(|| self.row_bytes(), Journal::len), ..end.clone() };
         let (bytes, path, unfinished) = (serde_json::to_vec(&end)?, self.path("end"), self.path("new"));
         let before = usize::try_from(self.size("end")).unwrap_or(usize::MAX);
-        self.take(bytes.len())?;
+        self.store.room().count(0, bytes.len());
+        self.bytes.fetch_add(bytes.len(), Ordering::Relaxed);
         let written = self.store.disk().write(&unfinished, &bytes);
         let written = written.and_then(|()| self.store.disk().rename(&unfinished, &path));
         match written.and_then(|()| self.store.disk().keep_names(&folder(&self.store))) {

@@ -7,12 +7,12 @@ use super::super::{proto, status};
 use super::asked::{Asked, now_ms};
 use super::folder::{End, JobFile};
 use super::holders::Holders;
-use super::rows::{Reading, Rows};
+use super::rows::Rows;
 use super::standing::{Standing, Stop, state_of};
 use super::wire;
 use crate::budget::Budget;
 use crate::jobs::sweep::journal::Kept;
-use crate::jobs::sweep::{self, SweepSpec, SweepTable};
+use crate::jobs::sweep::{SweepSpec, SweepTable};
 use proto::job_metadata::State;
 use std::collections::BTreeSet;
 use std::io;
@@ -33,18 +33,18 @@ pub(super) struct Job {
     pub(super) spec: SweepSpec,
     pub(super) budget: Budget,
     options: Option<proto::CompileOptions>,
-    standing: watch::Sender<Standing>,
+    pub(super) standing: watch::Sender<Standing>,
     /// None: on the disk alone.
-    rows: Mutex<Option<Rows>>,
+    pub(super) rows: Mutex<Option<Rows>>,
     waiting: Mutex<Waiting>,
     /// Where it is kept; none: nowhere, or not any more.
-    file: Mutex<Option<JobFile>>,
+    pub(super) file: Mutex<Option<JobFile>>,
     kept: bool,
     stop: OnceLock<Stop>,
     pub(super) stopped: CancellationToken,
-    used: Mutex<Instant>,
+    pub(super) used: Mutex<Instant>,
     holders: Mutex<Holders>,
-    table: OnceLock<SweepTable>,
+    pub(super) table: OnceLock<SweepTable>,
 }
 
 /// Rows on their way to the disk.
@@ -55,7 +55,7 @@ struct Waiting {
     carried: bool,
 }
 
-fn held<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+pub(super) fn held<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
@@ -95,6 +95,11 @@ impl Job {
     /// Where it stands.
     pub(super) fn standing(&self) -> Standing {
         self.standing.borrow().clone()
+    }
+
+    /// Whether a folder has it.
+    pub(super) fn is_kept(&self) -> bool {
+        self.kept
     }
 
     /// Whether it has ended.
@@ -278,54 +283,17 @@ impl Job {
         self.standing.send_modify(|standing| standing.gone = true);
     }
 
-    /// Reads its rows from the disk, where they are there alone.
-    ///
-    /// # Errors
-    /// Files that cannot be read, or do not have what they had.
-    pub(super) fn load(&self) -> Result<(), Status> {
-        let mut file = held(&self.file);
-        let mut rows = held(&self.rows);
-        let (Some(file), None) = (file.as_mut(), rows.as_ref()) else { return Ok(()) };
-        let lost = |what: String| Status::data_loss(format!("the rows of job \"{}\" cannot be read: {what}", self.id));
-        let read = file.open().map_err(|error| lost(error.to_string()))?;
-        file.close();
-        let expected = self.standing().rows;
-        if (read.len() as u64) < expected {
-            return Err(lost(format!("there are {} of {expected}", read.len())));
+    /// True while a stream of its rows, or of where it stands, is open.
+    pub(super) fn is_watched(&self) -> bool {
+        self.standing.receiver_count() > 0
+    }
+
+    /// It was last asked for when it ended, before this server began.
+    pub(super) fn ended_before(&self, ended_ms: u64) {
+        let since = Duration::from_millis(now_ms().saturating_sub(ended_ms));
+        if let Some(then) = Instant::now().checked_sub(since) {
+            *held(&self.used) = then;
         }
-        let mut found = Rows::default();
-        read.into_iter().for_each(|kept| found.push(kept));
-        *rows = Some(found);
-        Ok(())
-    }
-
-    /// The next rows of a stream.
-    ///
-    /// # Errors
-    /// As [`Self::load`].
-    pub(super) fn chunk(&self, reading: &mut Reading, end: u64) -> Result<proto::JobRows, Status> {
-        self.load()?;
-        Ok(held(&self.rows).get_or_insert_default().chunk(&self.spec, reading, end))
-    }
-
-    /// The whole table, of a job that has all of its rows.
-    ///
-    /// # Errors
-    /// As [`Self::load`].
-    pub(super) fn make_table(&self) -> Result<(), Status> {
-        self.load()?;
-        self.table.get_or_init(|| {
-            let with =
-                |kept: Kept| (self.spec.settings(kept.point).into_iter().map(|(_, value)| value).collect(), kept);
-            let rows = held(&self.rows).iter().flat_map(Rows::found).map(with).collect();
-            sweep::table_of(self.spec.names().map(str::to_owned).collect(), rows)
-        });
-        Ok(())
-    }
-
-    /// The table, once it was made.
-    pub(super) fn table(&self) -> Option<&SweepTable> {
-        self.table.get()
     }
 
     /// As it travels, without the options of the model, which may be long.

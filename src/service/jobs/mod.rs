@@ -1,8 +1,8 @@
 //! Jobs: what runs while clients come and go.
 //!
-//! `asked` is what a client wanted, and by which name; a `job` has `rows`, which it keeps in a `folder` that outlives the server, a
-//! `standing`, of which clients are told over the `wire`, and `holders`; the `registry` holds all jobs and hands them out in `pages`, `running` lets them take turns, and `calls`, `older` and `streams` are what
-//! clients see of them.
+//! `asked` is what a client wanted, and by which name; a `job` has `rows`, which it keeps in a `folder` that outlives the server (`reading`
+//! has them from there again), a `standing`, of which clients are told over the `wire`, and `holders`; the `registry` holds all jobs and hands
+//! them out in `pages`, `running` lets them take turns, and `calls`, `older` and `streams` are what clients see of them.
 
 mod asked;
 mod calls;
@@ -11,6 +11,7 @@ mod holders;
 mod job;
 mod older;
 mod pages;
+mod reading;
 pub(super) mod registry;
 mod rows;
 mod running;

@@ -163,7 +163,9 @@ impl Jobs {
         if let Some(end) = end.clone().filter(|end| end.bytes == file.row_bytes()) {
             let (state, rows, failed) = (state_of(end.code), end.rows, end.failed);
             let standing = Standing { state, rows, failed, end: Some(end), ..Standing::default() };
+            let ended_ms = end_ms(&standing);
             let job = Job::new(id.clone(), (asked, spec, wire_options), budget, Some(file), (None, standing));
+            job.ended_before(ended_ms);
             self.kept().insert(id, job);
             return Ok(());
         }
@@ -208,11 +210,13 @@ impl Jobs {
     }
 
     /// Stops a job; its rows stay. It is on the disk that it is to stop when this returns.
-    pub(super) fn cancel(job: &Job) {
-        if let Err(error) = job.keep_cancelled() {
-            tracing::warn!(%error, job = job.id, "that it is cancelled cannot be kept yet");
-        }
+    ///
+    /// # Errors
+    /// It is stopped, but not on the disk.
+    pub(super) fn cancel(job: &Job) -> Result<(), Status> {
+        let kept = job.keep_cancelled();
         job.stop(Stop::Cancelled);
+        kept.map_err(|error| status::not_kept("the job is stopped; that it is cancelled is", &error))
     }
 
     /// Stops and forgets a job.
@@ -253,11 +257,16 @@ impl Jobs {
     /// Forgets finished jobs that nobody asked for during the time that the limits give; how many. Waits for the disk.
     pub(in super::super) fn expire(&self, limits: &Limits) -> usize {
         let time = if self.store.is_some() { limits.sweeps_idle } else { limits.idle };
-        let is_old = |job: &&Arc<Job>| job.has_ended() && job.idle() >= time;
+        let is_old = |job: &&Arc<Job>| job.has_ended() && job.idle() >= time && !job.is_watched();
         let old: Vec<_> = self.kept().values().filter(is_old).cloned().collect();
         old.iter().for_each(|job| self.delete(job));
         old.len()
     }
+}
+
+/// When it ended [ms since 1970].
+fn end_ms(standing: &Standing) -> u64 {
+    standing.end.as_ref().map_or(u64::MAX, |end| end.ended_ms)
 }
 
 /// Whether this server may go on with a job that another one began.
@@ -272,10 +281,15 @@ fn goes_on(asked: &Asked, bundle: &Bundle, limits: &Limits) -> Result<(), Status
     check_size(bundle, limits)
 }
 
+/// So many times as many jobs are kept as may run and wait, where a folder has those that have ended.
+const ENDED: usize = 64;
+
 /// Room for one more job of a client.
 fn room(kept: &BTreeMap<String, Arc<Job>>, owner: &str, limits: &Limits) -> Result<(), Status> {
     let way_out = "one more; delete one that is no longer needed";
-    if kept.len() >= limits.sweeps {
+    // in a folder ended ones take its bytes, and hardly anything else
+    let counts = |job: &&Arc<Job>| !(job.is_kept() && job.has_ended());
+    if kept.values().filter(counts).count() >= limits.sweeps || kept.len() >= limits.sweeps.saturating_mul(ENDED) {
         return Err(status::limit("sweeps", limits.sweeps, way_out));
     }
     let own = kept.values().filter(|job| job.asked.owner == owner).count();

@@ -105,8 +105,13 @@ pub(super) fn rows(
                 return;
             }
             while reading.next < now.rows || !reading.begun || std::mem::take(&mut quiet) {
-                let (message, back) = chunk(&job, reading, now.rows).await;
+                let (before, begun) = (reading.next, reading.begun);
+                let (mut message, back) = chunk(&job, reading, now.rows).await;
                 reading = back;
+                if begun && before < now.rows && reading.next == before {
+                    // its rows are gone
+                    message = Err(status::not_found("job", &job.id));
+                }
                 let failed = message.is_err();
                 let sent = tokio::select! {
                     sent = sender.send(message) => sent.is_ok(),
@@ -122,6 +127,7 @@ pub(super) fn rows(
             if now.end.is_some() || only_finished {
                 let last = proto::JobRows { first_row: reading.next, job: Some(job.to_wire()), ..Default::default() };
                 let _ = sender.send(Ok(last)).await;
+                job.unload();
                 return;
             }
             match next(&mut standing, &sender, &shutdown).await {
