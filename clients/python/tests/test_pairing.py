@@ -38,7 +38,8 @@ def test_interrupted_calls_leave_no_answer_behind(plate: bimorph.Model) -> None:
             for voltage, charge in zip(voltages, expected):
                 try:
                     # some of these end before the alarm, some in the middle; the longest is stopped for certain
-                    signal.setitimer(signal.ITIMER_REAL, chance.uniform(5e-5, 2e-3))
+                    # (Python drops what is raised while it calls a finalizer: then the next alarm does it)
+                    signal.setitimer(signal.ITIMER_REAL, chance.uniform(5e-5, 2e-3), 0.5)
                     while True:
                         session.trial({"drive": 3.0 - voltage})
                 except Interrupted:
