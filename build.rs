@@ -13,6 +13,9 @@ const SMALLER: [&str; 2] = ["-Wl,--icf=all", "-Wl,-z,pack-relative-relocs"];
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     println!("cargo::rerun-if-changed=build.rs");
+    // another linker may know other arguments
+    let target = std::env::var("TARGET")?.to_uppercase().replace(['-', '.'], "_");
+    println!("cargo::rerun-if-env-changed=CARGO_TARGET_{target}_LINKER");
     let out = PathBuf::from(std::env::var("OUT_DIR")?);
     if cfg!(feature = "server") {
         let known = SMALLER.iter().filter(|argument| works(argument, &out).unwrap_or(false));

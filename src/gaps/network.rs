@@ -153,15 +153,9 @@ impl Circuit {
 }
 
 impl Potentials {
-    /// ∂(current through `resistance` [Ω] from a to b)/∂source [S], one entry per source.
-    pub fn current(&self, a: usize, b: usize, resistance: f64) -> DVector<f64> {
-        let p = &self.potential;
-        DVector::from_fn(p.ncols(), |s, _| (p[(a, s)] - p[(b, s)]) / resistance)
-    }
-
     /// ∂(potential of a − potential of b)/∂source, one entry per source.
     pub fn difference(&self, a: usize, b: usize) -> DVector<f64> {
-        (self.potential.row(a) - self.potential.row(b)).transpose()
+        DVector::from_fn(self.potential.ncols(), |s, _| self.potential[(a, s)] - self.potential[(b, s)])
     }
 }
 

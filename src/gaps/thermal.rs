@@ -51,7 +51,8 @@ impl Heating {
         let driven = potentials.potential.ncols();
         let conduction = Conduction::new(&heaters, sink)?;
         crate::budget::lay_out_matrix(heaters.len(), sources.saturating_mul(sources).saturating_add(2 * driven));
-        let currents: Vec<DVector<f64>> = heaters.iter().map(|h| potentials.current(h.a, h.b, h.resistance)).collect();
+        let currents: Vec<DVector<f64>> =
+            heaters.iter().map(|h| potentials.difference(h.a, h.b) / h.resistance).collect();
         let mut form = vec![0.0; heaters.len() * sources * sources];
         let mut watts = vec![0.0; heaters.len()];
         for i in 0..driven {

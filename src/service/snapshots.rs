@@ -3,6 +3,7 @@
 //! A name and a version of the envelope, a checksum, the version of the program (numbers may differ between versions, and a
 //! continuation promises the same bits), the id of the model, and the states.
 
+use crate::content::Fnv;
 use tonic::Status;
 
 const NAME: &[u8; 16] = b"bimorph snapshot";
@@ -61,9 +62,9 @@ fn word(bytes: &[u8]) -> Option<(&[u8], &[u8])> {
 
 /// FNV-1a, 128 bits (Fowler, Noll, Vo): against accidents, not against forgery, which would harm only who forges.
 pub(super) fn checksum(bytes: &[u8]) -> u128 {
-    bytes.iter().fold(0x6c62_272e_07bb_0142_62b8_2175_6295_c58d, |hash, byte| {
-        (hash ^ u128::from(*byte)).wrapping_mul(0x0000_0000_0100_0000_0000_0000_0000_013b)
-    })
+    let mut sum = Fnv::default();
+    sum.bytes(bytes);
+    sum.value()
 }
 
 #[cfg(test)]

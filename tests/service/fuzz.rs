@@ -7,6 +7,7 @@
 use super::attached::{Attached, trial};
 use super::running::{DEADLINE, Running, compiled, start_with};
 use super::sound::sound;
+use bimorph::content::Fnv;
 use bimorph::device::local::LocalDevice;
 use bimorph::service::limits::Limits;
 use bimorph::service::proto;
@@ -194,13 +195,6 @@ fn messages(seed: u64, mut done: impl FnMut(usize) -> bool) {
     assert!(fine > 0 && fine < count, "{fine} of {count}");
 }
 
-/// FNV-1a of 128 bits, as an envelope has it (`service::snapshots`).
-fn checksum(bytes: &[u8]) -> u128 {
-    bytes.iter().fold(0x6c62_272e_07bb_0142_62b8_2175_6295_c58d, |hash, byte| {
-        (hash ^ u128::from(*byte)).wrapping_mul(0x0000_0000_0100_0000_0000_0000_0000_013b)
-    })
-}
-
 /// Snapshots until `done`, from `seed`: each is refused, or is a session whose next step is a reply with finite numbers.
 fn snapshots(seed: u64, mut done: impl FnMut(usize) -> bool) {
     /// Name and version of the envelope, and its checksum.
@@ -217,11 +211,13 @@ fn snapshots(seed: u64, mut done: impl FnMut(usize) -> bool) {
             for _ in 0..1 + maker.below(3) {
                 maker.change(&mut body, &sound);
             }
+            let mut sealed = Fnv::default();
+            sealed.bytes(&body);
             // one in eight with the checksum that it had
             let sum = if maker.below(8) == 0 {
                 sound[HEAD..HEAD + 16].to_vec()
             } else {
-                checksum(&body).to_le_bytes().to_vec()
+                sealed.value().to_le_bytes().to_vec()
             };
             let snapshot = [&sound[..HEAD], &sum, &body].concat();
             let told = format!("seed {seed}, snapshot {count}: {snapshot:?}");

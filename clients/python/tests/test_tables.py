@@ -6,20 +6,10 @@ import dataclasses
 import pathlib
 
 import pytest
+from conftest import PLATE
 
 import bimorph
 from bimorph.executors import together
-
-PULLED = """param k=1
-anchor  * [f] [l=1u w=1u h=1u]
-mass2d  * [m] [m=1e-10]
-guide2d * [m] []
-spring2d * [f m] [kx=k]
-anchor  * [e] [l=1u w=1u h=1u]
-plategap2d * [m e] [A=1e-8 gap=2u]
-eground * [m] []
-V port * [e] []
-"""
 
 CHAIN = """param n=1
 process p = [Youngsmodulus=165e9 density=2300 h=2u]
@@ -78,13 +68,13 @@ def test_a_table_goes_to_parquet_and_back(client: bimorph.Client, tmp_path: path
     pytest.importorskip("pyarrow")
     from pyarrow import parquet
 
-    netlist = bimorph.Netlist.text(PULLED)
-    table = client.sweep(netlist, {"k": [1.0, 2.0], "V.v": [0.0, 1.0, 1e3]}, bimorph.Static(outputs=["m.x"]))
+    netlist = bimorph.Netlist.text(PLATE)
+    table = client.sweep(netlist, {"k": [1.0, 2.0], "drive.v": [0.0, 1.0, 1e3]}, bimorph.Static(outputs=["m.x"]))
     parquet.write_table(table.to_arrow(), tmp_path / "t.parquet")
     back = parquet.read_table(tmp_path / "t.parquet")
-    assert back.column_names == ["point", "k", "V.v", "m.x", "estimated_error", "warning", "error"]
+    assert back.column_names == ["point", "k", "drive.v", "m.x", "estimated_error", "warning", "error"]
     assert back.column("m.x").to_pylist() == [row.results.get("m.x") for row in table.rows]
-    assert back.column("V.v").to_pylist() == [0.0, 1.0, 1e3] * 2
+    assert back.column("drive.v").to_pylist() == [0.0, 1.0, 1e3] * 2
     assert back.schema.field("m.x").metadata == {b"unit": b"m"} and back.schema.metadata[b"parameters"] == b"2"
     moved = table.column("m.x")
     assert moved[0] == 0.0 and moved[1] != 0.0 and moved[4] == pytest.approx(moved[1] / 2, rel=1e-2)

@@ -165,13 +165,8 @@ impl Journal {
     }
 
     /// Bytes of whole lines that it has.
-    pub fn len(&self) -> u64 {
+    pub fn bytes(&self) -> u64 {
         self.file.lock().unwrap_or_else(PoisonError::into_inner).good
-    }
-
-    /// True without a line, which none is that was opened.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
     }
 
     fn line(&self, of: &impl Serialize) -> Result<(), JournalError> {

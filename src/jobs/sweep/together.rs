@@ -23,7 +23,7 @@ use std::sync::OnceLock;
 /// Points that are laid out at once, at most.
 pub(super) const CHUNK: usize = 32;
 /// Bodies of a point, at most: larger ones take their time anyway, and some of them at once the memory.
-const MOST: usize = 2000;
+const MOST: usize = 1000;
 
 /// What all points have in common.
 pub(super) struct Together<'a> {

@@ -194,7 +194,7 @@ impl JobFile {
         // nobody else may read it
         drop(private().open(&path)?);
         let (journal, rows) = Journal::open(&path, &self.sweep, true).map_err(io_error)?;
-        let bytes = journal.len();
+        let bytes = journal.bytes();
         if bytes > before {
             self.take(usize::try_from(bytes - before).unwrap_or(usize::MAX))?;
             self.store.disk().keep_names(&folder(&self.store))?;
@@ -224,7 +224,7 @@ impl JobFile {
     /// # Errors
     /// What the system said.
     pub(super) fn end(&self, end: &End) -> io::Result<()> {
-        let end = End { bytes: self.journal.as_ref().map_or_else(|| self.row_bytes(), Journal::len), ..end.clone() };
+        let end = End { bytes: self.journal.as_ref().map_or_else(|| self.row_bytes(), Journal::bytes), ..end.clone() };
         let (bytes, path, unfinished) = (serde_json::to_vec(&end)?, self.path("end"), self.path("new"));
         let before = usize::try_from(self.size("end")).unwrap_or(usize::MAX);
         self.store.room().count(0, bytes.len());

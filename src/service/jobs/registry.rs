@@ -161,9 +161,8 @@ impl Jobs {
         let budget = Budget::new(Allowance { purse, ..allowance(limits) });
         // what it was told of is there: its rows are read when somebody asks for them
         if let Some(end) = end.clone().filter(|end| end.bytes == file.row_bytes()) {
-            let (state, rows, failed) = (state_of(end.code), end.rows, end.failed);
+            let (state, rows, failed, ended_ms) = (state_of(end.code), end.rows, end.failed, end.ended_ms);
             let standing = Standing { state, rows, failed, end: Some(end), ..Standing::default() };
-            let ended_ms = end_ms(&standing);
             let job = Job::new(id.clone(), (asked, spec, wire_options), budget, Some(file), (None, standing));
             job.ended_before(ended_ms);
             self.kept().insert(id, job);
@@ -262,11 +261,6 @@ impl Jobs {
         old.iter().for_each(|job| self.delete(job));
         old.len()
     }
-}
-
-/// When it ended [ms since 1970].
-fn end_ms(standing: &Standing) -> u64 {
-    standing.end.as_ref().map_or(u64::MAX, |end| end.ended_ms)
 }
 
 /// Whether this server may go on with a job that another one began.
