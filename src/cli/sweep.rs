@@ -39,16 +39,23 @@ use std::sync::OnceLock;
     bimorph sweep bank.net --param wh=1.8u:2.2u:16 --analysis tran --stop 100u --port heat=2.2 --signals yoke.y\n  \
     bimorph sweep bank.net --vary wh=normal:2u:0.05u --samples 1000 --seed 7 --analysis modes --out mc.csv\n  \
     bimorph sweep bank.net --param wh=1.8u:2.2u:5 --param heat.v=0:3:31 --signals yoke.y --out hv.csv\n  \
+    bimorph sweep bank.net --points corners.csv --port heat=2.2 --signals yoke.y --out c.csv\n  \
+    bimorph sweep bank.net --param option.tol=1e-2,1e-3,1e-4 --analysis modes\n  \
     bimorph sweep bank.net --param wh=1.8u:2.2u:201 --out w.csv --resume\n  \
     bimorph sweep bank.net --param w=1.8u:2.2u:21 --to unix:///tmp/bimorph.sock")]
 pub(crate) struct Sweep {
     #[command(flatten)]
     model: ModelArgs,
 
-    /// An axis of the grid: LOW:HIGH:COUNT, ends included, or a list A,B,C, of a netlist parameter or, as PORT.v, of the voltage of a
-    /// port. Repeatable; the last varies fastest
-    #[arg(long = "param", value_name = "NAME=LOW:HIGH:COUNT", required_unless_present = "vary")]
+    /// An axis of the grid: LOW:HIGH:COUNT, ends included, or a list A,B,C, of a netlist parameter, of the voltage of a port (PORT.v), or
+    /// of an option of the model (option.tol). Repeatable; the last varies fastest
+    #[arg(long = "param", value_name = "NAME=LOW:HIGH:COUNT", required_unless_present_any = ["vary", "points"])]
     parameters: Vec<String>,
+
+    /// A list of points: a .csv file with names as of --param in its first row, and a row for each point. With --param and --vary: their
+    /// grid and their samples at each of these points
+    #[arg(long, value_name = "FILE")]
+    points: Option<PathBuf>,
 
     #[command(flatten)]
     chance: Chance,
@@ -211,7 +218,8 @@ impl Sweep {
     }
 
     fn spec(&self) -> Result<SweepSpec, Failure> {
-        let parameters = self.parameters.iter().map(|text| text.parse()).collect::<Result<Vec<SweepParameter>, _>>()?;
+        let axes = self.parameters.iter().map(|text| text.parse()).collect::<Result<Vec<SweepParameter>, _>>()?;
+        let parameters = [self.listed()?, axes].concat();
         self.check_use()?;
         let count = self.count.unwrap_or(MODES_COUNT.count());
         let max = self.max.unwrap_or(PULL_IN_MAX.number());
@@ -237,6 +245,13 @@ impl Sweep {
         let spec = SweepSpec { parameters, samples, analysis, shard, threads: self.threads };
         spec.point_numbers()?;
         Ok(spec)
+    }
+
+    /// The points of --points.
+    fn listed(&self) -> Result<Vec<SweepParameter>, Failure> {
+        let Some(path) = &self.points else { return Ok(Vec::new()) };
+        let text = std::fs::read_to_string(path).map_err(|source| Failure::Read { path: path.clone(), source })?;
+        Ok(sweep::points(&path.display().to_string(), &text)?)
     }
 
     /// Refuses what the analysis would ignore.

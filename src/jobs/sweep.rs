@@ -5,6 +5,7 @@
 //! rows come back in grid order, so the table has the same bits on one thread and on many, and the shards of a sweep put
 //! together are the whole sweep.
 
+mod axis;
 mod crew;
 mod design;
 mod distribution;
@@ -15,18 +16,23 @@ pub mod parse;
 pub mod part;
 mod pieces;
 mod point;
+#[cfg(feature = "server")]
+mod points;
 mod samples;
 mod spec;
 mod table;
 mod together;
 mod transient;
 
+pub use axis::SweepParameter;
 pub use crew::{Crew, Pool};
 pub use design::{DESIGNS, Design};
 pub use distribution::{Distribution, Vary, number};
 pub use error::SweepError;
+#[cfg(feature = "server")]
+pub use points::points;
 pub use samples::{Samples, Sampling};
-pub use spec::{Shard, SweepAnalysis, SweepParameter, SweepSpec};
+pub use spec::{Shard, SweepAnalysis, SweepSpec};
 pub use table::{SweepRow, SweepTable};
 
 use crate::compile::{CompileError, CompileOptions, Drawn, draw};
@@ -63,7 +69,8 @@ pub fn check_names(spec: &SweepSpec, bundle: &Bundle, options: &CompileOptions) 
 /// # Errors
 /// What the point would have for an error.
 pub fn first_drawn(spec: &SweepSpec, bundle: &Bundle, options: &CompileOptions) -> Result<Drawn, CompileError> {
-    draw(&Source::new(bundle), &spec::at(options, &spec.settings(0)))
+    let settings = spec.settings(0);
+    draw(&Source::new(bundle), &axis::at(&axis::chosen(options, &settings), &settings))
 }
 
 /// Runs a sweep; under a budget, each point has all of its allowance, and the rows together have it once more. `progress` is told after every point, from any thread, and answers whether to go on.

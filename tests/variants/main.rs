@@ -2,6 +2,7 @@
 //! one of them.
 
 mod lanes;
+mod listed;
 mod ports;
 mod together;
 

@@ -6,7 +6,8 @@
 //! the drawing has other beams) searches its own, as a point alone does. Which mesh a point gets depends on the
 //! grid and on the point alone, not on other points, on shards or on threads.
 
-use super::spec::{SweepAnalysis, SweepSpec, at};
+use super::axis::at;
+use super::spec::{SweepAnalysis, SweepSpec};
 use crate::analysis::AnalysisError;
 use crate::analysis::mesh::given::{Judged, judged};
 use crate::analysis::mesh::{self, Request};
@@ -63,7 +64,7 @@ impl<'a> Family<'a> {
     /// True where points share meshes at all.
     pub(super) fn shares(&self) -> bool {
         let own = self.options.segments.is_some() || self.options.band.is_some();
-        !own && self.spec.grid_points().is_ok_and(|points| points > 1)
+        !own && self.spec.has_variants()
     }
 
     /// The variant that meshes are searched for, where they fit this one.

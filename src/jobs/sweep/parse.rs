@@ -1,8 +1,9 @@
 //! Axes and shards as text: `w=1.8u:2.2u:21`, `w=1.8u,2u,2.2u`, `1/4`.
 
+use super::axis::SweepParameter;
 use super::distribution::number;
 use super::error::{SweepError, bad};
-use super::spec::{Shard, SweepParameter};
+use super::spec::Shard;
 use crate::netlist::Setting;
 use std::str::FromStr;
 
@@ -39,7 +40,7 @@ impl FromStr for SweepParameter {
             }
             _ => return Err(bad(what(), forms, values)),
         };
-        Ok(Self { name: name.to_owned(), values })
+        Ok(Self { name: name.to_owned(), values, in_step: false })
     }
 }
 

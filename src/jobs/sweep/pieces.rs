@@ -10,8 +10,8 @@ use super::transient::{self, Transients};
 use crate::budget::{self, Budget, Stopped};
 use crate::compile::CompileOptions;
 use crate::netlist::{Bundle, Source};
-use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, OnceLock};
 
 /// Runs points of a sweep by a crew. `each` is told of every one as soon as it is done, from any thread, and says whether to go on; `take` is
 /// given those of a piece once all of it are done. Whether all were run.
@@ -28,7 +28,6 @@ pub(super) fn run(
     let stop = AtomicBool::new(false);
     let (budget, full) = (budget::current(), OnceLock::new());
     let source = Source::new(bundle);
-    let family = Family::new(spec, &source, options);
     let go_on = || !stop.load(Ordering::Relaxed);
     let counted = |outcome: &Outcome| {
         if let Some(Err(Stopped::Bytes { most, .. } | Stopped::OwnerBytes { most, .. })) =
@@ -42,39 +41,71 @@ pub(super) fn run(
         }
         go_on()
     };
-    let transients = Transients::new(spec, &source, options);
-    let together = Together::new(spec, &source, options, &family);
-    let some = |numbers: &[usize]| match spec.analysis {
-        SweepAnalysis::Transient { .. } => {
-            transients.run(numbers, budget.as_ref(), &|outcome| outcome.is_none_or(counted) && go_on())
-        }
-        SweepAnalysis::Static { .. } | SweepAnalysis::Modes { .. } => {
-            together.run(numbers, budget.as_ref(), &|outcome| counted(outcome))
-        }
-        SweepAnalysis::PullIn { .. } => {
-            let one = |&number: &usize| {
-                let outcome = point::run(spec, number, &source, options, &family, budget.as_ref().map(Budget::part));
-                counted(&outcome).then_some(outcome)
-            };
-            numbers.iter().map(one).collect()
-        }
-    };
-    // no thread goes without while another has many; a row does not depend on who is beside it
-    let at_once = match spec.analysis {
-        SweepAnalysis::Transient { .. } => transient::CHUNK,
-        SweepAnalysis::PullIn { .. } => 1,
-        _ if family.shares() => numbers.len().div_ceil(2 * crew.size().max(1)).clamp(1, together::CHUNK),
-        _ => 1,
-    };
-    crew.run(numbers.len().div_ceil(at_once), &|piece| {
-        let piece = numbers.chunks(at_once).nth(piece).unwrap_or_default();
-        match go_on().then(|| some(piece)).flatten() {
-            Some(outcomes) => take(outcomes),
-            None => stop.store(true, Ordering::Relaxed),
-        }
-    });
+    for (options, numbers) in spec.by_options(options, numbers) {
+        let variants = Variants::new(spec, &source, &options);
+        let at_once = variants.at_once(numbers.len(), crew.size());
+        crew.run(numbers.len().div_ceil(at_once), &|piece| {
+            let piece = numbers.chunks(at_once).nth(piece).unwrap_or_default();
+            match go_on().then(|| variants.run(piece, budget.as_ref(), &counted, &go_on)).flatten() {
+                Some(outcomes) => take(outcomes),
+                None => stop.store(true, Ordering::Relaxed),
+            }
+        });
+    }
     match full.get() {
         Some(&most) => Err(SweepError::TooLarge { most }),
         None => Ok(go_on()),
+    }
+}
+
+/// Points with the same options.
+struct Variants<'a> {
+    spec: &'a SweepSpec,
+    source: &'a Source,
+    options: &'a CompileOptions,
+    family: Arc<Family<'a>>,
+    together: Together<'a>,
+    transients: Transients<'a>,
+}
+
+impl<'a> Variants<'a> {
+    fn new(spec: &'a SweepSpec, source: &'a Source, options: &'a CompileOptions) -> Self {
+        let family = Arc::new(Family::new(spec, source, options));
+        let together = Together::new(spec, source, options, Arc::clone(&family));
+        Self { spec, source, options, family, together, transients: Transients::new(spec, source, options) }
+    }
+
+    /// How many of `points` are a piece: no thread goes without while another has many. A row does not depend on who is beside it.
+    fn at_once(&self, points: usize, threads: usize) -> usize {
+        match self.spec.analysis {
+            SweepAnalysis::Transient { .. } => transient::CHUNK,
+            SweepAnalysis::PullIn { .. } => 1,
+            _ if self.family.shares() => points.div_ceil(2 * threads.max(1)).clamp(1, together::CHUNK),
+            _ => 1,
+        }
+    }
+
+    /// A piece; none where it was to stop.
+    fn run(
+        &self,
+        numbers: &[usize],
+        budget: Option<&Budget>,
+        counted: &(dyn Fn(&Outcome) -> bool + Sync),
+        go_on: &(dyn Fn() -> bool + Sync),
+    ) -> Option<Vec<Outcome>> {
+        match self.spec.analysis {
+            SweepAnalysis::Transient { .. } => {
+                self.transients.run(numbers, budget, &|outcome| outcome.is_none_or(counted) && go_on())
+            }
+            SweepAnalysis::Static { .. } | SweepAnalysis::Modes { .. } => self.together.run(numbers, budget, counted),
+            SweepAnalysis::PullIn { .. } => {
+                let one = |&number: &usize| {
+                    let part = budget.map(Budget::part);
+                    let outcome = point::run(self.spec, number, self.source, self.options, &self.family, part);
+                    counted(&outcome).then_some(outcome)
+                };
+                numbers.iter().map(one).collect()
+            }
+        }
     }
 }

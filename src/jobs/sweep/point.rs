@@ -1,8 +1,9 @@
 //! One point of a grid: compile with its parameter values, run the analysis, keep named numbers.
 
+use super::axis::{VOLTS, at, chosen};
 use super::error::SweepError;
 use super::family::Family;
-use super::spec::{SweepAnalysis, SweepSpec, VOLTS, at};
+use super::spec::{SweepAnalysis, SweepSpec};
 use crate::analysis::mesh::given::{Answer, Judged, judged, searched};
 use crate::analysis::mesh::{self, Request};
 use crate::analysis::signal::Signal;
@@ -84,7 +85,8 @@ pub(super) fn run(
 pub(super) fn check_names(spec: &SweepSpec, source: &Source, options: &CompileOptions) -> Result<(), SweepError> {
     let refused =
         |what: &str, expected: String, got: String| Err(SweepError::BadSpec { what: what.into(), expected, got });
-    let drawn = match draw(source, &at(options, &spec.settings(0))) {
+    let settings = spec.settings(0);
+    let drawn = match draw(source, &at(&chosen(options, &settings), &settings)) {
         Ok(drawn) => drawn,
         Err(CompileError::Netlist(diagnostics)) => {
             let Some(d) = diagnostics.items.iter().find(|d| d.code == NO_PARAMETER) else { return Ok(()) };

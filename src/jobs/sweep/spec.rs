@@ -1,15 +1,13 @@
 //! What to sweep: the points of a grid and their parameters.
 
+use super::axis::{self, SweepParameter, VOLTS, Varied, varied};
 use super::error::{SweepError, bad};
 use super::samples::Samples;
 use crate::analysis::mesh::Request;
 use crate::compile::CompileOptions;
 use crate::netlist::Setting;
 use std::borrow::Cow;
-use std::collections::HashSet;
-
-/// What stands behind the name of a port in the name of an axis of its voltages: `heat.v`. No netlist parameter has a point in its name.
-pub(super) const VOLTS: &str = ".v";
+use std::collections::{BTreeMap, HashSet};
 
 /// What to sweep.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,15 +22,6 @@ pub struct SweepSpec {
     pub shard: Shard,
     /// Worker threads; none: one per core. The table does not depend on it.
     pub threads: Option<usize>,
-}
-
-/// One axis of the grid.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SweepParameter {
-    /// A netlist parameter, or a port with `.v` behind it: its voltage [V].
-    pub name: String,
-    /// The values it takes, in order. SI.
-    pub values: Vec<Setting>,
 }
 
 /// What to compute at each point.
@@ -134,14 +123,51 @@ impl SweepSpec {
     /// # Errors
     /// [`SweepError::BadSpec`] for an axis without values or a grid too large to number.
     pub fn grid_points(&self) -> Result<usize, SweepError> {
-        self.parameters.iter().try_fold(self.sample_count(), |product, axis| {
-            if axis.values.is_empty() {
-                return Err(bad(format!("parameter {}", axis.name), "at least one value", "none"));
+        self.groups().try_fold(self.sample_count(), |product, group| {
+            let what = |axis: &SweepParameter| format!("parameter {}", axis.name);
+            let [first, others @ ..] = group else { return Ok(product) };
+            let count = first.values.len();
+            if first.in_step {
+                return Err(bad(what(first), "a parameter before it, to go along with", "none"));
+            }
+            if count == 0 {
+                return Err(bad(what(first), "at least one value", "none"));
+            }
+            if let Some(other) = others.iter().find(|axis| axis.values.len() != count) {
+                let expected = format!("{count} values, as {} has, with which it goes along", first.name);
+                return Err(bad(what(other), &expected, &other.values.len().to_string()));
             }
             product
-                .checked_mul(axis.values.len())
+                .checked_mul(count)
                 .ok_or_else(|| bad("parameters".into(), "a grid that can be numbered", "too many points"))
         })
+    }
+
+    /// The axes of the grid: one parameter, or several that go together.
+    pub(super) fn groups(&self) -> impl Iterator<Item = &[SweepParameter]> {
+        self.parameters.chunk_by(|_, next| next.in_step)
+    }
+
+    /// True where more than one point has the same options.
+    pub(super) fn has_variants(&self) -> bool {
+        let of_option = |group: &&[SweepParameter]| group.iter().any(|axis| axis.option().is_some());
+        let sorts = self.groups().filter(of_option).map(|group| group[0].values.len());
+        self.grid_points().is_ok_and(|points| points > sorts.fold(1, usize::saturating_mul))
+    }
+
+    /// Points of the grid, those together that have the same options, with these.
+    pub(super) fn by_options(&self, options: &CompileOptions, numbers: &[usize]) -> Vec<(CompileOptions, Vec<usize>)> {
+        if self.parameters.iter().all(|axis| axis.option().is_none()) {
+            return vec![(options.clone(), numbers.to_vec())];
+        }
+        let mut groups: BTreeMap<Vec<usize>, Vec<usize>> = BTreeMap::new();
+        for &number in numbers {
+            let places = self.places(number / self.sample_count());
+            let of_options = self.parameters.iter().zip(places).filter(|(axis, _)| axis.option().is_some());
+            groups.entry(of_options.map(|(_, place)| place).collect()).or_default().push(number);
+        }
+        let with = |numbers: Vec<usize>| (axis::chosen(options, &self.settings(numbers[0])), numbers);
+        groups.into_values().map(with).collect()
     }
 
     /// Numbers of the points this shard runs.
@@ -159,13 +185,16 @@ impl SweepSpec {
                 return Err(bad("parameters".into(), "each name once", &format!("\"{name}\" twice")));
             }
         }
+        let points = self.grid_points()?;
+        self.parameters.iter().try_for_each(SweepParameter::check)?;
+        self.check_samples()?;
         self.check_ports()?;
-        Ok((index..self.grid_points()?).step_by(count).collect())
+        Ok((index..points).step_by(count).collect())
     }
 
     /// Ports whose voltages vary.
     pub(super) fn ports(&self) -> impl Iterator<Item = &str> {
-        self.names().filter_map(|name| name.strip_suffix(VOLTS))
+        self.names().filter_map(|name| if let Varied::Voltage(port) = varied(name) { Some(port) } else { None })
     }
 
     /// Refuses voltages that are none, or are said twice.
@@ -185,9 +214,16 @@ impl SweepSpec {
                 return Err(bad(what(), "a port that is not held at a voltage besides", &format!("\"{port}\" twice")));
             }
         }
-        let words = |axis: &&SweepParameter| axis.values.iter().any(|value| matches!(value, Setting::Text(_)));
-        match self.parameters.iter().filter(|axis| axis.name.ends_with(VOLTS)).find(words) {
-            Some(axis) => Err(bad(format!("parameter \"{}\"", axis.name), "voltages [V]", "a word")),
+        Ok(())
+    }
+
+    /// Refuses options that are to be drawn.
+    fn check_samples(&self) -> Result<(), SweepError> {
+        let vary = self.samples.iter().flat_map(|samples| &samples.asked.vary);
+        match vary.map(|vary| &vary.name).find(|name| matches!(varied(name), Varied::Option(_))) {
+            Some(name) => {
+                Err(bad("samples".into(), "parameters of the netlist, or voltages PORT.v", &format!("\"{name}\"")))
+            }
             None => Ok(()),
         }
     }
@@ -196,7 +232,7 @@ impl SweepSpec {
     pub(super) fn analysis_at(&self, settings: &[(String, Setting)]) -> Cow<'_, SweepAnalysis> {
         let mut analysis = Cow::Borrowed(&self.analysis);
         for (name, value) in settings {
-            if let (Some(port), Setting::Number(volts)) = (name.strip_suffix(VOLTS), value)
+            if let (Varied::Voltage(port), Setting::Number(volts)) = (varied(name), value)
                 && let Some(held) = analysis.to_mut().voltages_mut()
             {
                 held.push((port.to_owned(), *volts));
@@ -214,25 +250,22 @@ impl SweepSpec {
     }
 
     /// Values of the parameters of the grid at one of its points, samples aside.
-    fn grid_settings(&self, mut number: usize) -> Vec<(String, Setting)> {
-        let mut settings = Vec::with_capacity(self.parameters.len());
-        for axis in self.parameters.iter().rev() {
-            let n = axis.values.len().max(1);
-            if let Some(value) = axis.values.get(number % n) {
-                settings.push((axis.name.clone(), value.clone()));
-            }
-            number /= n;
-        }
-        settings.reverse();
-        settings
+    fn grid_settings(&self, number: usize) -> Vec<(String, Setting)> {
+        let value =
+            |(axis, place): (&SweepParameter, usize)| Some((axis.name.clone(), axis.values.get(place)?.clone()));
+        self.parameters.iter().zip(self.places(number)).filter_map(value).collect()
     }
-}
 
-/// Options with the settings of a point.
-pub(super) fn at(options: &CompileOptions, settings: &[(String, Setting)]) -> CompileOptions {
-    let mut options = options.clone();
-    let swept: HashSet<&str> = settings.iter().map(|(name, _)| name.as_str()).collect();
-    options.set.retain(|(name, _)| !swept.contains(name.as_str()));
-    options.set.extend(settings.iter().filter(|(name, _)| !name.ends_with(VOLTS)).cloned());
-    options
+    /// Which value of each axis a point of the grid has, samples aside.
+    fn places(&self, mut number: usize) -> Vec<usize> {
+        let mut places = vec![0; self.parameters.len()];
+        for (axis, place) in self.parameters.iter().zip(&mut places).rev() {
+            let n = axis.values.len().max(1);
+            *place = number % n;
+            if !axis.in_step {
+                number /= n;
+            }
+        }
+        places
+    }
 }

@@ -5,9 +5,10 @@
 //! holds, is done; any other runs as a point alone. Which of the two it is depends on the grid and on the point, not on its neighbours, on
 //! shards or on threads, but for points that spend a server's budget together.
 
+use super::axis::at;
 use super::family::Family;
 use super::point::{self, Found, Outcome, brief};
-use super::spec::{SweepSpec, at};
+use super::spec::SweepSpec;
 use super::transient::guarded;
 use crate::analysis::PortVoltages;
 use crate::analysis::mesh::Request;
@@ -18,7 +19,7 @@ use crate::budget::Budget;
 use crate::compile::{CompileOptions, Compiled, draw};
 use crate::netlist::Source;
 use crate::refine::model_order::ModelOrder;
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 /// Points that are laid out at once, at most.
 pub(super) const CHUNK: usize = 32;
@@ -30,7 +31,7 @@ pub(super) struct Together<'a> {
     spec: &'a SweepSpec,
     source: &'a Source,
     options: &'a CompileOptions,
-    family: &'a Family<'a>,
+    family: Arc<Family<'a>>,
     lanes: OnceLock<Option<Lanes>>,
 }
 
@@ -99,7 +100,7 @@ impl<'a> Together<'a> {
         spec: &'a SweepSpec,
         source: &'a Source,
         options: &'a CompileOptions,
-        family: &'a Family<'a>,
+        family: Arc<Family<'a>>,
     ) -> Self {
         Self { spec, source, options, family, lanes: OnceLock::new() }
     }
@@ -119,7 +120,9 @@ impl<'a> Together<'a> {
                     let parameters = self.spec.settings(number).into_iter().map(|(_, value)| value).collect();
                     Outcome { number, parameters, values: Ok(found) }
                 }
-                None => point::run(self.spec, number, self.source, self.options, self.family, budget.map(Budget::part)),
+                None => {
+                    point::run(self.spec, number, self.source, self.options, &self.family, budget.map(Budget::part))
+                }
             };
             if !finished(&outcome) {
                 return None;

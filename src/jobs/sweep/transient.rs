@@ -7,9 +7,11 @@
 //! How far the steps may be off is estimated in the middle of the grid, at the cost of some two runs, and told at every point where it is
 //! beyond the tolerance.
 
+use super::axis::{SweepParameter, at};
 use super::family::{alike, middle};
 use super::point::{Found, Outcome, Value, brief};
-use super::spec::{SweepAnalysis, SweepSpec, at};
+use super::samples::Samples;
+use super::spec::{SweepAnalysis, SweepSpec};
 use crate::analysis::AnalysisError;
 use crate::analysis::mesh;
 use crate::analysis::side_by_side::{self, RunEnd};
@@ -21,13 +23,14 @@ use crate::compile::{CompileOptions, Compiled, draw};
 use crate::netlist::{Setting, Source};
 use crate::refine::model_order::ModelOrder;
 use crate::structure::Beam;
+use std::collections::BTreeSet;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::OnceLock;
 
 /// Points that are laid out at once.
 pub(super) const CHUNK: usize = 64;
-/// Axes whose corners are all looked at; of more, the ends of each with the others in the middle.
-const MOST_CORNERS: usize = 3;
+/// Corners that are all looked at; where there are more, the ends of each axis with the others in the middle.
+const MOST_CORNERS: usize = 8;
 
 /// Output times of the run by which the steps are judged.
 const JUDGED: usize = 201;
@@ -128,11 +131,8 @@ impl<'a> Transients<'a> {
     fn prepare(&self, settings: &[(String, Setting)], go_on: &dyn Fn() -> bool) -> Result<Prepared, String> {
         let drawn = draw(self.source, &at(self.options, settings)).map_err(|error| brief(&error))?;
         let options = self.transient(settings);
-        let shared = if self.spec.grid_points().is_ok_and(|n| n > 1) {
-            self.mesh.get_or_init(|| self.search(go_on)).as_ref()
-        } else {
-            None
-        };
+        let shared =
+            if self.spec.has_variants() { self.mesh.get_or_init(|| self.search(go_on)).as_ref() } else { None };
         match shared.filter(|shared| alike(&shared.beams, &drawn.structure.beams)) {
             Some(shared) => {
                 let compiled = drawn.on(shared.order.clone()).map_err(|error| error.to_string())?;
@@ -231,37 +231,53 @@ pub(super) fn guarded<T>(budget: Option<&Budget>, job: &mut dyn FnMut() -> Resul
 /// Share of the samples beyond a probe on either side.
 const RARE: f64 = 1e-3;
 
-/// The middle of the grid and its corners: of each axis of numbers the least and the largest, else the first and the last; of what is
-/// drawn the values beyond which one in a thousand lies.
+/// The middle of the grid and its corners: of each axis of numbers the least and the largest, else the first and the last; of what goes
+/// together the points where one of them is at an end; of what is drawn the values beyond which one in a thousand lies.
 fn probes(spec: &SweepSpec) -> Vec<Vec<(String, Setting)>> {
-    let ends = |values: &[Setting]| {
-        let number = |k: &usize| if let Setting::Number(x) = values[*k] { x } else { *k as f64 };
-        let by = |a: &usize, b: &usize| number(a).total_cmp(&number(b));
-        let all = 0..values.len();
-        let end = |k: Option<usize>| values[k.unwrap_or(0)].clone();
-        [end(all.clone().min_by(by)), end(all.max_by(by))]
-    };
+    let ends: Vec<Vec<Vec<(String, Setting)>>> = spec.groups().map(ends).chain(drawn(spec)).collect();
     let middle = middle(spec);
-    let mut axes: Vec<[Setting; 2]> = spec.parameters.iter().map(|axis| ends(&axis.values)).collect();
-    if let Some(samples) = &spec.samples {
-        let both = samples.quantiles(RARE).into_iter().zip(samples.quantiles(1.0 - RARE));
-        axes.extend(both.map(|((_, low), (_, high))| [low, high]));
-    }
+    let with = |probe: &[(String, Setting)], end: &[(String, Setting)]| {
+        let other = |(name, value): &(String, Setting)| {
+            let end = end.iter().find(|(at, _)| at == name).map(|(_, value)| value);
+            (name.clone(), end.unwrap_or(value).clone())
+        };
+        probe.iter().map(other).collect::<Vec<_>>()
+    };
     let mut probes = vec![middle.clone()];
-    if axes.len() <= MOST_CORNERS {
-        for corner in 0..1usize << axes.len() {
-            let at = |i: usize| axes[i][corner >> i & 1].clone();
-            probes.push(middle.iter().enumerate().map(|(i, (name, _))| (name.clone(), at(i))).collect());
+    if ends.iter().map(Vec::len).fold(1, usize::saturating_mul) <= MOST_CORNERS {
+        let mut corners = vec![middle];
+        for ends in &ends {
+            corners = ends.iter().flat_map(|end| corners.iter().map(|corner| with(corner, end))).collect();
         }
+        probes.extend(corners);
     } else {
-        for (i, axis) in axes.iter().enumerate() {
-            for end in axis {
-                let mut at = middle.clone();
-                at[i].1 = end.clone();
-                probes.push(at);
-            }
-        }
+        probes.extend(ends.iter().flatten().map(|end| with(&middle, end)));
     }
     probes.dedup();
     probes
+}
+
+/// The points of an axis where one of what goes together is at an end.
+fn ends(group: &[SweepParameter]) -> Vec<Vec<(String, Setting)>> {
+    let number = |axis: &SweepParameter, k: usize| match axis.values[k] {
+        Setting::Number(x) => x,
+        Setting::Text(_) => k as f64,
+    };
+    let mut places = BTreeSet::new();
+    for axis in group.iter().filter(|axis| axis.option().is_none()) {
+        let by = |a: &usize, b: &usize| number(axis, *a).total_cmp(&number(axis, *b));
+        places.extend((0..axis.values.len()).min_by(by));
+        places.extend((0..axis.values.len()).max_by(by));
+    }
+    if places.is_empty() {
+        places.insert(group[0].values.len() / 2);
+    }
+    let at = |place: usize| group.iter().map(|axis| (axis.name.clone(), axis.values[place].clone())).collect();
+    places.into_iter().map(at).collect()
+}
+
+/// The ends of what is drawn.
+fn drawn(spec: &SweepSpec) -> impl Iterator<Item = Vec<Vec<(String, Setting)>>> {
+    let both = |samples: &Samples| samples.quantiles(RARE).into_iter().zip(samples.quantiles(1.0 - RARE));
+    spec.samples.iter().flat_map(both).map(|(low, high)| vec![vec![low], vec![high]])
 }

@@ -30,11 +30,10 @@ pub fn spec_to_wire(spec: &SweepSpec) -> proto::SweepSpec {
             Analysis::Transient(proto::SweepTransient { stop_s: *stop, outputs, voltages })
         }
     };
-    let axis = |axis: &SweepParameter| proto::SweepParameter {
-        name: axis.name.clone(),
-        values: Some(Values::List(proto::SettingList {
-            values: axis.values.iter().map(|value| setting_to_wire("", value)).collect(),
-        })),
+    let axis = |axis: &SweepParameter| {
+        let list = proto::SettingList { values: axis.values.iter().map(|value| setting_to_wire("", value)).collect() };
+        let values = if axis.in_step { Values::InStep(list) } else { Values::List(list) };
+        proto::SweepParameter { name: axis.name.clone(), values: Some(values) }
     };
     proto::SweepSpec {
         parameters: spec.parameters.iter().map(axis).collect(),
@@ -71,7 +70,8 @@ pub fn grid_points(spec: &proto::SweepSpec) -> usize {
     let values = |axis: &proto::SweepParameter| match &axis.values {
         Some(Values::Linear(linear)) => linear.count as usize,
         Some(Values::List(list)) => list.values.len(),
-        None => 0,
+        // goes along with the one before it
+        Some(Values::InStep(_)) | None => 1,
     };
     let samples = spec.samples.as_ref().map_or(1, |samples| samples.count as usize).max(1);
     spec.parameters.iter().fold(samples, |points, axis| points.saturating_mul(values(axis).max(1)))
@@ -116,21 +116,24 @@ pub fn spec_from_wire(spec: Option<proto::SweepSpec>) -> Result<SweepSpec, Viola
 }
 
 fn axis_from_wire(field: &str, axis: proto::SweepParameter) -> Result<SweepParameter, Violation> {
+    let listed = |list: proto::SettingList, kind: &str| {
+        let convert = |(i, value)| setting_from_wire(&format!("{field}.{kind}.values[{i}]"), value);
+        list.values.into_iter().enumerate().map(convert).collect::<Result<Vec<_>, _>>()
+    };
+    let in_step = matches!(axis.values, Some(Values::InStep(_)));
     let values = match required(&format!("{field}.values"), axis.values)? {
         Values::Linear(l) => {
             let low = number(&format!("{field}.linear.low"), l.low, false)?;
             let high = number(&format!("{field}.linear.high"), l.high, false)?;
             linear(low, high, l.count as usize)
         }
-        Values::List(list) => {
-            let convert = |(i, value)| setting_from_wire(&format!("{field}.list.values[{i}]"), value);
-            list.values.into_iter().enumerate().map(convert).collect::<Result<_, _>>()?
-        }
+        Values::List(list) => listed(list, "list")?,
+        Values::InStep(list) => listed(list, "in_step")?,
     };
     if axis.name.is_empty() {
         return Err(Violation::new(format!("{field}.name"), "the parameter has no name"));
     }
-    Ok(SweepParameter { name: axis.name, values })
+    Ok(SweepParameter { name: axis.name, values, in_step })
 }
 
 /// A row as it travels.
@@ -251,8 +254,13 @@ mod tests {
 
     #[test]
     fn specifications_and_rows_survive_the_wire() {
+        let axis = |text: &str| text.parse::<SweepParameter>().expect("an axis");
         let spec = SweepSpec {
-            parameters: vec!["w=1u:2u:3".parse().expect("an axis"), "layer=p1,p2".parse().expect("an axis")],
+            parameters: vec![
+                axis("w=1u:2u:3"),
+                SweepParameter { in_step: true, ..axis("h=1u,3u,2u") },
+                axis("layer=p1,p2"),
+            ],
             samples: Some(samples()),
             analysis: SweepAnalysis::PullIn { port: None, max: 30.0 },
             shard: Shard { index: 1, count: 4 },

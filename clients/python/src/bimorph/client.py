@@ -141,7 +141,7 @@ class Client:
     def sweep(
         self,
         netlist: str | os.PathLike[str] | Netlist,
-        parameters: Mapping[str, Sequence[float | str]],
+        parameters: sweeps.Axes,
         analysis: sweeps.Analysis,
         *,
         set: Mapping[str, float | str] | None = None,
@@ -151,7 +151,9 @@ class Client:
         progress: Callable[[int, int], object] | None = None,
         **options: Unpack[Options],
     ) -> sweeps.Table:
-        """Runs ``analysis`` on the full grid of ``parameters`` (netlist parameters [SI]), on all cores of the server.
+        """Runs ``analysis`` on the full grid of ``parameters``, on all cores of the server: netlist parameters [SI], voltages of ports (``"heat.v"``
+        [V]) and options of the model (``"option.tol"``) by name. Names in a tuple go together: ``{("w", "gap"): [(2e-6, 1e-6), (1.8e-6, 1.2e-6)]}``
+        is a list of points, and an axis like any other.
 
         ``samples`` are drawn at every point of the grid, which may be empty (``{}``): Monte Carlo.
         ``shard`` (i, n) runs only points whose number modulo n is i. ``progress`` is told (points done, points).
@@ -164,7 +166,7 @@ class Client:
     def submit(
         self,
         netlist: str | os.PathLike[str] | Netlist,
-        parameters: Mapping[str, Sequence[float | str]],
+        parameters: sweeps.Axes,
         analysis: sweeps.Analysis,
         *,
         set: Mapping[str, float | str] | None = None,

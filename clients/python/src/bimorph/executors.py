@@ -14,7 +14,7 @@ from .conversion import LAYOUTS
 from .errors import BimorphError, Unavailable
 from .netlist import Netlist
 from .server import Server, serve
-from .sweep import Analysis, Samples, Table
+from .sweep import Analysis, Axes, Samples, Table
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -39,7 +39,7 @@ class Executor(Protocol):
 def sweep_on(
     executor: Executor,
     netlist: str | os.PathLike[str] | Netlist,
-    parameters: Mapping[str, Sequence[float | str]],
+    parameters: Axes,
     analysis: Analysis,
     *,
     shards: int,

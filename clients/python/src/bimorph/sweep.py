@@ -240,20 +240,41 @@ def setting(name: str, value: float | str) -> Any:
     return model_pb2.Setting(name=name, number=float(value))
 
 
+Value = float | str
+"""A value of a parameter [SI]; flags of options are True and False."""
+Axes = (
+    Mapping[str, Sequence[Value]]
+    | Mapping[tuple[str, ...], Sequence[Sequence[Value]]]
+    | Mapping[str | tuple[str, ...], Sequence[Value] | Sequence[Sequence[Value]]]
+)
+"""Axes of a grid: the values of a parameter by its name, or the points of several that go together by their names in a tuple."""
+
+
+def _axes(parameters: Axes) -> list[Any]:
+    """The axes as they travel."""
+    axes = []
+    for key, values in parameters.items():
+        names = (key,) if isinstance(key, str) else tuple(key)
+        rows = [(value,) for value in values] if isinstance(key, str) else [tuple(row) for row in values]
+        wrong = next((row for row in rows if len(row) != len(names)), None)
+        if not names or wrong is not None:
+            raise ValueError(f"{key!r}: expected a value for each of {len(names)} names at every point, got {wrong!r}")
+        for k, name in enumerate(names):
+            word = name.startswith("option.")
+            listed = [str(row[k]).lower() if word and isinstance(row[k], bool) else row[k] for row in rows]
+            settings = sweep_pb2.SettingList(values=[setting("", value) for value in listed])
+            axes.append(sweep_pb2.SweepParameter(name=name, **{"in_step" if k else "list": settings}))
+    return axes
+
+
 def to_wire(
-    parameters: Mapping[str, Sequence[float | str]],
+    parameters: Axes,
     analysis: Analysis,
     shard: tuple[int, int],
     samples: Samples | None = None,
 ) -> Any:
     """A specification as it travels."""
-    axes = [
-        sweep_pb2.SweepParameter(
-            name=name, list=sweep_pb2.SettingList(values=[setting("", value) for value in values])
-        )
-        for name, values in parameters.items()
-    ]
-    spec = sweep_pb2.SweepSpec(parameters=axes, shard=shard[0], shards=shard[1])
+    spec = sweep_pb2.SweepSpec(parameters=_axes(parameters), shard=shard[0], shards=shard[1])
     if samples is not None:
         spec.samples.CopyFrom(_samples(samples))
     if isinstance(analysis, PullIn):
