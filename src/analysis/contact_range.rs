@@ -3,7 +3,7 @@
 
 use super::AnalysisError;
 use crate::compile::Compiled;
-use crate::gaps::Gap;
+use crate::gaps::Domain;
 use crate::multibody::planar::Pose;
 
 /// Refuses a configuration in which a gap is closed beyond the range of its law, see [`crate::gaps::contact`].
@@ -38,7 +38,7 @@ pub(crate) fn comb_beyond<'a>(compiled: &'a Compiled, q: &[Pose]) -> Option<(&'a
     let system = &compiled.parts.system;
     // combs are the first gaps, in their order
     let beyond = compiled.structure.combs.iter().zip(&system.gaps).filter_map(|(comb, gap)| {
-        let Gap::Single { approach, .. } = gap else { return None };
+        let (approach, _) = gap.law()?;
         let (way, room) = (approach.value(q, system.model.linear), comb.finger[0] - comb.overlap);
         (comb.finger[0] > 0.0 && way > room * (1.0 + 1e-9)).then_some((comb.name.as_str(), [way, room]))
     });

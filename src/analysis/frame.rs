@@ -11,7 +11,7 @@ use super::statics::{NodeMotion, StaticResult, electrical, source_vector};
 use super::{AnalysisError, BeamMotions, NodeMotions, PortVoltages};
 use crate::compile::Compiled;
 use crate::discretize::frame::{Elements, Frame, FrameGaps, FrameOptions, assemble};
-use crate::gaps::{Drive, Gap, Point};
+use crate::gaps::{At, Domain, Drive, Member, Point};
 use crate::multibody::BlockMatrix;
 use crate::multibody::factor::ZeroPivot;
 use crate::multibody::planar::Pose;
@@ -65,7 +65,7 @@ pub fn frame_statics(
     let electrics = &compiled.parts.system.electrics;
     let charge = |port: usize| {
         let gaps = frame.gaps.iter().zip(&drive.volts).enumerate();
-        gaps.map(|(g, (gap, volts))| electrics.gap_rows[(g, port)] * gap.capacitance(true, &q) * volts).sum::<f64>()
+        gaps.map(|(g, (gap, volts))| electrics.gap_rows[(g, port)] * gap.capacitance(drawn(&q)) * volts).sum::<f64>()
     };
     let electrical = electrical(compiled, &sources, &rise);
     let result = StaticResult {
@@ -173,7 +173,7 @@ fn balance(
         let mut borne = vec![Pose::zeros(); system.bodies()];
         system.stiffness.multiply_add(&system.pattern, &q, &mut borne);
         for (gap, volts) in acting(frame, volts) {
-            gap.add_force(true, &q, -0.5 * volts * volts, true, &mut borne);
+            gap.add_force(drawn(&q), volts, &mut borne);
         }
         change.iter_mut().zip(&borne).for_each(|(change, borne)| *change -= borne);
         add_gap_stiffness(frame, &q, volts, &mut tangent.stiffness);
@@ -217,14 +217,19 @@ fn amount(q: &[Pose], size: f64) -> f64 {
 }
 
 /// The gaps with a voltage across them.
-fn acting<'a>(frame: &'a Frame, volts: &'a [f64]) -> impl Iterator<Item = (&'a Gap, f64)> {
+fn acting<'a>(frame: &'a Frame, volts: &'a [f64]) -> impl Iterator<Item = (&'a Member, f64)> {
     frame.gaps.iter().zip(volts.iter().copied()).filter(|(_, volts)| *volts != 0.0)
+}
+
+/// Small displacements about the drawing.
+fn drawn(q: &[Pose]) -> At<'_> {
+    At { q, linear: true }
 }
 
 /// Adds what the field in the gaps does to the stiffness at `q`, contact with it.
 fn add_gap_stiffness(frame: &Frame, q: &[Pose], volts: &[f64], stiffness: &mut BlockMatrix<f64, 3>) {
     for (gap, volts) in acting(frame, volts) {
-        gap.add_tangent((&frame.system.pattern, true), q, -0.5 * volts * volts, stiffness);
+        gap.add_tangent(drawn(q), volts, &frame.system.pattern, stiffness);
     }
 }
 

@@ -6,7 +6,6 @@
 //! a pull-in voltage (found on a cantilever in 1, 2, 4 and 8 pieces). It falls with the fourth power of the number of pieces.
 
 use crate::compile::Compiled;
-use crate::gaps::Gap;
 use crate::multibody::planar::Pose;
 use crate::structure::NodeId;
 use std::collections::HashMap;
@@ -41,17 +40,16 @@ pub(super) fn left_out<'a>(compiled: &'a Compiled, q: &[Pose], volts: &[f64]) ->
     }
     let between = |a: NodeId, b: NodeId| (a.min(b), a.max(b));
     let beams: HashMap<_, _> = structure.beams.iter().rev().map(|beam| (between(beam.a, beam.b), beam)).collect();
-    let facing = (0..system.gaps.len()).filter(|&g| matches!(system.gaps[g], Gap::Facing { .. }));
+    let loads = (0..system.gaps.len()).filter_map(|g| system.line_load(g, q, volts[g]));
     let yields = |a: NodeId, b: NodeId| -> f64 {
         beams.get(&between(a, b)).map_or(0.0, |beam| {
             let stiffness = beam.material.youngs_modulus * beam.thickness * beam.width.powi(3) / 12.0;
             beam.length.powi(4) / (384.0 * stiffness)
         })
     };
-    let share = |(drawn, g): (&'a crate::structure::BeamGap, usize)| {
-        let (load, distance) = system.line_load(g, q, volts[g])?;
+    let share = |(drawn, (load, distance)): (&'a crate::structure::BeamGap, (f64, f64))| {
         let [a, b, c, d] = drawn.nodes;
-        Some((drawn.name.as_str(), load * (yields(a, b) + yields(c, d)) / distance.max(f64::MIN_POSITIVE)))
+        (drawn.name.as_str(), load * (yields(a, b) + yields(c, d)) / distance.max(f64::MIN_POSITIVE))
     };
-    structure.beam_gaps.iter().zip(facing).filter_map(share).max_by(|a, b| a.1.total_cmp(&b.1))
+    structure.beam_gaps.iter().zip(loads).map(share).max_by(|a, b| a.1.total_cmp(&b.1))
 }

@@ -6,9 +6,7 @@ use super::session::Session;
 use super::states::Snapshot;
 use crate::analysis::signal::{self, Signal, View};
 use crate::compile::Compiled;
-use crate::gaps::Point;
-use crate::gaps::capacitor::Capacitor;
-use crate::gaps::system::Gap;
+use crate::gaps::{Domain, Point};
 
 /// Quantities of a state as a whole, with what they are, by the names under which [`super::Device::look`] knows them beside signals.
 pub const WHOLE: [(&str, &str); 3] = [
@@ -26,12 +24,7 @@ pub(super) fn names(compiled: &Compiled) -> Vec<String> {
 
 /// Gaps that close, of those there are: plates and facing beams.
 fn closing(compiled: &Compiled) -> impl Iterator<Item = usize> {
-    let closes = |gap: &Gap| match gap {
-        Gap::Single { capacitor, .. } => !matches!(capacitor, Capacitor::Comb { .. }),
-        Gap::Facing { .. } => true,
-        Gap::Stop { .. } => false,
-    };
-    compiled.parts.system.gaps.iter().enumerate().filter(move |(_, gap)| closes(gap)).map(|(g, _)| g)
+    compiled.parts.system.gaps.iter().enumerate().filter(|(_, gap)| gap.closes()).map(|(g, _)| g)
 }
 
 impl Session {

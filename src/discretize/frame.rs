@@ -15,8 +15,8 @@
 
 use super::bar::bar;
 use super::rigid::Assembly;
-use super::{DiscretizeError, cubic, gap, lay_spring, order};
-use crate::gaps::{Gap, Point};
+use super::{DiscretizeError, cubic, lay_spring, order};
+use crate::gaps::{Member, Point};
 use crate::multibody::linear_system::{LinearSystem, add_pair};
 use crate::multibody::planar::{JointFrame, Pose};
 use crate::multibody::{BodyId, BodyName, Joint};
@@ -75,7 +75,7 @@ pub struct Frame {
     /// For each beam, the points along its centreline, ends included.
     pub beams: Vec<Vec<Point>>,
     /// Gaps in the order of the product's own; none where they are left out.
-    pub gaps: Vec<Gap>,
+    pub gaps: Vec<Member>,
 }
 
 /// Assembles the frame of a drawing.
@@ -95,14 +95,14 @@ pub fn assemble(structure: &Structure, options: &FrameOptions) -> Result<Frame, 
     }
     rigid.hold_hinges(structure, &mut joints);
 
-    let (gaps, _, across) = match options.gaps {
-        FrameGaps::LeftOut => Default::default(),
-        FrameGaps::Laid { chord } => gap::lay(structure, &rigid, chord),
+    let gaps = match options.gaps {
+        FrameGaps::LeftOut => Vec::new(),
+        FrameGaps::Laid { chord } => rigid.gaps(structure, chord),
     };
     let couplings: Vec<(BodyId, BodyId)> = (pieces.iter().map(|p| (p.from.body, p.to.body)))
         .chain(joints.iter().map(|j: &Joint| (j.a, j.b)))
         .chain(dampers.iter().map(|d| (d.a, d.b)))
-        .chain(across)
+        .chain(super::couplings(&gaps))
         .collect();
     let bodies = rigid.finish_bodies().into_iter().map(|b| (b.name.to_string(), b.free.map(|p| *p))).collect();
     let (mut system, place) = LinearSystem::new(bodies, &couplings);
@@ -168,7 +168,7 @@ pub fn assemble(structure: &Structure, options: &FrameOptions) -> Result<Frame, 
     let nodes =
         (0..structure.nodes.len()).map(|n| structure.nodes[n].mechanical.then(|| placed(rigid.point(n)))).collect();
     let beams = beams.into_iter().map(|points| points.into_iter().map(placed).collect()).collect();
-    let gaps = gaps.into_iter().map(|g| gap::centered(g, &placed)).collect();
+    let gaps = gaps.into_iter().map(|laid| laid.member.moved(&placed)).collect();
     Ok(Frame { system, load, expansion, nodes, beams, gaps })
 }
 

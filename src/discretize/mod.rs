@@ -21,7 +21,6 @@
 //! | [`beam`] | a cut beam in the drawing: bodies, masses, joints, points |
 //! | [`cubic`] | the cubic beam element, and the next term of its dynamic stiffness |
 //! | [`frame`] | the same drawing as a linear frame of cubic beam elements: a baseline |
-//! | [`gap`] | combs, plates and facing beams → gap functions |
 //! | [`ports`] | resistors, heaters, sources and ports → network and quadratic forms of temperature |
 
 pub(crate) mod bar;
@@ -30,7 +29,6 @@ pub mod cubic;
 mod error;
 mod excess;
 pub mod frame;
-pub mod gap;
 pub mod junction;
 pub mod junction_limits;
 pub mod junction_springs;
@@ -46,7 +44,7 @@ pub use crate::options::{Junctions, Scheme};
 pub use error::{DiscretizeError, MOST_SEGMENTS};
 
 use crate::budget;
-use crate::gaps::{Load, Point, System};
+use crate::gaps::{Domain, Laid, Load, Member, Point, System};
 use crate::multibody::{BodyId, Coupling, Damper, Joint, Model};
 use crate::options::CompileOptions;
 use crate::structure::Structure;
@@ -149,7 +147,8 @@ pub fn discretize_like(
         lay_spring(spring, options.undamped, &rigid, &mut joints, &mut dampers);
     }
     rigid.hold_hinges(structure, &mut joints);
-    let (gaps, gap_names, mut couplings) = gap::lay(structure, &rigid, options.as_sugar);
+    let gaps = rigid.gaps(structure, options.as_sugar);
+    let mut couplings = couplings(&gaps);
     let loads: Vec<(usize, Load)> = structure
         .loads
         .iter()
@@ -160,7 +159,7 @@ pub fn discretize_like(
         .collect();
     let electrics = match other {
         Some(other) => other.system.electrics.clone(),
-        None => ports::lay(structure, &heaters, &rigid)?,
+        None => ports::lay(structure, &heaters, &gaps, &rigid)?,
     };
     let narrowest = structure.beams.iter().map(|b| b.width).fold(f64::INFINITY, f64::min);
     let gap_scale = structure.plate_gaps.iter().map(|g| g.gap).chain(structure.combs.iter().map(|c| c.gap));
@@ -184,9 +183,10 @@ pub fn discretize_like(
     }
     let model = model.couple(coupled);
     let moved = |p: Point| rigid.centered(p, &place);
+    let gap_names = gaps.iter().map(|laid| laid.name.to_owned()).collect();
     let system = System {
         model,
-        gaps: gaps.into_iter().map(|g| gap::centered(g, &moved)).collect(),
+        gaps: gaps.into_iter().map(|laid| laid.member.moved(&moved)).collect(),
         loads: loads.into_iter().map(|(_, l)| Load { point: moved(l.point), ..l }).collect(),
         electrics,
         length_scale: if scale.is_finite() { scale } else { 1e-6 },
@@ -203,6 +203,19 @@ impl Discretized {
     pub fn beyond_table(&self, structure: &Structure) -> Option<junction_limits::Beyond> {
         junction_limits::beyond(structure, &self.ends)
     }
+}
+
+/// The pairs of bodies that gaps couple.
+fn couplings(gaps: &[Laid<'_, Member>]) -> Vec<(BodyId, BodyId)> {
+    let (mut pairs, mut bodies) = (Vec::new(), Vec::new());
+    for laid in gaps {
+        bodies.clear();
+        laid.member.bodies(|body| bodies.push(body));
+        for (i, a) in bodies.iter().enumerate() {
+            pairs.extend(bodies[..i].iter().map(|b| (*a, *b)));
+        }
+    }
+    pairs
 }
 
 /// A lumped spring and damper: a joint half way between its two nodes.

@@ -8,14 +8,21 @@ use super::rigid::Assembly;
 use crate::gaps::drive::Electrics;
 use crate::gaps::network::{Circuit, CircuitError};
 use crate::gaps::thermal::{Heater, Heating};
+use crate::gaps::{Laid, Member};
 use crate::structure::{GapVoltage, Structure};
 use nalgebra::{DMatrix, RowDVector};
 
-/// Builds the electrical side; `heated` lists the beams that are heaters, in heater order.
+/// Builds the electrical side; `heated` lists the beams that are heaters, in heater order, and `gaps` what
+/// acts across gaps.
 ///
 /// # Errors
 /// [`DiscretizeError::SourceLoop`], [`DiscretizeError::Conductances`], [`DiscretizeError::NoHeatSink`].
-pub fn lay(structure: &Structure, heated: &[usize], rigid: &Assembly) -> Result<Electrics, DiscretizeError> {
+pub fn lay(
+    structure: &Structure,
+    heated: &[usize],
+    gaps: &[Laid<'_, Member>],
+    rigid: &Assembly,
+) -> Result<Electrics, DiscretizeError> {
     let ports = structure.ports.len();
     let mut names: Vec<String> = structure.ports.iter().map(|p| p.name.clone()).collect();
     names.extend(structure.voltage_sources.iter().map(|s| s.name.clone()));
@@ -62,28 +69,26 @@ pub fn lay(structure: &Structure, heated: &[usize], rigid: &Assembly) -> Result<
         }
     })?;
     let driven = potentials.potential.ncols();
-    let gaps = structure.combs.len() + structure.plate_gaps.len() + structure.beam_gaps.len();
+    let fields = gaps.iter().filter(|gap| gap.voltage.is_some()).count();
     // a gap with a voltage of its own is a source
-    crate::budget::lay_out_matrix(gaps + 2 * ports, driven + ports + structure.voltage_sources.len() + gaps);
+    crate::budget::lay_out_matrix(fields + 2 * ports, driven + ports + structure.voltage_sources.len() + fields);
 
-    let voltages = (structure.combs.iter().map(|c| (&c.name, &c.voltage)))
-        .chain(structure.plate_gaps.iter().map(|g| (&g.name, &g.voltage)))
-        .chain(structure.beam_gaps.iter().map(|g| (&g.name, &g.voltage)));
-    let mut rows: Vec<Result<Vec<f64>, usize>> = Vec::new();
-    for (name, voltage) in voltages {
-        rows.push(match voltage {
-            GapVoltage::Nodes(a, b) => Ok(potentials.difference(net[a.0], net[b.0]).iter().copied().collect()),
-            GapVoltage::Fixed(v) => {
+    let mut rows: Vec<(usize, Result<Vec<f64>, usize>)> = Vec::new();
+    for (g, gap) in gaps.iter().enumerate() {
+        let row = match gap.voltage {
+            None => continue,
+            Some(GapVoltage::Nodes(a, b)) => Ok(potentials.difference(net[a.0], net[b.0]).iter().copied().collect()),
+            Some(GapVoltage::Fixed(v)) => {
                 fixed.push(*v);
-                names.push(name.clone());
+                names.push(gap.name.to_owned());
                 Err(ports + fixed.len() - 1)
             }
-        });
+        };
+        rows.push((g, row));
     }
     let sources = ports + fixed.len();
-    // stops have no field
-    let mut gap_rows = DMatrix::zeros(rows.len() + structure.stops.len(), sources);
-    for (g, row) in rows.into_iter().enumerate() {
+    let mut gap_rows = DMatrix::zeros(gaps.len(), sources);
+    for (g, row) in rows {
         match row {
             Ok(row) => gap_rows.view_mut((g, 0), (1, driven)).copy_from(&RowDVector::from_vec(row)),
             Err(own) => gap_rows[(g, own)] = 1.0,

@@ -4,11 +4,11 @@
 //! Until [`Assembly::finish_bodies`] every point is given from its group's reference point (the position of the group's
 //! first node); after it, from the centre of mass, in which the mass matrix is diagonal and constant.
 
-use crate::gaps::Point;
+use crate::gaps::{Drawing, Laid, Member, Point};
 use crate::multibody::planar::JointFrame;
 use crate::multibody::{Body, BodyId, BodyName, Drag, Joint};
 use crate::sets::Sets;
-use crate::structure::{Beam, Mass, Structure};
+use crate::structure::{Beam, Mass, NodeId, Structure};
 use nalgebra::{Matrix2, Matrix3, Vector2};
 
 /// Stiffness of a hinge over that of the stiffest beam or spring.
@@ -157,6 +157,11 @@ impl Assembly {
     pub fn frame(&self, a: usize, b: usize, angle: f64) -> JointFrame {
         let middle = (self.position[a] + self.position[b]) * 0.5;
         self.frame_at(self.point(a), self.point(b), middle, Vector2::new(angle.cos(), angle.sin()))
+    }
+
+    /// What acts across gaps; `chord`: facing beams as SUGAR has them.
+    pub fn gaps<'a>(&self, structure: &'a Structure, chord: bool) -> Vec<Laid<'a, Member>> {
+        Member::lay(&Drawing { structure, point: &|node: NodeId| self.point(node.0), chord })
     }
 
     /// The frame of a joint at a drawn position, whose x axis lies along `axis`.

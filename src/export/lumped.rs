@@ -23,7 +23,7 @@ use crate::device::ports::{Answer, Ports};
 use crate::device::scale::Scale;
 use crate::gaps::capacitor::Capacitor;
 use crate::gaps::drive::Electrics;
-use crate::gaps::{Gap, Input, System};
+use crate::gaps::{Domain, Input, Member, System};
 pub use model::{Coordinate, Law, Lumped, LumpedGap, Reading};
 use nalgebra::{DMatrix, DVector};
 use sliding::{UNHELD, along, axis, coordinates, dampers, springs};
@@ -125,14 +125,10 @@ fn gaps(
     coordinates: &[Coordinate],
 ) -> Result<Vec<LumpedGap>, ExportError> {
     let electrics = &system.electrics;
-    let gap = |(g, gap): (usize, &Gap)| {
-        let (approach, law) = match gap {
-            Gap::Single { approach, capacitor, contact } => (approach, Law::Field(*capacitor, *contact)),
-            Gap::Stop { approach, ways, stop } => (approach, Law::Stop(*ways, *stop)),
-            Gap::Facing { .. } => {
-                let why = format!("gap \"{}\" lies along beams", compiled.parts.gap_names[g]);
-                return Err(ExportError::NotLumped { why });
-            }
+    let gap = |(g, gap): (usize, &Member)| {
+        let Some((approach, law)) = gap.law() else {
+            let why = format!("gap \"{}\" lies along beams", compiled.parts.gap_names[g]);
+            return Err(ExportError::NotLumped { why });
         };
         let (by_port, constant) = by_port(electrics, ports, &|s| electrics.gap_rows[(g, s)]);
         let name = compiled.parts.gap_names[g].clone();

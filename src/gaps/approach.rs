@@ -77,6 +77,40 @@ impl Approach {
             bend: [n.dot(&sa), -n.dot(&sb)],
         }
     }
+
+    /// Its two bodies.
+    pub(super) fn bodies(&self) -> [BodyId; 2] {
+        [self.a.body, self.b.body]
+    }
+
+    /// The same with its points where `to` takes them.
+    #[must_use]
+    pub(super) fn moved(self, to: &dyn Fn(Point) -> Point) -> Self {
+        Self { a: to(self.a), b: to(self.b), ..self }
+    }
+
+    /// `r +=` the forces of a potential φ(u) with the derivative φ′ = `first`.
+    #[inline]
+    pub(super) fn add_force(&self, m: &Measured, first: f64, r: &mut [Pose]) {
+        let f = m.gradient * first;
+        for (id, part) in [(self.a.body, f.fixed_rows::<3>(0)), (self.b.body, f.fixed_rows::<3>(3))] {
+            if let BodyId::Free(k) = id {
+                r[k] += part;
+            }
+        }
+    }
+
+    /// Change of u with a change `dq` of the configuration where it was measured [m].
+    pub(super) fn change(&self, m: &Measured, dq: &[Pose]) -> f64 {
+        let (da, db) = (Model::pose(dq, self.a.body), Model::pose(dq, self.b.body));
+        m.gradient.fixed_rows::<3>(0).dot(&da) + m.gradient.fixed_rows::<3>(3).dot(&db)
+    }
+
+    /// The forces of that potential on its points: −φ′·n on a, φ′·n on b.
+    pub(super) fn levers(&self, first: f64, mut lever: impl FnMut(Point, Vector2<f64>)) {
+        lever(self.a, self.axis * -first);
+        lever(self.b, self.axis * first);
+    }
 }
 
 impl Measured {

@@ -3,10 +3,11 @@
 //! At constant voltages and temperatures Π = U(q) − Σ ½·C(q)·V² + contact − load · displacement, and kinetic energy plus Π
 //! does not change: what the sources deliver is in −½·C·V².
 
+use super::domain::Domain;
 use super::drive::Drive;
 use super::system::System;
-use crate::multibody::planar::{self, Pose};
-use crate::multibody::{BodyId, forces};
+use crate::multibody::forces;
+use crate::multibody::planar::Pose;
 
 impl System {
     /// Potential Π(q) at a drive [J]; see [`crate::gaps::energy`].
@@ -18,11 +19,12 @@ impl System {
             }
         }
         sum += self.contact_energy(q);
+        let at = self.at(q);
+        for (gap, &volts) in self.gaps.iter().zip(&drive.volts) {
+            sum += gap.energy(at, volts);
+        }
         for load in &self.loads {
-            if let BodyId::Free(k) = load.point.body {
-                let moved = planar::point(&q[k], load.point.arm, self.model.linear);
-                sum -= drive.load * (moved.dot(&load.force) + q[k].z * load.moment);
-            }
+            sum += load.energy(at, drive.load);
         }
         sum
     }

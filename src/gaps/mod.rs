@@ -13,9 +13,12 @@
 //! | [`backbending`] | the strength of a hot arm, beyond which it is shortened for good |
 //! | [`capacitor`] | C(u) of a comb and of parallel plates |
 //! | [`contact`] | pressure between surfaces that touch |
+//! | [`domain`] | the trait of all that acts; [`member`]: which there are, and how each call finds its own |
+//! | [`drawn`] | from a drawing to them |
+//! | [`electrodes`], [`facing_beams`], [`stop_pair`] | combs and plates; beams that face each other; stops |
+//! | [`load`], [`point_force`], [`moving_frame`] | dead loads; forces that sources give; the motion of the frame |
 //! | [`facing`] | two facing beams: pressure along a gap that varies over their length |
 //! | `facing_ends` | where facing beams measure |
-//! | `gap` | the forces of a gap, and their tangent |
 //! | [`network`] | potentials of a resistive network driven by ports and sources |
 //! | `laplacian` | potentials in a network of conductors |
 //! | [`thermal`] | mean temperature rise of beams that carry current |
@@ -24,7 +27,7 @@
 //! | [`inputs`] | forces at points, heat into beams, the motion of the frame: what they do; `input`: which there are |
 //! | [`energy`] | the potential of it all, and the energy that an undamped motion keeps |
 //! | [`stop`] | how a stop bears |
-//! | `touching` | which gaps touch, and the energy in contacts |
+//! | `reading` | what is read of gaps: capacitance, distance, pull, which of them touch |
 //! | [`system`] | a multibody model with its gaps, loads and network: what `solve` works on |
 
 pub mod approach;
@@ -32,24 +35,35 @@ pub mod backbending;
 pub mod capacitor;
 mod conduction;
 pub mod contact;
+pub mod domain;
+pub mod drawn;
 pub mod drive;
+pub mod electrodes;
 pub mod energy;
 pub mod facing;
+pub mod facing_beams;
 mod facing_ends;
-mod gap;
 mod input;
 pub mod inputs;
 pub mod lag;
 mod laplacian;
+pub mod load;
+pub mod member;
+pub mod moving_frame;
 pub mod network;
-mod pull;
+pub mod point_force;
+mod reading;
 pub mod stop;
-mod stress_stiffness;
+pub mod stop_pair;
 pub mod system;
 pub mod thermal;
-mod touching;
 
+pub use approach::Point;
+pub use domain::{At, Domain, Law};
+pub use drawn::{Drawing, Laid};
 pub use drive::{Drive, Ramp};
 pub use input::Input;
 pub use lag::Lags;
-pub use system::{Gap, Load, Point, System};
+pub use load::Load;
+pub use member::Member;
+pub use system::System;

@@ -2,27 +2,14 @@
 //!
 //! The residual is r(q, drive) = ∂Π/∂q − load, so that statics is r = 0 and dynamics M·q̈ + C·q̇ + r = 0.
 
-use super::approach::Approach;
-pub use super::approach::Point;
-use super::capacitor::Capacitor;
+use super::approach::Point;
+use super::domain::{At, Domain};
 use super::drive::{Drive, Electrics};
-use super::facing_ends;
-pub use super::gap::Gap;
-use super::stop;
-use crate::multibody::planar::{self, Pose};
+use super::load::Load;
+use super::member::Member;
+use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, BodyId, Model, forces};
 use nalgebra::Vector2;
-
-/// A dead load on a point.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Load {
-    /// Where it acts.
-    pub point: Point,
-    /// Force [N].
-    pub force: Vector2<f64>,
-    /// Moment [N·m].
-    pub moment: f64,
-}
 
 /// What `solve` works on. Immutable; shared by sessions.
 #[derive(Debug, Clone)]
@@ -30,7 +17,7 @@ pub struct System {
     /// Bodies and joints.
     pub model: Model,
     /// Gaps, in the order of [`Drive::volts`].
-    pub gaps: Vec<Gap>,
+    pub gaps: Vec<Member>,
     /// Dead loads.
     pub loads: Vec<Load>,
     /// Ports, sources, heaters.
@@ -65,11 +52,14 @@ impl System {
     /// `r +=` the share of gaps, contacts and dead loads in the residual: minus the wrench on each body. A formulation that
     /// has its own way with joints needs only this of a system.
     pub fn add_body_forces(&self, q: &[Pose], drive: &Drive, r: &mut [Pose]) {
+        let at = self.at(q);
         for (gap, &volts) in self.gaps.iter().zip(&drive.volts).filter(|(gap, volts)| gap.acts(**volts)) {
-            gap.add_force(self.model.linear, q, -0.5 * volts * volts, true, r);
+            gap.add_force(at, volts, r);
         }
-        self.add_loads(q, -drive.load, r);
-        self.add_input_forces(q, drive, r);
+        for load in &self.loads {
+            load.add_force(at, drive.load, r);
+        }
+        self.add_input_forces(at, drive, r);
     }
 
     /// True where [`System::add_body_forces`] adds anything.
@@ -80,11 +70,14 @@ impl System {
 
     /// `tangent +=` the share of gaps, contacts and dead loads in ∂r/∂q.
     pub fn add_body_tangent(&self, q: &[Pose], drive: &Drive, tangent: &mut BlockMatrix<f64, 3>) {
+        let (at, pattern) = (self.at(q), &self.model.pattern);
         for (gap, &volts) in self.gaps.iter().zip(&drive.volts).filter(|(gap, volts)| gap.acts(**volts)) {
-            gap.add_tangent((&self.model.pattern, self.model.linear), q, -0.5 * volts * volts, tangent);
+            gap.add_tangent(at, volts, pattern, tangent);
         }
-        self.add_load_tangent(q, -drive.load, tangent);
-        self.add_input_tangent(q, drive, tangent);
+        for load in &self.loads {
+            load.add_tangent(at, drive.load, pattern, tangent);
+        }
+        self.add_input_tangent(at, drive, tangent);
     }
 
     /// The tangent ∂r/∂q and the residual r. The tangent's held directions are left to the caller, who may add inertia.
@@ -117,100 +110,68 @@ impl System {
 
     /// The share of gaps, loads and inputs in that, held directions not removed.
     pub fn add_body_drive_force(&self, q: &[Pose], drive: &Drive, change: &Drive, out: &mut [Pose]) {
+        let at = self.at(q);
         for ((gap, &volts), &dv) in self.gaps.iter().zip(&drive.volts).zip(&change.volts) {
             if dv != 0.0 {
-                gap.add_force(self.model.linear, q, -volts * dv, false, out);
+                gap.add_force_change(at, volts, dv, out);
             }
         }
         if change.load != 0.0 {
-            self.add_loads(q, -change.load, out);
-        }
-        self.add_input_change(q, drive, change, out);
-    }
-
-    /// Capacitance of a gap [F].
-    pub fn capacitance(&self, gap: usize, q: &[Pose]) -> f64 {
-        self.gaps[gap].capacitance(self.model.linear, q)
-    }
-
-    /// Change of a gap's capacitance with a change `dq` of the configuration [F].
-    pub fn capacitance_slope(&self, gap: usize, q: &[Pose], dq: &[Pose]) -> f64 {
-        match &self.gaps[gap] {
-            Gap::Single { approach, capacitor, .. } => {
-                let m = approach.measure(q, self.model.linear);
-                let (da, db) = (Model::pose(dq, approach.a.body), Model::pose(dq, approach.b.body));
-                let g = &m.gradient;
-                capacitor.at(m.value).slope * (g.fixed_rows::<3>(0).dot(&da) + g.fixed_rows::<3>(3).dot(&db))
+            for load in &self.loads {
+                load.add_force_change(at, drive.load, change.load, out);
             }
-            Gap::Facing { ends, side, facing } => {
-                let c = facing.at(&facing_ends::values(self.model.linear, ends, *side, q));
-                c.gradient.dot(&facing_ends::changes(self.model.linear, ends, *side, q, dq))
-            }
-            Gap::Stop { .. } => 0.0,
         }
+        self.add_input_change(at, drive, change, out);
     }
 
-    /// Distance left in a gap [m]: overlap of a comb, gap of plates, smallest gap of facing beams, way left to the nearer side of
-    /// a stop.
-    pub fn distance(&self, gap: usize, q: &[Pose]) -> f64 {
-        match &self.gaps[gap] {
-            Gap::Single { approach, capacitor, .. } => capacitor.distance(approach.value(q, self.model.linear)),
-            Gap::Facing { ends, side, facing } => {
-                facing.closest(&facing_ends::values(self.model.linear, ends, *side, q)).0
-            }
-            Gap::Stop { approach, ways, .. } => stop::nearer(ways, approach.value(q, self.model.linear)).0,
-        }
+    /// `tangent +=` what the forces at `q` under `drive` add to the stiffness of a linear model; nothing in any other, whose tangent has it.
+    ///
+    /// Small displacements about the drawing have K of unstressed parts. Vibrations about an equilibrium have more: the forces N, V, M in
+    /// the joints turn with them (K_σ of [`forces::add_stress_stiffness`]), and so do the points at which loads, voltage and contact act:
+    /// [`System::add_levers`]. Left out, a beam of N segments under thrust is too stiff by a share that falls with 1/N only.
+    pub fn add_stress_stiffness(&self, q: &[Pose], drive: &Drive, tangent: &mut BlockMatrix<f64, 3>) {
+        forces::add_stress_stiffness(&self.model, q, &drive.rest(), tangent);
+        self.add_levers(q, drive, tangent);
     }
 
-    /// Change of a gap's distance with a change `dq` of the configuration [m].
-    pub fn distance_slope(&self, gap: usize, q: &[Pose], dq: &[Pose]) -> f64 {
-        let along = |a: &Approach| {
-            let g = a.measure(q, self.model.linear).gradient;
-            g.fixed_rows::<3>(0).dot(&Model::pose(dq, a.a.body)) + g.fixed_rows::<3>(3).dot(&Model::pose(dq, a.b.body))
+    /// The share in it of the points at which forces act: a body that turns by θ carries the point at its arm r along, and the force F,
+    /// which keeps its direction, gets the lever −θ·r, a moment of −θ·(r·F).
+    pub fn add_levers(&self, q: &[Pose], drive: &Drive, tangent: &mut BlockMatrix<f64, 3>) {
+        if !self.model.linear {
+            return;
+        }
+        let mut lever = |point: Point, force: Vector2<f64>| {
+            if let BodyId::Free(k) = point.body {
+                tangent.diagonal[k][(2, 2)] += point.arm.dot(&force);
+            }
         };
-        match &self.gaps[gap] {
-            Gap::Single { approach, capacitor: Capacitor::Comb { .. }, .. } => along(approach),
-            Gap::Single { approach, .. } => -along(approach),
-            Gap::Facing { ends, side, facing } => {
-                let (_, weights) = facing.closest(&facing_ends::values(self.model.linear, ends, *side, q));
-                weights.dot(&facing_ends::changes(self.model.linear, ends, *side, q, dq))
-            }
-            Gap::Stop { approach, ways, .. } => {
-                stop::nearer(ways, approach.value(q, self.model.linear)).1 * along(approach)
-            }
+        let at = self.at(q);
+        for load in &self.loads {
+            load.levers(at, drive.load, &mut lever);
+        }
+        for (gap, &volts) in self.gaps.iter().zip(&drive.volts) {
+            gap.levers(at, volts, &mut lever);
         }
     }
 
     /// Bodies that gaps and dead loads act on, ascending.
     pub fn acted_on(&self) -> Vec<usize> {
-        let of_gap = |gap: &Gap| match gap {
-            Gap::Single { approach, .. } | Gap::Stop { approach, .. } => vec![approach.a.body, approach.b.body],
-            Gap::Facing { ends, .. } => facing_ends::bodies(ends).to_vec(),
+        let mut bodies = Vec::new();
+        let mut see = |id: BodyId| {
+            if let BodyId::Free(k) = id {
+                bodies.push(k);
+            }
         };
-        let ids = self.gaps.iter().flat_map(of_gap).chain(self.loads.iter().map(|load| load.point.body));
-        let free = |id: BodyId| if let BodyId::Free(k) = id { Some(k) } else { None };
-        let mut bodies: Vec<usize> = ids.filter_map(free).collect();
+        self.gaps.iter().for_each(|gap| gap.bodies(&mut see));
+        self.loads.iter().for_each(|load| load.bodies(&mut see));
         bodies.sort_unstable();
         bodies.dedup();
         bodies
     }
 
-    fn add_loads(&self, q: &[Pose], scale: f64, r: &mut [Pose]) {
-        for load in &self.loads {
-            if let BodyId::Free(k) = load.point.body {
-                let mut w = planar::wrench(&q[k], load.point.arm, load.force, self.model.linear);
-                w.z += load.moment;
-                r[k] += w * scale;
-            }
-        }
-    }
-
-    fn add_load_tangent(&self, q: &[Pose], scale: f64, tangent: &mut BlockMatrix<f64, 3>) {
-        for load in &self.loads {
-            if let BodyId::Free(k) = load.point.body {
-                let (_, bend) = planar::point_turn(&q[k], load.point.arm, self.model.linear);
-                tangent.diagonal[k][(2, 2)] += scale * bend.dot(&load.force);
-            }
-        }
+    /// A configuration, as domains take it.
+    #[inline]
+    pub(super) fn at<'a>(&self, q: &'a [Pose]) -> At<'a> {
+        At { q, linear: self.model.linear }
     }
 }

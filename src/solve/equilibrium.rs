@@ -15,7 +15,7 @@ pub mod path;
 pub mod side_by_side;
 
 use super::SolveError;
-use crate::gaps::{Drive, System};
+use crate::gaps::{Domain, Drive, System};
 use crate::multibody::BlockMatrix;
 use crate::multibody::factor::ZeroPivot;
 use crate::multibody::planar::Pose;

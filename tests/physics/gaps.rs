@@ -6,7 +6,7 @@ use bimorph::analysis::modes::modes;
 use bimorph::analysis::pull_in::pull_in;
 use bimorph::analysis::statics::static_equilibrium;
 use bimorph::compile::CompileOptions;
-use bimorph::gaps::Point;
+use bimorph::gaps::{At, Domain, Point};
 use bimorph::multibody::planar::Pose;
 use bimorph::multibody::{BlockMatrix, BodyId};
 use nalgebra::{DMatrix, DVector};
@@ -198,7 +198,7 @@ fn differences_of_a_nanometre() {
     let force = |q: &[Pose]| {
         let mut force = vec![Pose::zeros(); 2];
         for gap in &frame.gaps {
-            gap.add_force(true, q, -0.5 * 100.0, true, &mut force);
+            gap.add_force(At { q, linear: true }, 10.0, &mut force);
         }
         flat(&force)
     };

@@ -1,9 +1,7 @@
 //! The model of rigid parts that slide: coordinates, springs and dampers, gaps, and what is read.
 
 use super::super::linear::{Port, SignalShown};
-use crate::gaps::capacitor::Capacitor;
-use crate::gaps::contact::Contact;
-use crate::gaps::stop::Stop;
+pub use crate::gaps::Law;
 use nalgebra::{DMatrix, DVector, Vector2};
 
 /// Way of one part along one direction.
@@ -19,15 +17,6 @@ pub struct Coordinate {
     pub mass: f64,
     /// What its rate is measured in: that many per second of a micrometre is 1 V [rad/s].
     pub omega: f64,
-}
-
-/// What a gap does.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Law {
-    /// Capacitance, and contact where parts touch.
-    Field(Capacitor, Option<Contact>),
-    /// A stop, with its ways ahead and back [m].
-    Stop([Option<f64>; 2], Stop),
 }
 
 /// A gap with what it depends on.

@@ -11,7 +11,7 @@ pub use storage::LaneEquilibrium;
 
 use super::path::LoadPath;
 use super::{EquilibriumOptions, LEAP, STALLED};
-use crate::gaps::{Drive, System};
+use crate::gaps::{Domain, Drive, System};
 use crate::multibody::lanes::{Eight, LANES, LanePose, Real, across};
 use crate::multibody::planar::Pose;
 use kernels::{Task, Work};

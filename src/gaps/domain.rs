@@ -1,0 +1,143 @@
+//! What couples to a mechanism: one trait for fields, contacts, loads and the motion of a frame.
+//!
+//! The mechanism knows bodies and joints; a domain knows where those are and what drives it, and says what that does to them.
+//! Its potential Π(q, u) gives all of it, so that forces, stiffness, charges and the small-signal response agree:
+//! ```text
+//! forces ∂Π/∂q      tangent ∂²Π/∂q²      change of the forces with what drives it ∂²Π/∂q∂u      charge −∂Π/∂u
+//! ```
+//! Nothing here is called through a pointer: [`super::member::Member`] is one of the registered domains, chosen by a `match`.
+
+use super::approach::{Approach, Point};
+use super::capacitor::Capacitor;
+use super::contact::Contact;
+use super::stop::Stop;
+use crate::multibody::planar::Pose;
+use crate::multibody::{BlockMatrix, BodyId, Pattern};
+use nalgebra::Vector2;
+
+/// Where the bodies are.
+#[derive(Debug, Clone, Copy)]
+pub struct At<'a> {
+    /// Displacements.
+    pub q: &'a [Pose],
+    /// Small displacements about the drawing.
+    pub linear: bool,
+}
+
+/// A law of one approach, as other simulators can write it down.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Law {
+    /// A field, and what bears where its conductors touch.
+    Field(Capacitor, Option<Contact>),
+    /// A stop with the ways to its two sides [m].
+    Stop([Option<f64>; 2], Stop),
+}
+
+/// One thing that acts on bodies. Forces are those of the residual: minus the wrench on each body.
+pub trait Domain {
+    /// What drives it: the voltage across a gap [V], the share of the dead loads that acts [1], a force [N], the motion of a frame.
+    type Given: Copy;
+
+    /// `see` is told each body that forces act on.
+    fn bodies(&self, see: impl FnMut(BodyId));
+
+    /// `r += ∂Π/∂q`, held directions not removed.
+    fn add_force(&self, at: At<'_>, given: Self::Given, r: &mut [Pose]);
+
+    /// `r += (∂²Π/∂q∂u)·change`: how the forces at `given` change with it.
+    fn add_force_change(&self, at: At<'_>, given: Self::Given, change: Self::Given, r: &mut [Pose]);
+
+    /// `tangent += ∂²Π/∂q²`, on a pattern that couples its bodies.
+    fn add_tangent(&self, at: At<'_>, given: Self::Given, pattern: &Pattern, tangent: &mut BlockMatrix<f64, 3>);
+
+    /// False where it adds no force, wherever the bodies are.
+    fn acts(&self, given: Self::Given) -> bool {
+        let _ = given;
+        true
+    }
+
+    /// `lever` is told each point that a force of fixed direction acts on, and the force [N]: what a linear model's tangent leaves out.
+    fn levers(&self, at: At<'_>, given: Self::Given, lever: impl FnMut(Point, Vector2<f64>)) {
+        let _ = (at, given, lever);
+    }
+
+    /// Π [J] but for the shares of a field, −½·C·V², and of contact, which are told apart below.
+    fn energy(&self, at: At<'_>, given: Self::Given) -> f64 {
+        let _ = (at, given);
+        0.0
+    }
+
+    /// Capacitance [F].
+    fn capacitance(&self, at: At<'_>) -> f64 {
+        let _ = at;
+        0.0
+    }
+
+    /// Change of the capacitance with a change `dq` of the configuration [F].
+    fn capacitance_change(&self, at: At<'_>, dq: &[Pose]) -> f64 {
+        let _ = (at, dq);
+        0.0
+    }
+
+    /// Force per ½V² that pulls its two sides together, ∂C/∂u with u the approach of all of it [N/V²].
+    fn pull(&self, at: At<'_>) -> f64 {
+        let _ = at;
+        0.0
+    }
+
+    /// The same, and its change with a change `dq` of the configuration.
+    fn pull_and_change(&self, at: At<'_>, dq: &[Pose]) -> (f64, f64) {
+        let _ = (at, dq);
+        (0.0, 0.0)
+    }
+
+    /// True for electrodes that voltage draws upon each other.
+    fn closes(&self) -> bool {
+        false
+    }
+
+    /// The mean load along facing beams that closes them at `volts`, less that of contact [N/m], and the least distance [m].
+    fn line_load(&self, at: At<'_>, volts: f64) -> Option<(f64, f64)> {
+        let _ = (at, volts);
+        None
+    }
+
+    /// Distance left between its two sides [m]; infinite where it has none.
+    fn distance(&self, at: At<'_>) -> f64 {
+        let _ = at;
+        f64::INFINITY
+    }
+
+    /// Change of the distance with a change `dq` of the configuration [m].
+    fn distance_change(&self, at: At<'_>, dq: &[Pose]) -> f64 {
+        let _ = (at, dq);
+        0.0
+    }
+
+    /// Distance at which its sides touch, and the least one that its law of contact knows [m]; none: they never do.
+    fn touching(&self) -> Option<[f64; 2]> {
+        None
+    }
+
+    /// What is left until it could not be closed further [m].
+    fn room(&self, at: At<'_>) -> f64 {
+        self.distance(at)
+    }
+
+    /// Energy stored where its sides touch [J].
+    fn contact_energy(&self, at: At<'_>) -> f64 {
+        let _ = at;
+        0.0
+    }
+
+    /// Work of the contact force over a small change `dq` of the configuration [J], of either sign.
+    fn contact_work(&self, at: At<'_>, dq: &[Pose]) -> f64 {
+        let _ = (at, dq);
+        0.0
+    }
+
+    /// What it is a function of, and how, where that is one approach.
+    fn law(&self) -> Option<(&Approach, Law)> {
+        None
+    }
+}

@@ -1,0 +1,45 @@
+//! From a drawing to the members of a domain.
+
+use super::approach::{Approach, Point};
+use super::domain::Domain;
+use crate::structure::{GapVoltage, NodeId, Structure};
+use nalgebra::Vector2;
+
+/// A drawing, as domains read it.
+#[derive(Clone, Copy)]
+pub struct Drawing<'a, 'p> {
+    /// What is drawn.
+    pub structure: &'a Structure,
+    /// The material point of a node.
+    pub point: &'p dyn Fn(NodeId) -> Point,
+    /// Facing beams as SUGAR has them.
+    pub chord: bool,
+}
+
+impl Drawing<'_, '_> {
+    /// The approach of node `a` towards `b` along `axis`.
+    pub(super) fn approach(&self, a: NodeId, b: NodeId, axis: [f64; 2]) -> Approach {
+        Approach { a: (self.point)(a), b: (self.point)(b), axis: Vector2::new(axis[0], axis[1]) }
+    }
+}
+
+/// A domain whose members are drawn.
+pub trait Drawn: Domain<Given = f64> + Sized {
+    /// `put` is told each member of the drawing: its name, the voltage across it if it has a field, and itself.
+    fn lay<'a>(drawing: &Drawing<'a, '_>, put: impl FnMut(&'a str, Option<&'a GapVoltage>, Self));
+
+    /// The same with its points where `to` takes them.
+    #[must_use]
+    fn moved(self, to: &dyn Fn(Point) -> Point) -> Self;
+}
+
+/// A member that was laid.
+#[derive(Debug, Clone)]
+pub struct Laid<'a, M> {
+    /// Full element name.
+    pub name: &'a str,
+    /// The voltage across it; none: it has no field.
+    pub voltage: Option<&'a GapVoltage>,
+    /// What it does.
+    pub member: M,
+}

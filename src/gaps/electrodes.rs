@@ -1,0 +1,152 @@
+//! A comb, or two lumped plates: a field that depends on one approach, and what bears where plates touch.
+
+use super::approach::{Approach, Point};
+use super::capacitor::{Capacitance, Capacitor};
+use super::contact::{Contact, touching_distance};
+use super::domain::{At, Domain, Law};
+use super::drawn::{Drawing, Drawn};
+use crate::multibody::model::locate;
+use crate::multibody::planar::Pose;
+use crate::multibody::{BlockMatrix, BodyId, Pattern};
+use crate::structure::GapVoltage;
+use nalgebra::Vector2;
+
+/// Two electrodes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Electrodes {
+    /// What they measure.
+    pub approach: Approach,
+    /// C(u).
+    pub capacitor: Capacitor,
+    /// How they touch; none: never.
+    pub contact: Option<Contact>,
+}
+
+impl Electrodes {
+    /// The force of contact with the distance left at approach `u` [N], and its derivative [N/m].
+    fn pressed(&self, u: f64) -> (f64, f64) {
+        self.contact.map_or((0.0, 0.0), |contact| contact.force(self.capacitor.distance(u)))
+    }
+}
+
+impl Drawn for Electrodes {
+    /// Combs, then plates.
+    fn lay<'a>(drawing: &Drawing<'a, '_>, mut put: impl FnMut(&'a str, Option<&'a GapVoltage>, Self)) {
+        for comb in &drawing.structure.combs {
+            let approach = drawing.approach(comb.a, comb.b, comb.axis);
+            let slope = comb.gaps * comb.permittivity * comb.height / comb.gap;
+            let overlap = if comb.finite { comb.overlap } else { f64::INFINITY };
+            let capacitor = Capacitor::Comb { slope, overlap, blend: comb.gap, parasitic: comb.parasitic };
+            put(&comb.name, Some(&comb.voltage), Self { approach, capacitor, contact: None });
+        }
+        for plate in &drawing.structure.plate_gaps {
+            let approach = drawing.approach(plate.a, plate.b, plate.axis);
+            let contact = Contact { touch: plate.touch.unwrap_or(touching_distance(plate.gap)), area: plate.area };
+            let strength = plate.permittivity * plate.area;
+            let capacitor = Capacitor::Plates { strength, gap: plate.gap, closest: contact.least() };
+            put(&plate.name, Some(&plate.voltage), Self { approach, capacitor, contact: Some(contact) });
+        }
+    }
+
+    fn moved(self, to: &dyn Fn(Point) -> Point) -> Self {
+        Self { approach: self.approach.moved(to), ..self }
+    }
+}
+
+impl Domain for Electrodes {
+    type Given = f64;
+
+    fn bodies(&self, see: impl FnMut(BodyId)) {
+        self.approach.bodies().into_iter().for_each(see);
+    }
+
+    fn acts(&self, volts: f64) -> bool {
+        volts != 0.0 || self.contact.is_some()
+    }
+
+    fn add_force(&self, at: At<'_>, volts: f64, r: &mut [Pose]) {
+        let m = self.approach.measure(at.q, at.linear);
+        let mut first = -0.5 * volts * volts * self.capacitor.at(m.value).slope;
+        if let Some(contact) = self.contact {
+            first += contact.force(self.capacitor.distance(m.value)).0;
+        }
+        self.approach.add_force(&m, first, r);
+    }
+
+    fn add_force_change(&self, at: At<'_>, volts: f64, change: f64, r: &mut [Pose]) {
+        let m = self.approach.measure(at.q, at.linear);
+        self.approach.add_force(&m, -volts * change * self.capacitor.at(m.value).slope, r);
+    }
+
+    fn add_tangent(&self, at: At<'_>, volts: f64, pattern: &Pattern, tangent: &mut BlockMatrix<f64, 3>) {
+        let m = self.approach.measure(at.q, at.linear);
+        let Capacitance { slope, curvature, .. } = self.capacitor.at(m.value);
+        let factor = -0.5 * volts * volts;
+        let (mut first, mut second) = (factor * slope, factor * curvature);
+        if let Some(contact) = self.contact {
+            let (force, slope) = contact.force(self.capacitor.distance(m.value));
+            first += force;
+            second -= slope; // the distance shrinks as u grows
+        }
+        let h = m.hessian(first, second);
+        locate(pattern, self.approach.a.body, self.approach.b.body).add(tangent, &h);
+    }
+
+    fn levers(&self, at: At<'_>, volts: f64, lever: impl FnMut(Point, Vector2<f64>)) {
+        let u = self.approach.value(at.q, true);
+        self.approach.levers(-0.5 * volts * volts * self.capacitor.at(u).slope + self.pressed(u).0, lever);
+    }
+
+    fn capacitance(&self, at: At<'_>) -> f64 {
+        self.capacitor.at(self.approach.value(at.q, at.linear)).value
+    }
+
+    fn capacitance_change(&self, at: At<'_>, dq: &[Pose]) -> f64 {
+        let m = self.approach.measure(at.q, at.linear);
+        self.capacitor.at(m.value).slope * self.approach.change(&m, dq)
+    }
+
+    fn pull(&self, at: At<'_>) -> f64 {
+        self.capacitor.at(self.approach.value(at.q, at.linear)).slope
+    }
+
+    fn pull_and_change(&self, at: At<'_>, dq: &[Pose]) -> (f64, f64) {
+        let m = self.approach.measure(at.q, at.linear);
+        let Capacitance { slope, curvature, .. } = self.capacitor.at(m.value);
+        (slope, curvature * self.approach.change(&m, dq))
+    }
+
+    fn closes(&self) -> bool {
+        matches!(self.capacitor, Capacitor::Plates { .. })
+    }
+
+    /// Overlap of a comb, gap of plates.
+    fn distance(&self, at: At<'_>) -> f64 {
+        self.capacitor.distance(self.approach.value(at.q, at.linear))
+    }
+
+    fn distance_change(&self, at: At<'_>, dq: &[Pose]) -> f64 {
+        let along = self.approach.change(&self.approach.measure(at.q, at.linear), dq);
+        match self.capacitor {
+            Capacitor::Comb { .. } => along,
+            Capacitor::Plates { .. } => -along,
+        }
+    }
+
+    fn touching(&self) -> Option<[f64; 2]> {
+        self.contact.map(|c| [c.touch, c.least()])
+    }
+
+    fn contact_energy(&self, at: At<'_>) -> f64 {
+        self.contact.map_or(0.0, |contact| contact.energy(self.distance(at)))
+    }
+
+    fn contact_work(&self, at: At<'_>, dq: &[Pose]) -> f64 {
+        let force = self.contact.map_or(0.0, |contact| contact.force(self.distance(at)).0);
+        if force == 0.0 { 0.0 } else { force * self.distance_change(at, dq) }
+    }
+
+    fn law(&self) -> Option<(&Approach, Law)> {
+        Some((&self.approach, Law::Field(self.capacitor, self.contact)))
+    }
+}

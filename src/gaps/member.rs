@@ -1,0 +1,141 @@
+//! The register of domains: a mechanism's members of them stand in one list, and each call goes to the member's own law.
+
+use super::approach::{Approach, Point};
+use super::domain::{At, Domain, Law};
+use super::drawn::{Drawing, Drawn, Laid};
+use crate::multibody::planar::Pose;
+use crate::multibody::{BlockMatrix, BodyId, Pattern};
+use nalgebra::Vector2;
+
+/// Makes [`Member`] of the types listed, in the order in which a drawing's members stand.
+macro_rules! domains {
+    ($($kind:ident: $law:path, $what:literal;)+) => {
+        /// One of the registered domains; what drives it is a voltage [V].
+        #[derive(Debug, Clone, PartialEq)]
+        pub enum Member {
+            $(#[doc = $what] $kind($law),)+
+        }
+
+        $(impl From<$law> for Member {
+            fn from(law: $law) -> Self {
+                Self::$kind(law)
+            }
+        })+
+
+        /// The same call of whatever member it is.
+        macro_rules! each {
+            ($member:expr, $name:ident => $call:expr) => {
+                match $member { $(Member::$kind($name) => $call,)+ }
+            };
+        }
+
+        impl Member {
+            /// The members of a drawing, domain by domain.
+            pub fn lay<'a>(drawing: &Drawing<'a, '_>) -> Vec<Laid<'a, Self>> {
+                let mut all = Vec::new();
+                $(<$law>::lay(drawing, |name, voltage, law| all.push(Laid { name, voltage, member: law.into() }));)+
+                all
+            }
+
+            /// The same with its points where `to` takes them.
+            #[must_use]
+            pub fn moved(self, to: &dyn Fn(Point) -> Point) -> Self {
+                match self { $(Self::$kind(law) => law.moved(to).into(),)+ }
+            }
+        }
+    };
+}
+
+domains! {
+    Electrodes: super::electrodes::Electrodes, "A comb or lumped plates.";
+    FacingBeams: super::facing_beams::FacingBeams, "Two beams that face each other.";
+    StopPair: super::stop_pair::StopPair, "A stop.";
+}
+
+impl Domain for Member {
+    type Given = f64;
+
+    fn bodies(&self, see: impl FnMut(BodyId)) {
+        each!(self, m => m.bodies(see));
+    }
+
+    #[inline]
+    fn add_force(&self, at: At<'_>, given: f64, r: &mut [Pose]) {
+        each!(self, m => m.add_force(at, given, r));
+    }
+
+    #[inline]
+    fn add_force_change(&self, at: At<'_>, given: f64, change: f64, r: &mut [Pose]) {
+        each!(self, m => m.add_force_change(at, given, change, r));
+    }
+
+    #[inline]
+    fn add_tangent(&self, at: At<'_>, given: f64, pattern: &Pattern, tangent: &mut BlockMatrix<f64, 3>) {
+        each!(self, m => m.add_tangent(at, given, pattern, tangent));
+    }
+
+    #[inline]
+    fn acts(&self, given: f64) -> bool {
+        each!(self, m => m.acts(given))
+    }
+
+    fn levers(&self, at: At<'_>, given: f64, lever: impl FnMut(Point, Vector2<f64>)) {
+        each!(self, m => m.levers(at, given, lever));
+    }
+
+    fn energy(&self, at: At<'_>, given: f64) -> f64 {
+        each!(self, m => m.energy(at, given))
+    }
+
+    fn capacitance(&self, at: At<'_>) -> f64 {
+        each!(self, m => m.capacitance(at))
+    }
+
+    fn capacitance_change(&self, at: At<'_>, dq: &[Pose]) -> f64 {
+        each!(self, m => m.capacitance_change(at, dq))
+    }
+
+    fn pull(&self, at: At<'_>) -> f64 {
+        each!(self, m => m.pull(at))
+    }
+
+    fn pull_and_change(&self, at: At<'_>, dq: &[Pose]) -> (f64, f64) {
+        each!(self, m => m.pull_and_change(at, dq))
+    }
+
+    fn closes(&self) -> bool {
+        each!(self, m => m.closes())
+    }
+
+    fn line_load(&self, at: At<'_>, volts: f64) -> Option<(f64, f64)> {
+        each!(self, m => m.line_load(at, volts))
+    }
+
+    fn distance(&self, at: At<'_>) -> f64 {
+        each!(self, m => m.distance(at))
+    }
+
+    fn distance_change(&self, at: At<'_>, dq: &[Pose]) -> f64 {
+        each!(self, m => m.distance_change(at, dq))
+    }
+
+    fn touching(&self) -> Option<[f64; 2]> {
+        each!(self, m => m.touching())
+    }
+
+    fn room(&self, at: At<'_>) -> f64 {
+        each!(self, m => m.room(at))
+    }
+
+    fn contact_energy(&self, at: At<'_>) -> f64 {
+        each!(self, m => m.contact_energy(at))
+    }
+
+    fn contact_work(&self, at: At<'_>, dq: &[Pose]) -> f64 {
+        each!(self, m => m.contact_work(at, dq))
+    }
+
+    fn law(&self) -> Option<(&Approach, Law)> {
+        each!(self, m => m.law())
+    }
+}

@@ -1,0 +1,70 @@
+//! The frame that a mechanism is mounted on, as it moves: what the bodies feel of its motion.
+//!
+//! Displacements are those within the frame. In a frame with the acceleration a of its origin (that of the drawing) and the
+//! rate Ω about z, a body of mass m and inertia J with its centre at r feels
+//! ```text
+//! f = −m·(a + Ω̇ e×r − Ω²·r + 2Ω e×v),     moment −J·Ω̇,     e×r = (−y, x)
+//! ```
+//! (Goldstein, "Classical Mechanics" 1980, §4.10): Euler's, the centrifugal and Coriolis' force. All but the last depend on
+//! the place alone and belong to the residual here; Coriolis' force is that of [`crate::solve::time::gyration`].
+
+use super::domain::{At, Domain};
+use crate::multibody::planar::{self, Pose};
+use crate::multibody::{BlockMatrix, Body, BodyId, Pattern};
+use nalgebra::Vector2;
+
+/// Motion of the frame, or a change of it.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Frame {
+    /// Acceleration of the origin [m/s²].
+    pub acceleration: Vector2<f64>,
+    /// Rate about z [rad/s].
+    pub rate: f64,
+    /// Rate of change of the rate [rad/s²].
+    pub turning: f64,
+}
+
+/// All bodies in a frame. What drives them is its motion.
+#[derive(Debug, Clone, Copy)]
+pub struct InFrame<'a>(pub &'a [Body]);
+
+impl InFrame<'_> {
+    /// `r += m·(a + Ω̇ e×r − outward·r)` and the moment J·Ω̇.
+    fn add(&self, q: &[Pose], frame: &Frame, outward: f64, r: &mut [Pose]) {
+        for ((r, q), body) in r.iter_mut().zip(q).zip(self.0) {
+            let place = body.center + q.xy();
+            let push = frame.acceleration + planar::turn(place) * frame.turning - place * outward;
+            r.x += body.mass * push.x;
+            r.y += body.mass * push.y;
+            r.z += body.inertia * frame.turning;
+        }
+    }
+}
+
+impl Domain for InFrame<'_> {
+    type Given = Frame;
+
+    fn bodies(&self, see: impl FnMut(BodyId)) {
+        (0..self.0.len()).map(BodyId::Free).for_each(see);
+    }
+
+    fn add_force(&self, at: At<'_>, frame: Frame, r: &mut [Pose]) {
+        self.add(at.q, &frame, frame.rate * frame.rate, r);
+    }
+
+    fn add_force_change(&self, at: At<'_>, frame: Frame, change: Frame, r: &mut [Pose]) {
+        self.add(at.q, &change, 2.0 * frame.rate * change.rate, r);
+    }
+
+    /// But for the skew share of Euler's force.
+    fn add_tangent(&self, _: At<'_>, frame: Frame, _: &Pattern, tangent: &mut BlockMatrix<f64, 3>) {
+        if frame.rate == 0.0 {
+            return;
+        }
+        for (block, body) in tangent.diagonal.iter_mut().zip(self.0) {
+            let softer = body.mass * frame.rate * frame.rate;
+            block[(0, 0)] -= softer;
+            block[(1, 1)] -= softer;
+        }
+    }
+}
