@@ -93,6 +93,14 @@ impl Budget {
         self.0.order.store(LATE, Ordering::Relaxed);
     }
 
+    /// Gives its bytes back to its owner, whose other computations may have them.
+    pub fn give_back(&self) {
+        let used = self.0.used.swap(0, Ordering::Relaxed);
+        if let Some(purse) = &self.0.allowance.purse {
+            purse.give_back(used);
+        }
+    }
+
     /// Bytes laid out so far.
     pub fn used(&self) -> usize {
         self.0.used.load(Ordering::Relaxed)

@@ -64,14 +64,14 @@ impl Remote {
         options: &CompileOptions,
     ) -> Result<(Client, String), Failure> {
         let release_after = match self.release_after {
-            Some(seconds) if !(seconds > 0.0 && seconds <= 1e9) => {
-                return Err(Failure::bad("--release-after", "a time above 0 s, at most 1e9 s", seconds.to_string()));
+            Some(seconds) if !(1e-3..=1e9).contains(&seconds) => {
+                return Err(Failure::bad("--release-after", "a time from 1 ms to 1e9 s", seconds.to_string()));
             }
             seconds => seconds.map(Duration::from_secs_f64),
         };
+        let mut client = self.reach.client(uri)?;
         // from here on whoever is interrupted is told what the job is called
         interrupt::asked();
-        let mut client = self.reach.client(uri)?;
         let how = Submission { share: self.share, release_after };
         let name = client.submit(spec, bundle, options, how)?;
         Ok((client, name))

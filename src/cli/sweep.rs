@@ -129,7 +129,8 @@ impl Sweep {
         let table = self.here(&spec, &bundle, &options, &bar);
         bar.finish_and_clear();
         let (table, journal) = table?;
-        let written = self.deliver(&table, &spec, &bundle, &options)?;
+        let part = (spec.shard.count > 1).then(|| Part::of(&spec, &bundle, &options)).transpose()?;
+        let written = self.deliver(&table, &spec, part.map(|part| part.to_string()).as_deref())?;
         // points that are in no table stay where they are
         if let Some(journal) = journal.filter(|_| written) {
             journal.finish()?;
@@ -151,7 +152,9 @@ impl Sweep {
             eprintln!("the rows that it has stay on the server: `bimorph jobs delete {name} --to {uri}` forgets them");
             return Err(failure);
         }
-        let written = self.deliver(&table, spec, bundle, options).map(drop);
+        // the version in it is that of the server
+        let part = Some(job.part.as_str()).filter(|part| !part.is_empty());
+        let written = self.deliver(&table, spec, part).map(drop);
         // a table that could not be written is still there
         if let Err(error @ (Failure::Write { .. } | Failure::Stdout(_))) = written {
             eprintln!("its rows are on the server: `bimorph jobs attach {name} --to {uri}` has them");
@@ -163,16 +166,9 @@ impl Sweep {
     }
 
     /// Writes the table and says what it has; whether there was anything to write.
-    fn deliver(
-        &self,
-        table: &SweepTable,
-        spec: &SweepSpec,
-        bundle: &Bundle,
-        options: &CompileOptions,
-    ) -> Result<bool, Failure> {
+    fn deliver(&self, table: &SweepTable, spec: &SweepSpec, part: Option<&str>) -> Result<bool, Failure> {
         let Shard { index, count } = spec.shard;
-        let part = (count > 1).then(|| Part::of(spec, bundle, options)).transpose()?.map(|part| part.to_string());
-        let written = delivery::deliver(self.out.as_deref(), table, part.as_deref())?;
+        let written = delivery::deliver(self.out.as_deref(), table, part)?;
         let shard = part.map(|_| format!(" (shard {index}/{count})")).unwrap_or_default();
         eprintln!("{}", delivery::summary(table, &shard));
         Ok(written)

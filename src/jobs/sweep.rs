@@ -23,6 +23,7 @@ mod spec;
 mod table;
 mod together;
 mod transient;
+mod values;
 
 pub use axis::SweepParameter;
 pub use crew::{Crew, Pool};
@@ -34,6 +35,7 @@ pub use points::points;
 pub use samples::{Samples, Sampling};
 pub use spec::{Shard, SweepAnalysis, SweepSpec};
 pub use table::{SweepRow, SweepTable};
+pub use values::Values;
 
 use crate::compile::{CompileError, CompileOptions, Drawn, draw};
 use crate::netlist::{Bundle, Setting, Source};

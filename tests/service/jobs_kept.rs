@@ -11,15 +11,15 @@ use proto::job_metadata::State;
 use std::path::{Path, PathBuf};
 use tonic::Code;
 
-fn server(folder: &Path) -> Running {
+pub(crate) fn server(folder: &Path) -> Running {
     start_kept(folder, Limits { analyses: 2, ..Limits::default() }, LOCAL)
 }
 
-async fn job(wire: &mut Wire, name: &str) -> proto::Job {
+pub(crate) async fn job(wire: &mut Wire, name: &str) -> proto::Job {
     wire.get_job(proto::GetJobRequest { name: name.to_owned() }).await.expect("is here").into_inner()
 }
 
-async fn ended(wire: &mut Wire, name: &str) -> proto::Job {
+pub(crate) async fn ended(wire: &mut Wire, name: &str) -> proto::Job {
     let mut watched =
         wire.watch_job(proto::WatchJobRequest { name: name.to_owned() }).await.expect("a stream").into_inner();
     let mut last = None;
@@ -30,7 +30,7 @@ async fn ended(wire: &mut Wire, name: &str) -> proto::Job {
 }
 
 /// The first rows of a job, at least so many.
-async fn some_rows(wire: &mut Wire, name: &str, least: usize) -> Vec<proto::JobRow> {
+pub(crate) async fn some_rows(wire: &mut Wire, name: &str, least: usize) -> Vec<proto::JobRow> {
     let mut stream = fetch(wire, name, 0).await.expect("a stream");
     let mut rows = Vec::new();
     while rows.len() < least {
@@ -39,7 +39,7 @@ async fn some_rows(wire: &mut Wire, name: &str, least: usize) -> Vec<proto::JobR
     rows
 }
 
-fn file(folder: &Path, name: &str, end: &str) -> PathBuf {
+pub(crate) fn file(folder: &Path, name: &str, end: &str) -> PathBuf {
     folder.join(format!("{name}.{end}"))
 }
 

@@ -13,6 +13,7 @@ mod fuzz;
 mod inside;
 mod jobs;
 mod jobs_kept;
+mod jobs_left;
 mod kept;
 mod leases;
 mod limits;

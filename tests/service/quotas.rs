@@ -2,6 +2,7 @@
 
 use super::attached::trial;
 use super::cuts::LOCAL;
+use super::jobs::{MANY, request};
 use super::running::{Running, block_on, start_guarded, wire_bundle};
 use bimorph::service::limits::Limits;
 use bimorph::service::proto;
@@ -179,5 +180,32 @@ fn processor_time_of_one_client() {
         assert!(matches!(reply, ReplyKind::Trial(_)), "{reply:?}");
         let (_, _, refused) = stream(&mut alice, own()).await;
         assert_eq!(super::attached::refusal(&refused), Code::ResourceExhausted);
+    });
+}
+
+/// A job whose client has used up its processor time ends with the rows that it has: what it could not compute is no row, and who has nothing left
+/// can still cancel and delete.
+#[test]
+#[cfg(target_os = "linux")]
+fn a_job_of_a_client_without_processor_time() {
+    let (_folder, server) = server(Limits { client_cpu: Duration::from_millis(300), ..Limits::default() });
+    block_on(async {
+        let mut alice = client(&server, "alice").await;
+        let name = alice.submit_job(request(MANY)).await.expect("starts").into_inner().name;
+        let watched = proto::WatchJobRequest { name: name.clone() };
+        let mut watched = alice.watch_job(watched).await.expect("a stream").into_inner();
+        let mut last = None;
+        while let Some(job) = watched.message().await.expect("goes on") {
+            last = Some(job);
+        }
+        let last = last.expect("told");
+        let metadata = last.metadata.expect("metadata");
+        let Some(proto::job::Result::Error(why)) = last.result else { panic!("it is not done: {metadata:?}") };
+        assert!(why.code == Code::ResourceExhausted as i32 && why.message.starts_with("client_cpu: "), "{why:?}");
+        assert!(metadata.rows > 0 && metadata.failed == 0, "{metadata:?}");
+        alice.cancel_job(proto::CancelJobRequest { name: name.clone() }).await.expect("costs nothing");
+        alice.delete_job(proto::DeleteJobRequest { name: name.clone() }).await.expect("costs nothing");
+        let gone = alice.get_job(proto::GetJobRequest { name }).await.expect_err("is gone");
+        assert_eq!(gone.code(), Code::NotFound);
     });
 }

@@ -1,6 +1,7 @@
 //! What an axis of a sweep varies: a parameter of the netlist, the voltage of a port, or an option of the model.
 
 use super::error::{SweepError, bad};
+use super::values::Values;
 use crate::netlist::Setting;
 use crate::options::{CompileOptions, MODEL, ModelOption, Range, Value};
 use std::collections::HashSet;
@@ -16,7 +17,7 @@ pub struct SweepParameter {
     /// A netlist parameter; a port with `.v` behind it: its voltage [V]; an option of the model with `option.` before it.
     pub name: String,
     /// The values it takes, in order. SI.
-    pub values: Vec<Setting>,
+    pub values: Values,
     /// True: it is no axis of its own. It takes its first value where the one before it has its first, and so on: a list of points.
     pub in_step: bool,
 }
@@ -52,6 +53,11 @@ impl SweepParameter {
     /// [`SweepError::BadSpec`] for a voltage that is none, an option that there is not, and a value beyond its range.
     pub(super) fn check(&self) -> Result<(), SweepError> {
         let what = || format!("parameter \"{}\"", self.name);
+        if let Values::Linear { low, high, .. } = self.values
+            && !(high - low).is_finite()
+        {
+            return Err(bad(what(), "two ends with a finite distance", &format!("{low:e} and {high:e}")));
+        }
         match varied(&self.name) {
             Varied::Parameter => Ok(()),
             Varied::Voltage(_) if self.values.iter().any(|value| matches!(value, Setting::Text(_))) => {
@@ -69,7 +75,7 @@ impl SweepParameter {
                 };
                 let mut options = CompileOptions::default();
                 let refused =
-                    self.values.iter().find_map(|value| options.choose(option, value_of(option, value)).err());
+                    self.values.iter().find_map(|value| options.choose(option, value_of(option, &value)).err());
                 refused.map_or(Ok(()), |refused| Err(bad(what(), &refused.expected, &refused.got)))
             }
         }

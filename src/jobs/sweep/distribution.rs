@@ -53,18 +53,25 @@ impl Distribution {
     /// [`SweepError::BadSpec`] for numbers that are no distribution.
     pub fn check(&self, name: &str) -> Result<(), SweepError> {
         let (fits, expected) = match *self {
-            Self::Normal { mean, deviation } => {
-                (mean.is_finite() && deviation.is_finite() && deviation >= 0.0, "a mean and a deviation from 0")
+            Self::Normal { deviation, .. } => {
+                (deviation >= 0.0 && self.is_finite(), "a mean and a deviation from 0, and numbers that are finite")
             }
             Self::Uniform { low, high } => {
                 (low.is_finite() && high.is_finite() && low <= high && (high - low).is_finite(), "a low and a high end")
             }
             Self::LogNormal { median, deviation } => {
-                let sound = median.is_finite() && median > 0.0 && (0.0..=50.0).contains(&deviation);
-                (sound, "a median above 0 and a deviation of its logarithm from 0 to 50")
+                let sound = median > 0.0 && (0.0..=50.0).contains(&deviation) && self.is_finite();
+                (sound, "a median above 0 and a deviation of its logarithm from 0 to 50, and numbers that are finite")
             }
         };
         if fits { Ok(()) } else { Err(bad(format!("distribution of \"{name}\""), expected, &format!("{self:?}"))) }
+    }
+}
+
+impl Distribution {
+    /// Whether what is drawn is finite: ten deviations from the middle, where no sample ever comes.
+    fn is_finite(&self) -> bool {
+        [-10.0, 10.0].iter().all(|score| self.quantile(0.5, *score).is_finite())
     }
 }
 

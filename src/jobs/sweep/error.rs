@@ -1,5 +1,6 @@
 //! Why a sweep has no table.
 
+use crate::budget::Stopped;
 use thiserror::Error;
 
 /// Why a sweep has no table. A point that fails is not an error of the sweep: its row says why.
@@ -30,6 +31,9 @@ pub enum SweepError {
         /// What it may use [byte].
         most: usize,
     },
+    /// What all computations of its owner may use is used up.
+    #[error("{0}")]
+    Owner(Stopped),
     /// The operating system gave no threads.
     #[error("no worker threads: {reason}")]
     Threads {

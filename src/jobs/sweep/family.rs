@@ -46,9 +46,11 @@ impl<'a> Family<'a> {
             let Some(segments) = mesh.get_or_init(|| self.search(first, share)) else { continue };
             let order = ModelOrder { segments: segments.clone(), estimated_error: None, modes_in_band: 0, passes: 0 };
             let refused = |error: DiscretizeError| AnalysisError::NotConverged { detail: error.to_string() };
-            let judged = judged(&drawn.clone().on(order).map_err(refused)?, request)?;
-            if judged.holds {
-                return Ok(Some(judged));
+            match judged(&drawn.clone().on(order).map_err(refused)?, request) {
+                Ok(judged) if judged.holds => return Ok(Some(judged)),
+                Ok(_) => {}
+                // near a fold a mesh may have no equilibrium where a finer one has: the point finds its own, or says why not
+                Err(_) => return Ok(None),
             }
         }
         Ok(None)
@@ -93,8 +95,11 @@ impl<'a> Family<'a> {
 
 /// The middle of a grid, with the median of what is drawn.
 pub(super) fn middle(spec: &SweepSpec) -> Vec<(String, Setting)> {
-    let mut settings: Vec<_> =
-        spec.parameters.iter().map(|axis| (axis.name.clone(), axis.values[axis.values.len() / 2].clone())).collect();
+    let mut settings: Vec<_> = spec
+        .parameters
+        .iter()
+        .filter_map(|axis| Some((axis.name.clone(), axis.values.get(axis.values.len() / 2)?)))
+        .collect();
     settings.extend(spec.samples.iter().flat_map(|samples| samples.quantiles(0.5)));
     settings
 }

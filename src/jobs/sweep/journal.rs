@@ -99,7 +99,18 @@ pub fn name(spec: &SweepSpec, bundle: &Bundle, options: &CompileOptions) -> Stri
     state.model(bundle, options);
     // the threads change nothing; samples are named by what was asked for
     let asked = spec.samples.as_ref().map(|samples| &samples.asked);
-    state.text(&format!("{:?} {asked:?} {:?} {:?}", spec.parameters, spec.analysis, spec.shard));
+    state.text(&format!("{asked:?} {:?} {:?}", spec.analysis, spec.shard));
+    for axis in &spec.parameters {
+        state.text(&axis.name);
+        state.text(&format!("{} {}", axis.in_step, axis.values.len()));
+        axis.values.iter().for_each(|value| match value {
+            Setting::Number(x) => state.bytes(&[&[0], &x.to_bits().to_le_bytes()[..]].concat()),
+            Setting::Text(text) => {
+                state.bytes(&[1]);
+                state.text(&text);
+            }
+        });
+    }
     format!("{:032x}", state.value())
 }
 
@@ -118,26 +129,10 @@ impl Journal {
         }
         let mut bytes = Vec::new();
         file.read_to_end(&mut bytes).map_err(failed)?;
-        // a line that is cut off, and a head that is, are as if they had never been
-        let whole = bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |last| last + 1);
-        if whole > 0 && !resume {
+        if bytes.contains(&b'\n') && !resume {
             return Err(JournalError::Exists { path: path.to_owned() });
         }
-        let mut lines = bytes[..whole].split_inclusive(|byte| *byte == b'\n');
-        let mut known = Vec::new();
-        let mut good = 0;
-        if let Some(line) = lines.next() {
-            let head: Option<Head> = serde_json::from_slice(line).ok();
-            if head.is_none_or(|head| head.sweep != name) {
-                return Err(JournalError::Other { path: path.to_owned() });
-            }
-            good += line.len();
-        }
-        for line in lines {
-            let Ok(kept) = serde_json::from_slice::<Kept>(line) else { break };
-            known.push(kept);
-            good += line.len();
-        }
+        let (known, good) = read(path, name, &bytes)?;
         file.set_len(good as u64).and_then(|()| file.seek(SeekFrom::End(0))).map_err(failed)?;
         let journal =
             Self { path: path.to_owned(), file: Mutex::new(Open { file, good: good as u64, synced: Instant::now() }) };
@@ -146,6 +141,15 @@ impl Journal {
             journal.line(&head)?;
         }
         Ok((journal, known))
+    }
+
+    /// The points of the sweep `name` in a file, up to the first line that is damaged. Changes nothing.
+    ///
+    /// # Errors
+    /// [`JournalError`]: it is of another sweep, or the file system refuses.
+    pub fn read(path: &Path, name: &str) -> Result<Vec<Kept>, JournalError> {
+        let bytes = std::fs::read(path).map_err(|source| JournalError::Io { path: path.to_owned(), source })?;
+        read(path, name, &bytes).map(|(known, _)| known)
     }
 
     /// Adds a point.
@@ -204,6 +208,26 @@ impl Journal {
     }
 }
 
+/// The points of a journal, and how many of its bytes they are. A line that is cut off, and a head that is, are as if they had never been.
+fn read(path: &Path, name: &str, bytes: &[u8]) -> Result<(Vec<Kept>, usize), JournalError> {
+    let whole = bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |last| last + 1);
+    let mut lines = bytes[..whole].split_inclusive(|byte| *byte == b'\n');
+    let (mut known, mut good) = (Vec::new(), 0);
+    if let Some(line) = lines.next() {
+        let head: Option<Head> = serde_json::from_slice(line).ok();
+        if head.is_none_or(|head| head.sweep != name) {
+            return Err(JournalError::Other { path: path.to_owned() });
+        }
+        good += line.len();
+    }
+    for line in lines {
+        let Ok(kept) = serde_json::from_slice::<Kept>(line) else { break };
+        known.push(kept);
+        good += line.len();
+    }
+    Ok((known, good))
+}
+
 /// Points as the lines of a journal.
 ///
 /// # Errors
@@ -225,7 +249,7 @@ impl Outcome {
                 let each = found.values.iter().map(|v| (v.name.clone(), v.unit.clone().into_owned(), v.value));
                 (each.collect(), found.estimated_error, found.warning.clone(), None)
             }
-            Err(error) => (Vec::new(), None, String::new(), Some(error.clone())),
+            Err(error) => (Vec::new(), None, String::new(), Some(error.to_string())),
         };
         Kept { point: self.number, values, estimated_error, warning, error }
     }
@@ -243,7 +267,7 @@ impl Kept {
         let Self { point: number, values, estimated_error, warning, error } = self;
         let value = |(name, unit, value): (String, String, _)| Value { name, unit: unit.into(), value };
         let values = match error {
-            Some(error) => Err(error),
+            Some(error) => Err(error.into()),
             None => Ok(Found { values: values.into_iter().map(value).collect(), estimated_error, warning }),
         };
         Outcome { number, parameters, values }

@@ -4,6 +4,7 @@ use super::axis::SweepParameter;
 use super::distribution::number;
 use super::error::{SweepError, bad};
 use super::spec::Shard;
+use super::values::Values;
 use crate::netlist::Setting;
 use std::str::FromStr;
 
@@ -30,13 +31,13 @@ impl FromStr for SweepParameter {
                     let refused = |_| bad(what(), "numbers or words, separated by commas", text);
                     Setting::parse(text).map_err(refused)
                 };
-                list.split(',').map(|text| entry(text.trim())).collect::<Result<_, _>>()?
+                list.split(',').map(|text| entry(text.trim())).collect::<Result<Vec<_>, _>>()?.into()
             }
             [low, high, count] => {
                 let low = number(low).ok_or_else(|| bad(what(), "a number as low end", low))?;
                 let high = number(high).ok_or_else(|| bad(what(), "a number as high end", high))?;
                 let n = count.parse().ok().filter(|n| (1..=AXIS_MAX).contains(n));
-                linear(low, high, n.ok_or_else(|| bad(what(), "a count from 1", count))?)
+                Values::Linear { low, high, count: n.ok_or_else(|| bad(what(), "a count from 1", count))? }
             }
             _ => return Err(bad(what(), forms, values)),
         };
@@ -57,16 +58,6 @@ impl FromStr for Shard {
     }
 }
 
-/// `count` equally spaced numbers from `low` to `high`; the ends are exact. One number: `low`.
-pub fn linear(low: f64, high: f64, count: usize) -> Vec<Setting> {
-    let last = count.saturating_sub(1).max(1) as f64;
-    let at = |i: usize| {
-        let s = i as f64 / last;
-        if i + 1 == count && count > 1 { high } else { low + (high - low) * s }
-    };
-    (0..count).map(|i| Setting::Number(at(i))).collect()
-}
-
 #[cfg(test)]
 mod tests {
     //! Axes read as they are written, and slips are refused.
@@ -74,7 +65,7 @@ mod tests {
 
     fn numbers(text: &str) -> Vec<f64> {
         let axis: SweepParameter = text.parse().expect("an axis");
-        axis.values.iter().map(|v| if let Setting::Number(x) = v { *x } else { f64::NAN }).collect()
+        axis.values.iter().map(|v| if let Setting::Number(x) = v { x } else { f64::NAN }).collect()
     }
 
     #[test]
@@ -88,7 +79,7 @@ mod tests {
     fn lists_hold_numbers_with_suffixes_and_strings() {
         assert_eq!(numbers("w = 1.8u, 2u,-3M"), [1.8e-6, 2e-6, -3e6]);
         let axis: SweepParameter = "layer=p1,'p2'".parse().expect("an axis");
-        assert_eq!(axis.values, [Setting::Text("p1".into()), Setting::Text("p2".into())]);
+        assert_eq!(axis.values, vec![Setting::Text("p1".into()), Setting::Text("p2".into())].into());
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use super::crew::Crew;
 use super::error::SweepError;
 use super::family::Family;
-use super::point::{self, Outcome};
+use super::point::{self, Failed, Outcome};
 use super::spec::{SweepAnalysis, SweepSpec};
 use super::together::{self, Together};
 use super::transient::{self, Transients};
@@ -17,7 +17,8 @@ use std::sync::{Arc, OnceLock};
 /// given those of a piece once all of it are done. Whether all were run.
 ///
 /// # Errors
-/// [`SweepError::TooLarge`] where the points need more memory than the budget of this thread has.
+/// [`SweepError::TooLarge`] where the points need more memory than the budget of this thread has, and [`SweepError::Owner`] where its owner's is
+/// used up.
 pub(super) fn run(
     (spec, bundle, options): (&SweepSpec, &Bundle, &CompileOptions),
     numbers: &[usize],
@@ -27,14 +28,22 @@ pub(super) fn run(
 ) -> Result<bool, SweepError> {
     let stop = AtomicBool::new(false);
     let (budget, full) = (budget::current(), OnceLock::new());
+    let end = |why: SweepError| {
+        let _ = full.set(why);
+        stop.store(true, Ordering::Relaxed);
+    };
     let source = Source::new(bundle);
     let go_on = || !stop.load(Ordering::Relaxed);
     let counted = |outcome: &Outcome| {
-        if let Some(Err(Stopped::Bytes { most, .. } | Stopped::OwnerBytes { most, .. })) =
-            budget.as_ref().map(|budget| budget.take(outcome.bytes()))
-        {
-            let _ = full.set(most);
-            stop.store(true, Ordering::Relaxed);
+        // it may have a result another time: it is no row
+        if let Err(Failed::Owner(why)) = outcome.values {
+            end(SweepError::Owner(why));
+            return false;
+        }
+        match budget.as_ref().map(|budget| budget.take(outcome.bytes())) {
+            Some(Err(Stopped::Bytes { most, .. })) => end(SweepError::TooLarge { most }),
+            Some(Err(why)) => end(SweepError::Owner(why)),
+            Some(Ok(())) | None => {}
         }
         if !each(outcome) {
             stop.store(true, Ordering::Relaxed);
@@ -52,10 +61,8 @@ pub(super) fn run(
             }
         });
     }
-    match full.get() {
-        Some(&most) => Err(SweepError::TooLarge { most }),
-        None => Ok(go_on()),
-    }
+    let more = go_on();
+    full.into_inner().map_or(Ok(more), Err)
 }
 
 /// Points with the same options.

@@ -8,11 +8,12 @@ use crate::analysis::mesh::given::{Answer, Judged, judged, searched};
 use crate::analysis::mesh::{self, Request};
 use crate::analysis::signal::Signal;
 use crate::analysis::{AnalysisError, statics};
-use crate::budget::{self, Budget};
+use crate::budget::{self, Budget, Stopped};
 use crate::compile::{CompileError, CompileOptions, draw};
 use crate::netlist::{Setting, Severity, Source};
 use std::borrow::Cow;
 use std::collections::HashSet;
+use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// What columns of a static sweep are called.
@@ -33,7 +34,40 @@ pub(super) struct Value {
 pub(super) struct Outcome {
     pub(super) number: usize,
     pub(super) parameters: Vec<Setting>,
-    pub(super) values: Result<Found, String>,
+    pub(super) values: Result<Found, Failed>,
+}
+
+/// Why a point has no result.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Failed {
+    /// It has none, whoever computes it.
+    Point(String),
+    /// What its owner may use is used up: it may have one another time.
+    Owner(Stopped),
+}
+
+impl From<String> for Failed {
+    fn from(text: String) -> Self {
+        Self::Point(text)
+    }
+}
+
+impl From<Stopped> for Failed {
+    fn from(why: Stopped) -> Self {
+        match why {
+            Stopped::OwnerBytes { .. } | Stopped::OwnerCpu { .. } => Self::Owner(why),
+            why => Self::Point(why.to_string()),
+        }
+    }
+}
+
+impl fmt::Display for Failed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Point(text) => f.write_str(text),
+            Self::Owner(why) => why.fmt(f),
+        }
+    }
 }
 
 /// The results of a point.
@@ -55,14 +89,14 @@ impl Outcome {
                 let values = found.values.iter().map(|value| size_of::<Value>() + value.name.len());
                 values.sum::<usize>() + found.warning.len()
             }
-            Err(error) => error.len(),
+            Err(error) => error.to_string().len(),
         };
         // and once more in the table
         2 * (size_of::<Self>() + parameters + values)
     }
 }
 
-/// Runs point `number`, under `part` of the sweep's budget. A fault inside is that point's error: it must not take the other points with it.
+/// Runs point `number`, under `part` of the sweep's budget.
 pub(super) fn run(
     spec: &SweepSpec,
     number: usize,
@@ -72,13 +106,17 @@ pub(super) fn run(
     part: Option<Budget>,
 ) -> Outcome {
     let settings = spec.settings(number);
-    let solve = || solve(spec, &settings, source, options, family);
-    let values = catch_unwind(AssertUnwindSafe(|| match part {
-        Some(part) => budget::within(&part, solve).unwrap_or_else(|why| Err(why.to_string())),
-        None => solve(),
-    }));
-    let values = values.unwrap_or_else(|_| Err("internal fault at this point".to_owned()));
+    let values = guarded(part, || solve(spec, &settings, source, options, family));
     Outcome { number, parameters: settings.into_iter().map(|(_, value)| value).collect(), values }
+}
+
+/// Runs a job under a part of the budget. A fault inside is the error of that job: it must not take the other points with it.
+pub(super) fn guarded<T>(part: Option<Budget>, job: impl FnOnce() -> Result<T, String>) -> Result<T, Failed> {
+    let outcome = catch_unwind(AssertUnwindSafe(|| match part {
+        Some(part) => Ok(budget::within(&part, job)??),
+        None => Ok(job()?),
+    }));
+    outcome.unwrap_or_else(|_| Err("internal fault at this point".to_owned().into()))
 }
 
 /// Refuses parameters and outputs that the netlist does not have: at every point they would be an error.
@@ -168,6 +206,8 @@ pub(super) fn found(judged: Judged, spec: &SweepSpec, options: &CompileOptions) 
     let beyond = mesh::beyond(options.tol, estimated_error).map(|message| format!("{}: {message}", mesh::WARNING));
     let warnings: Vec<String> = beyond.into_iter().chain(judged.warnings).collect();
     let values = values(&judged.answer, &spec.analysis)?;
+    // what is told of it stands in the warning; files of JSON have no infinity
+    let estimated_error = estimated_error.filter(|error| error.is_finite());
     Ok(Found { values, estimated_error, warning: warnings.join("; ") })
 }
 

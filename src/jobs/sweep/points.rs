@@ -14,32 +14,33 @@ pub fn points(name: &str, text: &str) -> Result<Vec<SweepParameter>, SweepError>
     let failed =
         |error: csv::Error| bad(name.to_owned(), "a table of points, names in its first row", &error.to_string());
     let head = reader.headers().map_err(failed)?.clone();
-    let named = |(k, name): (usize, &str)| SweepParameter {
-        // a file of a spreadsheet may begin with a mark of its encoding
-        name: name.trim_start_matches('\u{feff}').to_owned(),
-        values: Vec::new(),
-        in_step: k > 0,
-    };
-    let mut axes: Vec<SweepParameter> = head.iter().enumerate().map(named).collect();
-    if let Some(k) = axes.iter().position(|axis| axis.name.is_empty()) {
+    // a file of a spreadsheet may begin with a mark of its encoding
+    let names: Vec<&str> = head.iter().map(|name| name.trim_start_matches('\u{feff}')).collect();
+    if let Some(k) = names.iter().position(|name| name.is_empty()) {
         return Err(bad(name.to_owned(), "a name above each column", &format!("none above column {}", k + 1)));
     }
+    let mut columns = vec![Vec::new(); names.len()];
     for record in reader.records() {
         let record = record.map_err(failed)?;
-        for (axis, cell) in axes.iter_mut().zip(&record) {
+        for ((column, axis), cell) in columns.iter_mut().zip(&names).zip(&record) {
             let line = record.position().map_or(0, csv::Position::line);
-            let what = || format!("{name}, line {line}, {}", axis.name);
+            let what = || format!("{name}, line {line}, {axis}");
             if cell.is_empty() {
                 return Err(bad(what(), "a number or a word", "nothing"));
             }
             let value = Setting::parse(cell).map_err(|_| bad(what(), "a number or a word", cell))?;
-            axis.values.push(value);
+            column.push(value);
         }
     }
-    match axes.first() {
-        Some(first) if !first.values.is_empty() => Ok(axes),
-        _ => Err(bad(name.to_owned(), "a table of points, names in its first row", "no point")),
+    if columns.first().is_none_or(Vec::is_empty) {
+        return Err(bad(name.to_owned(), "a table of points, names in its first row", "no point"));
     }
+    let axis = |(k, (name, column)): (usize, (&str, Vec<Setting>))| SweepParameter {
+        name: name.to_owned(),
+        values: column.into(),
+        in_step: k > 0,
+    };
+    Ok(names.into_iter().zip(columns).enumerate().map(axis).collect())
 }
 
 #[cfg(test)]
@@ -53,9 +54,9 @@ mod tests {
         let axes = points("corners.csv", text).unwrap();
         let names: Vec<_> = axes.iter().map(|axis| (axis.name.as_str(), axis.in_step)).collect();
         assert_eq!(names, [("w", false), ("layer", true), ("heat.v", true)]);
-        assert_eq!(axes[0].values, [Setting::Number(2e-6), Setting::Number(1.8e-6)]);
-        assert_eq!(axes[1].values, vec![Setting::Text("poly".into()); 2]);
-        assert_eq!(axes[2].values, [Setting::Number(0.0), Setting::Number(2.2)]);
+        assert_eq!(axes[0].values, vec![Setting::Number(2e-6), Setting::Number(1.8e-6)].into());
+        assert_eq!(axes[1].values, vec![Setting::Text("poly".into()); 2].into());
+        assert_eq!(axes[2].values, vec![Setting::Number(0.0), Setting::Number(2.2)].into());
     }
 
     #[test]

@@ -251,8 +251,7 @@ impl SweepSpec {
 
     /// Values of the parameters of the grid at one of its points, samples aside.
     fn grid_settings(&self, number: usize) -> Vec<(String, Setting)> {
-        let value =
-            |(axis, place): (&SweepParameter, usize)| Some((axis.name.clone(), axis.values.get(place)?.clone()));
+        let value = |(axis, place): (&SweepParameter, usize)| Some((axis.name.clone(), axis.values.get(place)?));
         self.parameters.iter().zip(self.places(number)).filter_map(value).collect()
     }
 

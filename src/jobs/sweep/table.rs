@@ -55,7 +55,7 @@ pub(super) fn assemble(parameters: Vec<String>, outcomes: Vec<Outcome>) -> Sweep
                 }
                 (Ok(row), found.estimated_error, found.warning)
             }
-            Err(error) => (Err(error), None, String::new()),
+            Err(error) => (Err(error.to_string()), None, String::new()),
         };
         let Outcome { number: point, parameters, .. } = outcome;
         table.rows.push(SweepRow { point, parameters, values, estimated_error, warning });

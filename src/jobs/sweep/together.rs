@@ -7,9 +7,8 @@
 
 use super::axis::at;
 use super::family::Family;
-use super::point::{self, Found, Outcome, brief};
+use super::point::{self, Found, Outcome, brief, guarded};
 use super::spec::SweepSpec;
-use super::transient::guarded;
 use crate::analysis::PortVoltages;
 use crate::analysis::mesh::Request;
 use crate::analysis::mesh::given::{Finer, Judged, finer, judged_modes, judged_static};
@@ -140,11 +139,12 @@ impl<'a> Together<'a> {
         }
         let request = self.spec.analysis.request().filter(|request| !matches!(request, Request::PullIn { .. }));
         let Some(request) = request.filter(|_| self.spec.ports().next().is_none()) else { return none() };
-        let prepare = |&number: &usize| guarded(budget, &mut || self.prepare(number, &request)).ok().flatten();
+        let part = || budget.map(Budget::part);
+        let prepare = |&number: &usize| guarded(part(), || self.prepare(number, &request)).ok().flatten();
         let prepared: Vec<Option<Compiled>> = numbers.iter().map(prepare).collect();
         let variants: Vec<&Compiled> = prepared.iter().flatten().collect();
         let Some(lanes) = self.lanes.get().and_then(Option::as_ref) else { return none() };
-        let Ok(judged) = guarded(budget, &mut || Ok(lanes.judged(&variants, &request))) else { return none() };
+        let Ok(judged) = guarded(part(), || Ok(lanes.judged(&variants, &request))) else { return none() };
         let mut judged = judged.into_iter();
         let found = |compiled: &Option<Compiled>| {
             let judged = compiled.as_ref().and_then(|_| judged.next().flatten())?;

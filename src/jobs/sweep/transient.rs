@@ -9,7 +9,7 @@
 
 use super::axis::{SweepParameter, at};
 use super::family::{alike, middle};
-use super::point::{Found, Outcome, Value, brief};
+use super::point::{Failed, Found, Outcome, Value, brief, guarded};
 use super::samples::Samples;
 use super::spec::{SweepAnalysis, SweepSpec};
 use crate::analysis::AnalysisError;
@@ -18,13 +18,12 @@ use crate::analysis::side_by_side::{self, RunEnd};
 use crate::analysis::signal::Signal;
 use crate::analysis::step_error;
 use crate::analysis::transient::{TransientOptions, transient};
-use crate::budget::{self, Budget};
+use crate::budget::Budget;
 use crate::compile::{CompileOptions, Compiled, draw};
 use crate::netlist::{Setting, Source};
 use crate::refine::model_order::ModelOrder;
 use crate::structure::Beam;
 use std::collections::BTreeSet;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::OnceLock;
 
 /// Points that are laid out at once.
@@ -72,10 +71,10 @@ impl<'a> Transients<'a> {
         budget: Option<&Budget>,
         finished: &(dyn Fn(Option<&Outcome>) -> bool + Sync),
     ) -> Option<Vec<Outcome>> {
-        let within = |job: &mut dyn FnMut() -> Result<Found, String>| guarded(budget, job);
+        let part = || budget.map(Budget::part);
         let go_on = || finished(None);
-        let prepare = |&number: &usize| guarded(budget, &mut || self.prepare(&self.spec.settings(number), &go_on));
-        let prepared: Vec<Result<Prepared, String>> = numbers.iter().map(prepare).collect();
+        let prepare = |&number: &usize| guarded(part(), || self.prepare(&self.spec.settings(number), &go_on));
+        let prepared: Vec<Result<Prepared, Failed>> = numbers.iter().map(prepare).collect();
         let variants: Vec<(usize, &Compiled)> =
             prepared.iter().enumerate().filter_map(|(k, p)| Some((k, &p.as_ref().ok()?.compiled))).collect();
         let compiled: Vec<&Compiled> = variants.iter().map(|(_, compiled)| *compiled).collect();
@@ -83,7 +82,7 @@ impl<'a> Transients<'a> {
         let same = self.spec.ports().next().is_none();
         let side_by_side = same.then(|| {
             let options = self.transient(&[]);
-            guarded(budget, &mut || {
+            guarded(part(), || {
                 side_by_side::ends(&compiled, &options, &mut || finished(None)).map_err(|error| error.to_string())
             })
         });
@@ -99,8 +98,8 @@ impl<'a> Transients<'a> {
             let options = self.transient(&settings);
             let values = match (prepared, end) {
                 (Err(error), _) => Err(error.clone()),
-                (Ok(point), Some(end)) => self.found(point, &options, end),
-                (Ok(point), None) => within(&mut || self.found(point, &options, alone(&point.compiled, &options)?)),
+                (Ok(point), Some(end)) => self.found(point, &options, end).map_err(Failed::from),
+                (Ok(point), None) => guarded(part(), || self.found(point, &options, alone(&point.compiled, &options)?)),
             };
             let parameters = settings.into_iter().map(|(_, value)| value).collect();
             let outcome = Outcome { number, parameters, values };
@@ -194,6 +193,7 @@ impl<'a> Transients<'a> {
         };
         let told = told.iter().cloned();
         let warnings: Vec<String> = beyond.into_iter().chain(told).chain(steps).chain(end.warnings).collect();
+        let estimated_error = estimated_error.filter(|error| error.is_finite());
         Ok(Found { values, estimated_error, warning: warnings.join("; ") })
     }
 }
@@ -217,15 +217,6 @@ fn alone(compiled: &Compiled, options: &TransientOptions<'_>) -> Result<RunEnd, 
     let last = |(_, _, values): &(String, String, Vec<f64>)| values.last().copied().unwrap_or(f64::NAN);
     let values = result.signals.iter().map(last).collect();
     Ok(RunEnd { values, steps: result.counters.steps, warnings: result.warnings })
-}
-
-/// Runs a job under a part of the budget. A fault inside is the error of that job.
-pub(super) fn guarded<T>(budget: Option<&Budget>, job: &mut dyn FnMut() -> Result<T, String>) -> Result<T, String> {
-    let outcome = catch_unwind(AssertUnwindSafe(|| match budget.map(Budget::part) {
-        Some(part) => budget::within(&part, job).unwrap_or_else(|why| Err(why.to_string())),
-        None => job(),
-    }));
-    outcome.unwrap_or_else(|_| Err("internal fault at this point".to_owned()))
 }
 
 /// Share of the samples beyond a probe on either side.
@@ -259,20 +250,14 @@ fn probes(spec: &SweepSpec) -> Vec<Vec<(String, Setting)>> {
 
 /// The points of an axis where one of what goes together is at an end.
 fn ends(group: &[SweepParameter]) -> Vec<Vec<(String, Setting)>> {
-    let number = |axis: &SweepParameter, k: usize| match axis.values[k] {
-        Setting::Number(x) => x,
-        Setting::Text(_) => k as f64,
-    };
-    let mut places = BTreeSet::new();
-    for axis in group.iter().filter(|axis| axis.option().is_none()) {
-        let by = |a: &usize, b: &usize| number(axis, *a).total_cmp(&number(axis, *b));
-        places.extend((0..axis.values.len()).min_by(by));
-        places.extend((0..axis.values.len()).max_by(by));
-    }
+    let of_axis = |axis: &SweepParameter| axis.values.ends().map(|(least, largest)| [least, largest]);
+    let axes = group.iter().filter(|axis| axis.option().is_none());
+    let mut places: BTreeSet<usize> = axes.filter_map(of_axis).flatten().collect();
     if places.is_empty() {
         places.insert(group[0].values.len() / 2);
     }
-    let at = |place: usize| group.iter().map(|axis| (axis.name.clone(), axis.values[place].clone())).collect();
+    let at =
+        |place: usize| group.iter().filter_map(|axis| Some((axis.name.clone(), axis.values.get(place)?))).collect();
     places.into_iter().map(at).collect()
 }
 

@@ -11,6 +11,7 @@ use crate::service::convert::sweep as wire;
 use crate::service::ids::Ids;
 use crate::service::proto;
 use proto::job_metadata::State;
+use std::collections::BTreeSet;
 use std::time::Duration;
 use tonic::{Code, Status};
 
@@ -89,6 +90,7 @@ struct Heard {
     parameters: Vec<String>,
     rows: Vec<(Vec<Setting>, Kept)>,
     failed: u64,
+    points: BTreeSet<usize>,
 }
 
 impl Client {
@@ -218,6 +220,13 @@ impl Client {
                 let read = wire::job_row_from_wire(found, columns.get(row.columns as usize));
                 let read =
                     read.map_err(|v| self.error(&Status::internal(format!("{}: {}", v.field, v.description))))?;
+                if !all.points.insert(read.1.point) {
+                    let text = format!(
+                        "point {} came twice: the server has lost rows and computed them again; ask for all of them anew",
+                        read.1.point
+                    );
+                    return Err(self.error(&Status::data_loss(text)));
+                }
                 all.failed += u64::from(read.1.error.is_some());
                 all.rows.push(read);
             }

@@ -3,8 +3,7 @@
 use super::model::{setting_from_wire, setting_to_wire};
 use super::{Violation, named, number, options, required, samples, voltages};
 use crate::jobs::sweep::journal::Kept;
-use crate::jobs::sweep::parse::linear;
-use crate::jobs::sweep::{Shard, SweepAnalysis, SweepParameter, SweepRow, SweepSpec, SweepTable};
+use crate::jobs::sweep::{self, Shard, SweepAnalysis, SweepParameter, SweepRow, SweepSpec, SweepTable};
 use crate::netlist::Setting;
 use crate::options::analysis::{MODES_COUNT, PULL_IN_MAX, TRAN_STOP};
 use crate::options::{Described, Value};
@@ -31,8 +30,16 @@ pub fn spec_to_wire(spec: &SweepSpec) -> proto::SweepSpec {
         }
     };
     let axis = |axis: &SweepParameter| {
-        let list = proto::SettingList { values: axis.values.iter().map(|value| setting_to_wire("", value)).collect() };
-        let values = if axis.in_step { Values::InStep(list) } else { Values::List(list) };
+        let values = match axis.values {
+            sweep::Values::Linear { low, high, count } if !axis.in_step => {
+                Values::Linear(proto::Linear { low, high, count: u32::try_from(count).unwrap_or(u32::MAX) })
+            }
+            _ => {
+                let values = axis.values.iter().map(|value| setting_to_wire("", &value)).collect();
+                let list = proto::SettingList { values };
+                if axis.in_step { Values::InStep(list) } else { Values::List(list) }
+            }
+        };
         proto::SweepParameter { name: axis.name.clone(), values: Some(values) }
     };
     proto::SweepSpec {
@@ -118,14 +125,14 @@ pub fn spec_from_wire(spec: Option<proto::SweepSpec>) -> Result<SweepSpec, Viola
 fn axis_from_wire(field: &str, axis: proto::SweepParameter) -> Result<SweepParameter, Violation> {
     let listed = |list: proto::SettingList, kind: &str| {
         let convert = |(i, value)| setting_from_wire(&format!("{field}.{kind}.values[{i}]"), value);
-        list.values.into_iter().enumerate().map(convert).collect::<Result<Vec<_>, _>>()
+        list.values.into_iter().enumerate().map(convert).collect::<Result<Vec<_>, _>>().map(sweep::Values::List)
     };
     let in_step = matches!(axis.values, Some(Values::InStep(_)));
     let values = match required(&format!("{field}.values"), axis.values)? {
         Values::Linear(l) => {
             let low = number(&format!("{field}.linear.low"), l.low, false)?;
             let high = number(&format!("{field}.linear.high"), l.high, false)?;
-            linear(low, high, l.count as usize)
+            sweep::Values::Linear { low, high, count: l.count as usize }
         }
         Values::List(list) => listed(list, "list")?,
         Values::InStep(list) => listed(list, "in_step")?,

@@ -87,8 +87,7 @@ impl Calls {
 
     pub(in super::super) async fn cancelled_job(&self, name: &str) -> Reply<proto::CancelJobResponse> {
         let job = self.0.jobs.get(id(name)?, "job")?;
-        // it may wait for the disk
-        self.0.desk.run(move || Jobs::cancel(&job)).await?;
+        aside(move || Jobs::cancel(&job)).await?;
         Ok(Response::new(proto::CancelJobResponse {}))
     }
 
@@ -105,6 +104,12 @@ impl Calls {
             shared.jobs.delete(&job);
             Ok(())
         };
-        self.0.desk.run(delete).await
+        aside(delete).await
     }
+}
+
+/// What waits for the disk and computes nothing: in nobody's turn and on nobody's account, so that who has used up what is his may stop what
+/// runs.
+async fn aside(job: impl FnOnce() -> Result<(), Status> + Send + 'static) -> Result<(), Status> {
+    tokio::task::spawn_blocking(job).await.unwrap_or_else(|_| Err(status::fault()))
 }

@@ -82,32 +82,34 @@ pub(super) fn begin(store: &Arc<Store>, id: &str, asked: &Asked, request: &[u8])
     }
 }
 
-/// Every job of a folder. What was left of others is removed.
+/// The ids of what a folder has.
 ///
 /// # Errors
 /// A folder that cannot be read.
-pub(super) fn find(store: &Arc<Store>) -> io::Result<Vec<Found>> {
+pub(super) fn ids(store: &Store) -> io::Result<BTreeSet<String>> {
     let mut ids = BTreeSet::new();
     for entry in fs::read_dir(folder(store))? {
         let name = entry?.file_name().to_string_lossy().into_owned();
         ids.extend(name.split('.').next().filter(|id| is_id(id)).map(str::to_owned));
     }
-    let mut found = Vec::new();
-    for id in ids {
-        let file = JobFile::of(store, &id, "");
-        let counted = ["job", "rows", "end", "new"].iter().map(|end| file.size(end)).sum::<u64>();
-        file.bytes.store(usize::try_from(counted).unwrap_or(usize::MAX), Ordering::Relaxed);
-        match file.read() {
-            Ok(Some(((asked, request), end))) => {
-                let file = JobFile { sweep: asked.sweep.clone(), ..file };
-                found.push(Found { id, asked, request, end, file });
-            }
-            // never answered: there is nothing that could go on
-            Ok(None) => file.remove(),
-            Err(error) => tracing::warn!(job = id, %error, "it cannot be read, and is left alone"),
+    Ok(ids)
+}
+
+/// What a folder has of a job. What was left of one that was never answered is removed.
+pub(super) fn find(store: &Arc<Store>, id: &str) -> Option<Found> {
+    let file = JobFile::of(store, id, "");
+    let counted = ["job", "rows", "end", "new"].iter().map(|end| file.size(end)).sum::<u64>();
+    file.bytes.store(usize::try_from(counted).unwrap_or(usize::MAX), Ordering::Relaxed);
+    match file.read() {
+        Ok(Some(((asked, request), end))) => {
+            let file = JobFile { sweep: asked.sweep.clone(), ..file };
+            return Some(Found { id: id.to_owned(), asked, request, end, file });
         }
+        // there is nothing that could go on
+        Ok(None) => file.remove(),
+        Err(error) => tracing::warn!(job = id, %error, "it cannot be read, and is left alone"),
     }
-    Ok(found)
+    None
 }
 
 fn folder(store: &Store) -> PathBuf {
@@ -163,7 +165,11 @@ impl JobFile {
         let Some(bytes) = there("job")? else { return Ok(None) };
         let strange = || io::Error::new(io::ErrorKind::InvalidData, "it is damaged, or of another version");
         let head = read_head(&bytes).ok_or_else(strange)?;
-        let end = there("end")?.map(|bytes| serde_json::from_slice(&bytes)).transpose()?;
+        // one that is damaged is as if it had never been: the job goes on
+        let end = there("end")?.and_then(|bytes| {
+            let told = |error: &serde_json::Error| tracing::warn!(job = self.id, %error, "its end cannot be read, so it goes on");
+            serde_json::from_slice(&bytes).inspect_err(told).ok()
+        });
         Ok(Some((head, end)))
     }
 
@@ -203,6 +209,14 @@ impl JobFile {
         }
         self.journal = Some(journal);
         Ok(rows)
+    }
+
+    /// The rows of a job that has ended. Changes nothing.
+    ///
+    /// # Errors
+    /// What the system said.
+    pub(super) fn read_rows(&self) -> io::Result<Vec<Kept>> {
+        Journal::read(&self.path("rows"), &self.sweep).map_err(io_error)
     }
 
     /// Adds rows to the open journal. When this returns they are on the disk, or, where nobody waits for the disk, with the system.

@@ -4,7 +4,7 @@ use std::collections::{BTreeSet, VecDeque};
 use std::time::{Duration, Instant};
 
 /// Connections of its client that a job remembers; of more, the last.
-const MOST: usize = 64;
+const MOST: usize = 1024;
 
 /// Connections by which a job was asked for.
 #[derive(Debug, Default)]
@@ -24,6 +24,11 @@ impl Holders {
                 self.connections.pop_front();
             }
         }
+    }
+
+    /// One of them is known to be open.
+    pub(super) fn are_there(&mut self) {
+        self.gone = None;
     }
 
     /// For how long all of them have been closed, as far as those tell that are open; none: one is open. A process that asks itself always

@@ -10,9 +10,9 @@ use super::holders::Holders;
 use super::rows::Rows;
 use super::standing::{Standing, Stop, state_of};
 use super::wire;
-use crate::budget::Budget;
+use crate::budget::{Budget, Stopped};
 use crate::jobs::sweep::journal::Kept;
-use crate::jobs::sweep::{SweepSpec, SweepTable};
+use crate::jobs::sweep::{SweepError, SweepSpec};
 use proto::job_metadata::State;
 use std::collections::BTreeSet;
 use std::io;
@@ -44,7 +44,6 @@ pub(super) struct Job {
     pub(super) stopped: CancellationToken,
     pub(super) used: Mutex<Instant>,
     holders: Mutex<Holders>,
-    pub(super) table: OnceLock<SweepTable>,
 }
 
 /// Rows on their way to the disk.
@@ -83,7 +82,6 @@ impl Job {
             stopped: CancellationToken::new(),
             used: Mutex::new(Instant::now()),
             holders: Mutex::default(),
-            table: OnceLock::new(),
         })
     }
 
@@ -100,6 +98,17 @@ impl Job {
     /// Whether a folder has it.
     pub(super) fn is_kept(&self) -> bool {
         self.kept
+    }
+
+    /// Whether it goes on, or has ended with all of its rows, and is not told to stop.
+    pub(super) fn lives(&self) -> bool {
+        self.stop.get().is_none() && !matches!(self.standing.borrow().state, State::Cancelled | State::Failed)
+    }
+
+    /// Whether this server has no more use for it: it has ended, and not because another one should go on with it.
+    pub(super) fn is_over(&self) -> bool {
+        let standing = self.standing.borrow();
+        standing.end.is_some() && !standing.refused
     }
 
     /// Whether it has ended.
@@ -121,7 +130,10 @@ impl Job {
     /// Cancels it where its client is gone for longer than it asked for; a process that asks itself never is.
     pub(super) fn look_for_client(&self, open: &BTreeSet<u64>) {
         let Some(release) = self.asked.release().filter(|_| !self.has_ended()) else { return };
-        if held(&self.holders).are_gone(open).is_some_and(|time| time >= release) {
+        // who reads its rows, or watches it, is there
+        if self.is_watched() {
+            held(&self.holders).are_there();
+        } else if held(&self.holders).are_gone(open).is_some_and(|time| time >= release) {
             self.stop(Stop::Released(release));
         }
     }
@@ -141,8 +153,16 @@ impl Job {
     pub(super) fn keep_cancelled(&self) -> io::Result<()> {
         let file = held(&self.file);
         let standing = self.standing();
+        let Some(file) = file.as_ref().filter(|_| standing.end.is_none() || standing.refused) else { return Ok(()) };
         let end = self.ending(&standing, Code::Cancelled, "cancelled".to_owned());
-        file.as_ref().filter(|_| standing.end.is_none()).map_or(Ok(()), |file| file.end(&end))
+        file.end(&end)?;
+        if standing.refused {
+            self.standing.send_modify(|standing| {
+                (standing.state, standing.refused) = (State::Cancelled, false);
+                standing.end = Some(end);
+            });
+        }
+        Ok(())
     }
 
     /// Its first point is begun.
@@ -207,9 +227,18 @@ impl Job {
         self.standing.send_modify(|standing| (standing.rows, standing.failed) = (all, failed));
     }
 
-    /// Points that have a row.
-    pub(super) fn points(&self) -> BTreeSet<usize> {
-        held(&self.rows).iter().flat_map(Rows::points).collect()
+    /// Points that have a row; the bytes of these rows are taken from its budget.
+    ///
+    /// # Errors
+    /// [`SweepError`] where it has no room for them.
+    pub(super) fn points(&self) -> Result<BTreeSet<usize>, SweepError> {
+        let rows = held(&self.rows);
+        let bytes = rows.iter().map(Rows::bytes).sum();
+        self.budget.take(bytes).map_err(|why| match why {
+            Stopped::Bytes { most, .. } => SweepError::TooLarge { most },
+            why => SweepError::Owner(why),
+        })?;
+        Ok(rows.iter().flat_map(Rows::points).collect())
     }
 
     fn ending(&self, standing: &Standing, code: Code, message: String) -> End {
@@ -251,15 +280,22 @@ impl Job {
             standing.state = state_of(end.code);
             standing.end = Some(end);
         });
+        drop(file);
+        self.budget.give_back();
+        self.unload();
     }
 
     /// This server does not go on with it. That is not kept: another one may.
     pub(super) fn refuse(&self, why: &Status) {
         let end = self.ending(&self.standing(), why.code(), why.message().to_owned());
+        if let Some(file) = held(&self.file).as_mut() {
+            file.close();
+        }
         self.standing.send_modify(|standing| {
-            standing.state = state_of(end.code);
+            (standing.state, standing.refused) = (state_of(end.code), true);
             standing.end = Some(end);
         });
+        self.unload();
     }
 
     /// Comes back when nothing of it is computed any more.
@@ -286,14 +322,6 @@ impl Job {
     /// True while a stream of its rows, or of where it stands, is open.
     pub(super) fn is_watched(&self) -> bool {
         self.standing.receiver_count() > 0
-    }
-
-    /// It was last asked for when it ended, before this server began.
-    pub(super) fn ended_before(&self, ended_ms: u64) {
-        let since = Duration::from_millis(now_ms().saturating_sub(ended_ms));
-        if let Some(then) = Instant::now().checked_sub(since) {
-            *held(&self.used) = then;
-        }
     }
 
     /// As it travels, without the options of the model, which may be long.

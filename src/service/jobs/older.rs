@@ -6,7 +6,6 @@ use super::job::Job;
 use super::streams::{self, SweepStream, TableStream};
 use proto::job_metadata::State;
 use proto::sweep_status::State as Older;
-use std::sync::Arc;
 use tonic::{Response, Status};
 
 impl Calls {
@@ -34,9 +33,8 @@ impl Calls {
             return Err(Status::failed_precondition(text.trim_end()));
         }
         let place = self.sending()?;
-        let made = Arc::clone(&job);
-        self.0.desk.run(move || made.make_table()).await?;
-        Ok(Response::new(TableStream::new(job, place, &self.0.shutdown)))
+        let table = self.0.desk.run(move || job.table()).await?;
+        Ok(Response::new(TableStream::new(table, place, &self.0.shutdown)))
     }
 
     pub(in super::super) async fn cancelled_sweep(&self, id: &str) -> Reply<proto::CancelSweepResponse> {

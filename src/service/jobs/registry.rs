@@ -99,8 +99,13 @@ impl Jobs {
     ) -> Result<Arc<Job>, Status> {
         let Task { spec, bundle, options } = task;
         let asked = asked.with(&spec, &bundle, &options);
-        if let Some(before) = already(&self.kept(), &asked)? {
-            return Ok(before);
+        let again = |job: Arc<Job>| {
+            job.touch(client().number);
+            Ok(job)
+        };
+        let before = already(&self.kept(), &asked)?;
+        if let Some(before) = before {
+            return again(before);
         }
         let violation = |error: SweepError| status::bad_request(&error.to_string(), [spec_violation(&error)]);
         let points = spec.grid_points().map_err(violation)?;
@@ -115,7 +120,7 @@ impl Jobs {
         {
             let kept = self.kept();
             if let Some(before) = already(&kept, &asked)? {
-                return Ok(before);
+                return again(before);
             }
             room(&kept, &asked.owner, limits)?;
         }
@@ -142,9 +147,10 @@ impl Jobs {
     /// A folder that cannot be read.
     pub(in super::super) fn wake(&self, accounts: &Accounts, limits: &Limits) -> std::io::Result<()> {
         let Some(store) = &self.store else { return Ok(()) };
-        for found in folder::find(store)? {
+        // one by one: not the requests of all of them at once
+        for id in folder::ids(store)? {
+            let Some(found) = folder::find(store, &id) else { continue };
             self.sequence.fetch_max(found.asked.sequence.saturating_add(1), Ordering::Relaxed);
-            let id = found.id.clone();
             if let Err(error) = self.wake_one(found, accounts, limits) {
                 tracing::warn!(job = id, error, "it cannot be read, and is left alone");
             }
@@ -161,10 +167,9 @@ impl Jobs {
         let budget = Budget::new(Allowance { purse, ..allowance(limits) });
         // what it was told of is there: its rows are read when somebody asks for them
         if let Some(end) = end.clone().filter(|end| end.bytes == file.row_bytes()) {
-            let (state, rows, failed, ended_ms) = (state_of(end.code), end.rows, end.failed, end.ended_ms);
+            let (state, rows, failed) = (state_of(end.code), end.rows, end.failed);
             let standing = Standing { state, rows, failed, end: Some(end), ..Standing::default() };
             let job = Job::new(id.clone(), (asked, spec, wire_options), budget, Some(file), (None, standing));
-            job.ended_before(ended_ms);
             self.kept().insert(id, job);
             return Ok(());
         }
@@ -256,7 +261,7 @@ impl Jobs {
     /// Forgets finished jobs that nobody asked for during the time that the limits give; how many. Waits for the disk.
     pub(in super::super) fn expire(&self, limits: &Limits) -> usize {
         let time = if self.store.is_some() { limits.sweeps_idle } else { limits.idle };
-        let is_old = |job: &&Arc<Job>| job.has_ended() && job.idle() >= time && !job.is_watched();
+        let is_old = |job: &&Arc<Job>| job.is_over() && job.idle() >= time && !job.is_watched();
         let old: Vec<_> = self.kept().values().filter(is_old).cloned().collect();
         old.iter().for_each(|job| self.delete(job));
         old.len()
@@ -298,8 +303,7 @@ fn room(kept: &BTreeMap<String, Arc<Job>>, owner: &str, limits: &Limits) -> Resu
 fn already(kept: &BTreeMap<String, Arc<Job>>, asked: &Asked) -> Result<Option<Arc<Job>>, Status> {
     let mut same = kept.values().filter_map(|job| job.asked.is(asked).map(|same| (job, same)));
     if asked.share {
-        let lives = |job: &&Arc<Job>| !matches!(job.standing().state, State::Cancelled | State::Failed);
-        return Ok(same.filter(|(_, same)| *same).map(|(job, _)| job).find(lives).cloned());
+        return Ok(same.filter(|(_, same)| *same).map(|(job, _)| job).find(|job| job.lives()).cloned());
     }
     match same.next() {
         Some((_, false)) => {

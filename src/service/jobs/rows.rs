@@ -87,6 +87,12 @@ impl Rows {
         self.rows.iter().map(|row| row.point)
     }
 
+    /// Bytes that they take, about.
+    pub(super) fn bytes(&self) -> usize {
+        let texts = |row: &Row| row.warning.len() + row.error.as_ref().map_or(0, |error| error.len());
+        self.rows.iter().map(|row| size_of::<Row>() + 8 * row.values.len() + texts(row)).sum()
+    }
+
     /// Every row as it was found.
     pub(super) fn found(&self) -> impl Iterator<Item = Kept> {
         self.rows.iter().map(|row| {

@@ -52,6 +52,7 @@ impl Crews {
             let outcome = caught(&job.budget, || crews.run(&job, &bundle, &options));
             job.finish(match outcome {
                 Some(Ok(Ok(_))) => None,
+                Some(Ok(Err(SweepError::Owner(why)))) => Some(status::stopped(why)),
                 Some(Ok(Err(error @ SweepError::TooLarge { .. }))) => {
                     Some(Status::resource_exhausted(error.to_string()))
                 }
@@ -72,7 +73,7 @@ impl Crews {
         // the upper half only tells more clients apart than there are
         let client = client.value() as u64;
         let crew = Taken { crews: self, pool, client, stopped: &job.stopped, begin: &|| job.begin() };
-        let known = job.points();
+        let known = job.points()?;
         let mut numbers = job.spec.point_numbers()?;
         numbers.retain(|number| !known.contains(number));
         sweep::run_by(&job.spec, bundle, options, &numbers, &crew, &|kept| job.found(kept, &self.runtime))

@@ -14,6 +14,8 @@ pub(super) struct Standing {
     pub(super) rows: u64,
     pub(super) failed: u64,
     pub(super) end: Option<End>,
+    /// It has ended for this server alone: another one may go on with it.
+    pub(super) refused: bool,
     /// Deleted.
     pub(super) gone: bool,
     /// The next server goes on with it.

@@ -7,6 +7,7 @@ use super::super::{proto, status};
 use super::job::Job;
 use super::rows::Reading;
 use super::standing::Standing;
+use crate::jobs::sweep::SweepTable;
 use prost::Message;
 use std::future::Future;
 use std::pin::Pin;
@@ -96,51 +97,65 @@ pub(super) fn rows(
     let (mut standing, shutdown) = (job.watch(), shutdown.clone());
     tokio::spawn(async move {
         let _place = place;
-        let mut reading = Reading::from(first);
-        let mut quiet = false;
-        loop {
-            let now = standing.borrow_and_update().clone();
-            if now.gone {
-                let _ = sender.send(Err(status::not_found("job", &job.id))).await;
-                return;
-            }
-            while reading.next < now.rows || !reading.begun || std::mem::take(&mut quiet) {
-                let (before, begun) = (reading.next, reading.begun);
-                let (mut message, back) = chunk(&job, reading, now.rows).await;
-                reading = back;
-                if begun && before < now.rows && reading.next == before {
-                    // its rows are gone
-                    message = Err(status::not_found("job", &job.id));
-                }
-                let failed = message.is_err();
-                let sent = tokio::select! {
-                    sent = sender.send(message) => sent.is_ok(),
-                    () = shutdown.ending.cancelled() => {
-                        let _ = sender.try_send(Err(status::stopping()));
-                        false
-                    }
-                };
-                if failed || !sent {
-                    return;
-                }
-            }
-            if now.end.is_some() || only_finished {
-                let last = proto::JobRows { first_row: reading.next, job: Some(job.to_wire()), ..Default::default() };
-                let _ = sender.send(Ok(last)).await;
-                job.unload();
-                return;
-            }
-            match next(&mut standing, &sender, &shutdown).await {
-                Next::Told => tokio::time::sleep(GATHERING).await,
-                Next::Quiet => quiet = true,
-                Next::Over(why) => {
-                    say_last(&sender, why);
-                    return;
-                }
-            }
+        send_rows(&job, (first, only_finished), &mut standing, &sender, &shutdown).await;
+        drop(standing);
+        if job.has_ended() {
+            // it may wait for who reads a disk
+            tokio::task::spawn_blocking(move || job.unload());
         }
     });
     Box::pin(ReceiverStream::new(receiver))
+}
+
+async fn send_rows(
+    job: &Arc<Job>,
+    (first, only_finished): (u64, bool),
+    standing: &mut watch::Receiver<Standing>,
+    sender: &mpsc::Sender<Result<proto::JobRows, Status>>,
+    shutdown: &Shutdown,
+) {
+    let mut reading = Reading::from(first);
+    let mut quiet = false;
+    loop {
+        let now = standing.borrow_and_update().clone();
+        if now.gone {
+            let _ = sender.send(Err(status::not_found("job", &job.id))).await;
+            return;
+        }
+        while reading.next < now.rows || !reading.begun || std::mem::take(&mut quiet) {
+            let (before, begun) = (reading.next, reading.begun);
+            let (mut message, back) = chunk(job, reading, now.rows).await;
+            reading = back;
+            if begun && before < now.rows && reading.next == before {
+                // its rows are gone
+                message = Err(status::not_found("job", &job.id));
+            }
+            let failed = message.is_err();
+            let sent = tokio::select! {
+                sent = sender.send(message) => sent.is_ok(),
+                () = shutdown.ending.cancelled() => {
+                    let _ = sender.try_send(Err(status::stopping()));
+                    false
+                }
+            };
+            if failed || !sent {
+                return;
+            }
+        }
+        if now.end.is_some() || only_finished {
+            let last = proto::JobRows { first_row: reading.next, job: Some(job.to_wire()), ..Default::default() };
+            let _ = sender.send(Ok(last)).await;
+            return;
+        }
+        match next(standing, sender, shutdown).await {
+            Next::Told => tokio::time::sleep(GATHERING).await,
+            Next::Quiet => quiet = true,
+            Next::Over(why) => {
+                say_last(sender, why);
+                return;
+            }
+        }
+    }
 }
 
 /// The next message of a stream: on a thread of its own, as it may read a disk.
@@ -156,7 +171,7 @@ async fn chunk(job: &Arc<Job>, mut reading: Reading, end: u64) -> (Result<proto:
 /// A table on its way: columns first, then rows in as few messages as fit, each made when the one before is taken. A
 /// reader that is slow holds a place and one message, and no thread.
 pub(in super::super) struct TableStream {
-    job: Arc<Job>,
+    table: SweepTable,
     /// Rows sent; none before the first message.
     sent: Option<usize>,
     ending: Pin<Box<WaitForCancellationFutureOwned>>,
@@ -164,13 +179,13 @@ pub(in super::super) struct TableStream {
 }
 
 impl TableStream {
-    /// The table of a job whose table was made.
-    pub(super) fn new(job: Arc<Job>, place: OwnedSemaphorePermit, shutdown: &Shutdown) -> Self {
-        Self { job, sent: None, ending: Box::pin(shutdown.ending.clone().cancelled_owned()), _place: place }
+    /// A table from its first row on.
+    pub(super) fn new(table: SweepTable, place: OwnedSemaphorePermit, shutdown: &Shutdown) -> Self {
+        Self { table, sent: None, ending: Box::pin(shutdown.ending.clone().cancelled_owned()), _place: place }
     }
 
     fn next(&mut self) -> Option<proto::SweepChunk> {
-        let table = self.job.table()?;
+        let table = &self.table;
         let mut chunk = proto::SweepChunk::default();
         let first = self.sent.is_none();
         if first {
@@ -198,7 +213,7 @@ impl Stream for TableStream {
     type Item = Result<proto::SweepChunk, Status>;
 
     fn poll_next(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<Option<Self::Item>> {
-        let over = self.sent.is_some_and(|sent| self.job.table().is_none_or(|table| sent >= table.rows.len()));
+        let over = self.sent.is_some_and(|sent| sent >= self.table.rows.len());
         if !over && self.ending.as_mut().poll(cx).is_ready() {
             self.sent = Some(usize::MAX);
             return Poll::Ready(Some(Err(status::stopping())));

@@ -183,6 +183,8 @@ class Client:
         With ``share`` it is the one that computes the same, if this client has one there, running or done. ``release_after`` [s] lets the
         server cancel it when it has had no connection of this client for so long; None: it runs on.
         """
+        if release_after is not None and not release_after > 0:
+            raise ValueError(f"release_after: expected a time above 0 s, or None, got {release_after}")
         request = jobs_pb2.SubmitJobRequest(
             bundle=self._bundle(netlist, include),
             options=options_to_wire(set or {}, options),
@@ -201,7 +203,7 @@ class Client:
 
         Raises :class:`NotFound` for one that the server does not have (any more).
         """
-        found = Sweep(self._channel, sweep if "/" in sweep else f"jobs/{sweep}")
+        found = Sweep(self._channel, sweep if "/" in sweep else f"jobs/{sweep}", shared=True)
         found.status()
         return found
 

@@ -32,10 +32,19 @@ def arrow(columns: Mapping[str, Sequence[Any]], units: Mapping[str, str], about:
         import pyarrow
     except ImportError:
         raise ImportError("to_arrow() needs pyarrow: pip install pyarrow") from None
-    arrays = {name: pyarrow.array(values) for name, values in columns.items()}
+    # a column without a value is one of numbers all the same: parts of a sweep have one schema
+    kinds = {name: pyarrow.float64() if name in units else None for name in columns}
+    arrays = {name: pyarrow.array(_alike(values), type=kinds[name]) for name, values in columns.items()}
     unit = {name: {"unit": units[name]} if name in units else None for name in arrays}
     fields = [pyarrow.field(name, array.type, metadata=unit[name]) for name, array in arrays.items()]
     return pyarrow.table(list(arrays.values()), schema=pyarrow.schema(fields, metadata=dict(about)))
+
+
+def _alike(values: Sequence[Any]) -> Sequence[Any]:
+    """Numbers as words where some are words: a column of Arrow is of one type."""
+    if not any(isinstance(value, str) for value in values):
+        return values
+    return [value if value is None or isinstance(value, str) else repr(value) for value in values]
 
 
 def axes(given: Axes | None) -> Axes:

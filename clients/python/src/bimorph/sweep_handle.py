@@ -24,7 +24,7 @@ _STATES = {
 }
 
 _ATTEMPTS = 6
-"""Streams in a row that break without a row, after which the rows are given up."""
+"""Streams in a row that break without a word, after which the rows are given up."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,8 @@ def _time(about: Any, name: str) -> datetime.datetime | None:
 class Sweep:
     """A sweep on a server: :meth:`Client.submit` starts one, :meth:`Client.attach` finds one again by its ``id``, also from another process.
 
-    It runs whether or not anybody waits for it. The end of a ``with`` block ends it and lets the server forget it, unless it is shared.
+    It runs whether or not anybody waits for it. The end of a ``with`` block ends it and lets the server forget it, unless it is shared
+    or was attached to.
     """
 
     def __init__(self, channel: Channel, id: str, shared: bool = False) -> None:
@@ -113,7 +114,13 @@ class Sweep:
         points = self._persistent_status().points
         rows: list[_Found] = []
         parameters: list[str] = []
+        known: set[int] = set()
         for chunk in self._chunks(0):
+            for found in chunk.found:
+                if found.row.point in known:
+                    point = found.row.point
+                    raise BimorphError(f"point {point} came twice: the server has lost rows and computed them again; wait anew")
+                known.add(found.row.point)
             rows.extend(chunk.found)
             parameters = chunk.parameters
             if progress is not None:
@@ -173,7 +180,7 @@ class Sweep:
             try:
                 for chunk in self._fetch(first):
                     first += len(chunk.found)
-                    breaks = 0 if chunk.found else breaks
+                    breaks = 0
                     yield chunk
                 return
             except Unavailable as error:
