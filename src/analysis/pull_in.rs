@@ -13,7 +13,7 @@ use super::AnalysisError;
 use super::contact_range::within_contact_range;
 use super::statics::source_vector;
 use crate::compile::Compiled;
-use crate::gaps::System;
+use crate::gaps::{Domain, System};
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
 use crate::solve::SolveError;
@@ -53,7 +53,8 @@ pub fn pull_in(compiled: &Compiled, port: Option<&str>, max: f64) -> Result<Pull
     let (rows, heating) = (&system.electrics.gap_rows, &system.electrics.heating);
     let pulls = |source: usize| (0..system.gaps.len()).any(|gap| rows[(gap, source)] != 0.0);
     // what is heated may be pushed to where another voltage closes a gap
-    let pushes = !system.gaps.is_empty() && (0..heating.heaters.len()).any(|k| heating.current(k, source) != 0.0);
+    let pushes =
+        system.gaps.iter().any(Domain::is_gap) && (0..heating.heaters.len()).any(|k| heating.current(k, source) != 0.0);
     if !pulls(source) && !pushes {
         let names = &system.electrics.names;
         let others: Vec<&str> = (0..names.len()).filter(|k| pulls(*k)).map(|k| names[k].as_str()).collect();

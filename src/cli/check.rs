@@ -4,6 +4,7 @@ use super::failure::Failure;
 use super::model::{Context, ModelArgs, Named};
 use super::output;
 use bimorph::compile::{Compiled, Formulation};
+use bimorph::gaps::elements;
 use bimorph::netlist::Setting;
 use bimorph::structure::Structure;
 use clap::Args;
@@ -136,7 +137,9 @@ fn contents(s: &Structure) -> String {
         (_, "mass") => format!("{n} masses"),
         _ => format!("{n} {word}s"),
     };
-    let list: Vec<String> = counts.iter().filter(|(n, _)| *n > 0).map(|(n, word)| plural(*n, word)).collect();
+    let placed = elements().map(|e| (s.placed.iter().filter(|p| p.element == e.name).count(), e.name));
+    let counts = counts.into_iter().chain(placed).filter(|(n, _)| *n > 0);
+    let list: Vec<String> = counts.map(|(n, word)| plural(n, word)).collect();
     list.join(", ")
 }
 

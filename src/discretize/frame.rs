@@ -16,7 +16,7 @@
 use super::bar::bar;
 use super::rigid::Assembly;
 use super::{DiscretizeError, cubic, lay_spring, order};
-use crate::gaps::{Member, Point};
+use crate::gaps::{Domain, Member, Point};
 use crate::multibody::linear_system::{LinearSystem, add_pair};
 use crate::multibody::planar::{JointFrame, Pose};
 use crate::multibody::{BodyId, BodyName, Joint};
@@ -95,10 +95,11 @@ pub fn assemble(structure: &Structure, options: &FrameOptions) -> Result<Frame, 
     }
     rigid.hold_hinges(structure, &mut joints);
 
-    let gaps = match options.gaps {
-        FrameGaps::LeftOut => Vec::new(),
-        FrameGaps::Laid { chord } => rigid.gaps(structure, chord),
-    };
+    let mut gaps = rigid.gaps(structure, options.gaps == FrameGaps::Laid { chord: true });
+    if options.gaps == FrameGaps::LeftOut {
+        gaps.retain(|laid| !laid.member.is_gap());
+    }
+    super::lay_dampers(&gaps, undamped, &mut dampers);
     let couplings: Vec<(BodyId, BodyId)> = (pieces.iter().map(|p| (p.from.body, p.to.body)))
         .chain(joints.iter().map(|j: &Joint| (j.a, j.b)))
         .chain(dampers.iter().map(|d| (d.a, d.b)))

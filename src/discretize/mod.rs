@@ -71,7 +71,7 @@ pub struct Discretized {
     ends: Arc<junction::Ends>,
     /// For each heater of the electrics, its beam in the structure.
     pub heaters: Vec<usize>,
-    /// Name of each gap of the system.
+    /// Name of each gap of the system, which come before what acts without two sides.
     pub gap_names: Vec<String>,
 }
 
@@ -149,14 +149,11 @@ pub fn discretize_like(
     rigid.hold_hinges(structure, &mut joints);
     let gaps = rigid.gaps(structure, options.as_sugar);
     let mut couplings = couplings(&gaps);
-    let loads: Vec<(usize, Load)> = structure
-        .loads
-        .iter()
-        .map(|l| {
-            let force = Vector2::new(l.force[0], l.force[1]);
-            (l.node.0, Load { point: rigid.point(l.node.0), force, moment: l.moment })
-        })
-        .collect();
+    let load = |l: &crate::structure::Load| {
+        let force = Vector2::new(l.force[0], l.force[1]);
+        Load { point: rigid.point(l.node.0), force, moment: l.moment }
+    };
+    let loads: Vec<Load> = structure.loads.iter().map(load).collect();
     let electrics = match other {
         Some(other) => other.system.electrics.clone(),
         None => ports::lay(structure, &heaters, &gaps, &rigid)?,
@@ -167,6 +164,7 @@ pub fn discretize_like(
     if rigid.bodies.is_empty() {
         return Err(DiscretizeError::NothingMoves);
     }
+    lay_dampers(&gaps, options.undamped, &mut dampers);
     budget::lay_out(rigid.bodies.len() * BODY_BYTES);
     let bodies = rigid.finish_bodies();
     for joint in &mut joints {
@@ -183,11 +181,11 @@ pub fn discretize_like(
     }
     let model = model.couple(coupled);
     let moved = |p: Point| rigid.centered(p, &place);
-    let gap_names = gaps.iter().map(|laid| laid.name.to_owned()).collect();
+    let gap_names = gaps.iter().filter(|laid| laid.member.is_gap()).map(|laid| laid.name.to_owned()).collect();
     let system = System {
         model,
         gaps: gaps.into_iter().map(|laid| laid.member.moved(&moved)).collect(),
-        loads: loads.into_iter().map(|(_, l)| Load { point: moved(l.point), ..l }).collect(),
+        loads: loads.into_iter().map(|l| Load { point: moved(l.point), ..l }).collect(),
         electrics,
         length_scale: if scale.is_finite() { scale } else { 1e-6 },
     };
@@ -216,6 +214,13 @@ fn couplings(gaps: &[Laid<'_, Member>]) -> Vec<(BodyId, BodyId)> {
         }
     }
     pairs
+}
+
+/// The dampers that laws have, none of an undamped model.
+fn lay_dampers(gaps: &[Laid<'_, Member>], undamped: bool, dampers: &mut Vec<Damper>) {
+    if !undamped {
+        gaps.iter().for_each(|laid| laid.member.dampers(|damper| dampers.push(damper)));
+    }
 }
 
 /// A lumped spring and damper: a joint half way between its two nodes.

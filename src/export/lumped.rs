@@ -125,9 +125,14 @@ fn gaps(
     coordinates: &[Coordinate],
 ) -> Result<Vec<LumpedGap>, ExportError> {
     let electrics = &system.electrics;
+    // what acts without sides comes after all gaps; where it adds no force, its damping is among that of the parts
+    let acts = |(_, gap): &(usize, &Member)| gap.is_gap() || gap.acts(1.0);
     let gap = |(g, gap): (usize, &Member)| {
         let Some((approach, law)) = gap.law() else {
-            let why = format!("gap \"{}\" lies along beams", compiled.parts.gap_names[g]);
+            let why = match compiled.parts.gap_names.get(g) {
+                Some(name) => format!("gap \"{name}\" lies along beams"),
+                None => "a force acts on it that is neither that of a field nor of a stop".to_owned(),
+            };
             return Err(ExportError::NotLumped { why });
         };
         let (by_port, constant) = by_port(electrics, ports, &|s| electrics.gap_rows[(g, s)]);
@@ -135,7 +140,7 @@ fn gaps(
         let along = along(coordinates, &approach.a, approach.axis) - along(coordinates, &approach.b, approach.axis);
         Ok(LumpedGap { name, along, law, by_port, constant })
     };
-    system.gaps.iter().enumerate().map(gap).collect()
+    system.gaps.iter().enumerate().filter(acts).map(gap).collect()
 }
 
 /// What a signal reads.

@@ -5,6 +5,10 @@
 //! ```text
 //! forces ∂Π/∂q      tangent ∂²Π/∂q²      change of the forces with what drives it ∂²Π/∂q∂u      charge −∂Π/∂u
 //! ```
+//! Damping is linear and constant, and belongs to the mechanism: a domain hands its dampers over when it is laid
+//! ([`super::drawn::Drawn::dampers`]), and every integrator, frequency response and noise has them. Only heat has states of its own
+//! ([`super::lag`]): temperatures follow voltages alone, so that they come before the mechanism and not with it.
+//!
 //! Nothing here is called through a pointer: [`super::member::Member`] is one of the registered domains, chosen by a `match`.
 
 use super::approach::{Approach, Point};
@@ -49,6 +53,11 @@ pub trait Domain {
 
     /// `tangent += ∂²Π/∂q²`, on a pattern that couples its bodies.
     fn add_tangent(&self, at: At<'_>, given: Self::Given, pattern: &Pattern, tangent: &mut BlockMatrix<f64, 3>);
+
+    /// True where it has two sides with a distance between them, and is called a gap.
+    fn is_gap(&self) -> bool {
+        true
+    }
 
     /// False where it adds no force, wherever the bodies are.
     fn acts(&self, given: Self::Given) -> bool {

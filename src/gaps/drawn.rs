@@ -2,7 +2,9 @@
 
 use super::approach::{Approach, Point};
 use super::domain::Domain;
-use crate::structure::{GapVoltage, NodeId, Structure};
+use super::element::Element;
+use crate::multibody::Damper;
+use crate::structure::{GapVoltage, NodeId, Placed, Structure};
 use nalgebra::Vector2;
 
 /// A drawing, as domains read it.
@@ -16,7 +18,12 @@ pub struct Drawing<'a, 'p> {
     pub chord: bool,
 }
 
-impl Drawing<'_, '_> {
+impl<'a> Drawing<'a, '_> {
+    /// What a netlist placed of a domain's own element.
+    pub fn placed<D: Drawn>(&self) -> impl Iterator<Item = &'a Placed> + use<'a, D> {
+        self.structure.placed.iter().filter(|placed| D::ELEMENT.is_some_and(|element| placed.element == element.name))
+    }
+
     /// The approach of node `a` towards `b` along `axis`.
     pub(super) fn approach(&self, a: NodeId, b: NodeId, axis: [f64; 2]) -> Approach {
         Approach { a: (self.point)(a), b: (self.point)(b), axis: Vector2::new(axis[0], axis[1]) }
@@ -27,6 +34,14 @@ impl Drawing<'_, '_> {
 pub trait Drawn: Domain<Given = f64> + Sized {
     /// `put` is told each member of the drawing: its name, the voltage across it if it has a field, and itself.
     fn lay<'a>(drawing: &Drawing<'a, '_>, put: impl FnMut(&'a str, Option<&'a GapVoltage>, Self));
+
+    /// The element that netlists place it with, where that is its own and no other part of a drawing.
+    const ELEMENT: Option<Element> = None;
+
+    /// `put` is told its dampers, before [`Drawn::moved`]: damping is constant, and the mechanism's own.
+    fn dampers(&self, put: impl FnMut(Damper)) {
+        let _ = put;
+    }
 
     /// The same with its points where `to` takes them.
     #[must_use]

@@ -3,8 +3,9 @@
 use super::approach::{Approach, Point};
 use super::domain::{At, Domain, Law};
 use super::drawn::{Drawing, Drawn, Laid};
+use super::element::Element;
 use crate::multibody::planar::Pose;
-use crate::multibody::{BlockMatrix, BodyId, Pattern};
+use crate::multibody::{BlockMatrix, BodyId, Damper, Pattern};
 use nalgebra::Vector2;
 
 /// Makes [`Member`] of the types listed, in the order in which a drawing's members stand.
@@ -30,11 +31,19 @@ macro_rules! domains {
         }
 
         impl Member {
-            /// The members of a drawing, domain by domain.
+            const ELEMENTS: &'static [Option<Element>] = &[$(<$law as Drawn>::ELEMENT),+];
+
+            /// The members of a drawing, domain by domain: those that are gaps first.
             pub fn lay<'a>(drawing: &Drawing<'a, '_>) -> Vec<Laid<'a, Self>> {
-                let mut all = Vec::new();
+                let mut all: Vec<Laid<'a, Self>> = Vec::new();
                 $(<$law>::lay(drawing, |name, voltage, law| all.push(Laid { name, voltage, member: law.into() }));)+
+                all.sort_by_key(|laid| !laid.member.is_gap());
                 all
+            }
+
+            /// `put` is told its dampers, before [`Member::moved`].
+            pub fn dampers(&self, put: impl FnMut(Damper)) {
+                match self { $(Self::$kind(law) => law.dampers(put),)+ }
             }
 
             /// The same with its points where `to` takes them.
@@ -52,8 +61,17 @@ domains! {
     StopPair: super::stop_pair::StopPair, "A stop.";
 }
 
+/// The elements that domains have of their own, in the order of the register.
+pub fn elements() -> impl Iterator<Item = &'static Element> {
+    Member::ELEMENTS.iter().flatten()
+}
+
 impl Domain for Member {
     type Given = f64;
+
+    fn is_gap(&self) -> bool {
+        each!(self, m => m.is_gap())
+    }
 
     fn bodies(&self, see: impl FnMut(BodyId)) {
         each!(self, m => m.bodies(see));

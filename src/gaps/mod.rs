@@ -14,7 +14,7 @@
 //! | [`capacitor`] | C(u) of a comb and of parallel plates |
 //! | [`contact`] | pressure between surfaces that touch |
 //! | [`domain`] | the trait of all that acts; [`member`]: which there are, and how each call finds its own |
-//! | [`drawn`] | from a drawing to them |
+//! | [`drawn`], [`element`] | from a drawing to them; elements of their own |
 //! | [`electrodes`], [`facing_beams`], [`stop_pair`] | combs and plates; beams that face each other; stops |
 //! | [`load`], [`point_force`], [`moving_frame`] | dead loads; forces that sources give; the motion of the frame |
 //! | [`facing`] | two facing beams: pressure along a gap that varies over their length |
@@ -39,6 +39,7 @@ pub mod domain;
 pub mod drawn;
 pub mod drive;
 pub mod electrodes;
+pub mod element;
 pub mod energy;
 pub mod facing;
 pub mod facing_beams;
@@ -62,8 +63,9 @@ pub use approach::Point;
 pub use domain::{At, Domain, Law};
 pub use drawn::{Drawing, Laid};
 pub use drive::{Drive, Ramp};
+pub use element::Element;
 pub use input::Input;
 pub use lag::Lags;
 pub use load::Load;
-pub use member::Member;
+pub use member::{Member, elements};
 pub use system::System;

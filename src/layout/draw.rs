@@ -7,6 +7,7 @@
 
 use super::lines::{Line, Lines};
 use super::process::Process;
+use crate::gaps::elements;
 use std::collections::HashMap;
 
 /// Pads whose sizes are not given [m].
@@ -263,7 +264,9 @@ impl<'a> Draw<'a> {
     fn tell(&mut self) {
         let mut missing: HashMap<&str, usize> = HashMap::new();
         for line in &self.lines.elements {
-            if matches!(line.model.as_str(), "link2d" | "spring2d" | "damper2d" | "mass2d" | "plategap2d" | "stop2d") {
+            let lumped =
+                matches!(line.model.as_str(), "link2d" | "spring2d" | "damper2d" | "mass2d" | "plategap2d" | "stop2d");
+            if lumped || elements().any(|element| element.name == line.model) {
                 *missing.entry(line.model.as_str()).or_insert(0) += 1;
             }
         }

@@ -45,6 +45,9 @@ pub(crate) fn finite(drawing: &Drawing, sink: &mut Sink) {
     for k in &s.springs {
         look(&k.name, k.a, all(&k.stiffness) && all(&k.damping));
     }
+    for p in &s.placed {
+        look(&p.name, p.nodes[0], all(&p.values));
+    }
     for f in &s.loads {
         look(&f.name, f.node, all(&f.force) && f.moment.is_finite());
     }

@@ -49,5 +49,5 @@ pub use setting::Setting;
 
 /// The names of all built-in elements, in the order of docs/netlist.md.
 pub fn element_names() -> impl Iterator<Item = &'static str> {
-    elements::MODELS.iter().map(|model| model.name)
+    elements::models().map(|model| model.name)
 }

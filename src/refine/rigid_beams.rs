@@ -94,6 +94,7 @@ fn acted_on(structure: &Structure) -> Vec<NodeId> {
     nodes.extend(structure.plate_gaps.iter().flat_map(|g| [g.a, g.b]));
     nodes.extend(structure.beam_gaps.iter().flat_map(|g| g.nodes));
     nodes.extend(structure.stops.iter().flat_map(|s| [Some(s.a), s.b]).flatten());
+    nodes.extend(structure.placed.iter().flat_map(|p| p.nodes.iter().copied()));
     nodes.sort_unstable();
     nodes.dedup();
     nodes

@@ -12,6 +12,7 @@ mod index;
 mod mechanical;
 mod network;
 mod node;
+mod placed;
 mod without_circuit;
 
 pub use circuit::{CircuitElement, CircuitKind};
@@ -20,6 +21,7 @@ pub use index::NodeIndex;
 pub use mechanical::{Beam, Heater, Link, Load, MOLTEN, Mass, Material, Pad, SpringDamper, Support, Yield};
 pub use network::{Port, Resistor, VoltageSource, Wire};
 pub use node::{Node, NodeId};
+pub use placed::Placed;
 
 use serde::{Deserialize, Serialize};
 
@@ -52,6 +54,9 @@ pub struct Structure {
     /// Stops.
     #[serde(default)]
     pub stops: Vec<Stop>,
+    /// Elements of domains that have their own.
+    #[serde(default)]
+    pub placed: Vec<Placed>,
     /// Resistors.
     pub resistors: Vec<Resistor>,
     /// Conductors without resistance.

@@ -12,6 +12,7 @@ mod lumped;
 mod material;
 mod meaning;
 mod pinned;
+mod placed;
 mod pressure;
 mod section;
 mod stop;
@@ -20,7 +21,7 @@ mod table;
 pub(crate) mod upright;
 
 pub(crate) use arguments::{Argument, Arguments, Instance, Site};
-pub(crate) use table::{MODELS, Model, model};
+pub(crate) use table::{Model, model, models};
 
 use super::drawing::Drawing;
 use super::front::Read;
@@ -30,7 +31,7 @@ use super::suggest::{did_you_mean, nearest};
 
 /// The entry of a layer that a name which nothing reads is a slip of: near it, or the same but for its case.
 pub(crate) fn meant_entry(name: &str) -> Option<&'static str> {
-    if is_entry(name) || MODELS.iter().any(|model| model.takes(name)) {
+    if is_entry(name) || models().any(|model| model.takes(name)) {
         return None;
     }
     let alike = table::LAYER_ENTRIES.iter().find(|entry| entry.eq_ignore_ascii_case(name));
@@ -97,7 +98,7 @@ pub(crate) fn unknown<'a>(
         return sink.error("E056", span, format!("the element `{name}` is not supported"), *reason);
     }
     // names that differ in their numbers alone are different things: `slider` is not `slider1`
-    let known = table::MODELS.iter().map(|m| m.name).chain(subnets).filter(|known| !differ_in_numbers(known, name));
+    let known = models().map(|m| m.name).chain(subnets).filter(|known| !differ_in_numbers(known, name));
     let help =
         did_you_mean(name, known, "it is neither built in nor a subnet defined above; is a `uses` line missing?");
     sink.error("E055", span, format!("unknown element `{name}`"), help)

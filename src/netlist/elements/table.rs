@@ -2,7 +2,9 @@
 
 use super::super::sink::Reported;
 use super::arguments::Site;
-use super::{arm, beam, circuit, comb, curve, gap, load, lumped, pinned, pressure, section, stop, support};
+use super::{arm, beam, circuit, comb, curve, gap, load, lumped, pinned, placed, pressure, section, stop, support};
+use crate::gaps::elements;
+use std::sync::LazyLock;
 
 /// An element of the language.
 #[derive(Debug)]
@@ -28,7 +30,15 @@ impl Model {
 
 /// The element of that name.
 pub(crate) fn model(name: &str) -> Option<&'static Model> {
-    MODELS.iter().find(|m| m.name == name)
+    models().find(|m| m.name == name)
+}
+
+/// Every element: those of the language, then those of domains that have their own.
+pub(crate) fn models() -> impl Iterator<Item = &'static Model> {
+    static OF_DOMAINS: LazyLock<Vec<Model>> = LazyLock::new(|| {
+        elements().map(|e| own(e.name, e.nodes, e.node_names, e.parameters, placed::placed)).collect()
+    });
+    MODELS.iter().chain(OF_DOMAINS.iter())
 }
 
 /// Entries a layer may have; any element may override them.
@@ -125,8 +135,8 @@ const fn own(
     Model { name, nodes, node_names, parameters, sugar: false, build }
 }
 
-/// Every element.
-pub(crate) const MODELS: &[Model] = &[
+/// Every element of the language.
+const MODELS: &[Model] = &[
     sugar("anchor", PADS, "[a …]", SIZE, support::anchor),
     sugar("bondingpad", PADS, "[a …]", SIZE, support::anchor),
     sugar("commonground", PADS, "[a …]", SIZE, support::anchor),

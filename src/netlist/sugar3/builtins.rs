@@ -1,6 +1,6 @@
 //! The functions of SUGAR 3 netlists: nodes, materials, elements, subnets, and mathematics.
 
-use super::super::elements::{self, Argument, Arguments, Instance, MODELS};
+use super::super::elements::{self, Argument, Arguments, Instance};
 use super::super::sink::Reported;
 use super::super::source::Span;
 use super::super::sugar2;
@@ -31,7 +31,7 @@ pub(super) fn install(lua: &Lua, shared: &Shared) -> mlua::Result<()> {
     globals.raw_set("PI", PI)?;
     globals.raw_set("_currnodes", lua.create_table()?)?;
     drawing(lua, shared, &globals)?;
-    for model in MODELS {
+    for model in elements::models() {
         let build = model_function(lua, shared, model.name)?;
         globals.raw_set(format!("mf{}", model.name), &build)?;
         if !SHORT.contains(&model.name) {

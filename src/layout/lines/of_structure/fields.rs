@@ -1,6 +1,7 @@
-//! Lines of combs, gaps and stops.
+//! Lines of combs, gaps, stops and what domains have of their own.
 
 use super::{OfStructure, unmirrored};
+use crate::gaps::elements;
 use crate::structure::{Beam, GapVoltage, NodeId};
 use std::collections::{BTreeMap, HashMap, HashSet};
 
@@ -83,6 +84,12 @@ impl OfStructure<'_> {
             parameters.extend(optional.into_iter().filter_map(|(n, v)| Some((n, v?))));
             let nodes: Vec<NodeId> = [Some(stop.a), stop.b].into_iter().flatten().collect();
             self.push(&stop.name, "stop2d", "*", &nodes, &parameters);
+        }
+        for placed in &structure.placed {
+            let Some(element) = elements().find(|element| element.name == placed.element) else { continue };
+            let given = element.parameters.iter().copied().zip(placed.values.iter().copied());
+            let parameters: Vec<_> = given.filter(|(_, value)| *value != 0.0).chain([("oz", placed.angle)]).collect();
+            self.push(&placed.name, element.name, "*", &placed.nodes, &parameters);
         }
     }
 }
