@@ -59,6 +59,7 @@ domains! {
     Electrodes: super::electrodes::Electrodes, "A comb or lumped plates.";
     FacingBeams: super::facing_beams::FacingBeams, "Two beams that face each other.";
     StopPair: super::stop_pair::StopPair, "A stop.";
+    Dashpot: super::dashpot::Dashpot, "A damper to the ground.";
 }
 
 /// The elements that domains have of their own, in the order of the register.

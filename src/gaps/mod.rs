@@ -35,6 +35,7 @@ pub mod backbending;
 pub mod capacitor;
 mod conduction;
 pub mod contact;
+pub mod dashpot;
 pub mod domain;
 pub mod drawn;
 pub mod drive;

@@ -4,6 +4,7 @@ mod backbending;
 mod baselines;
 mod beams;
 mod contact;
+mod dashpot;
 mod drawn;
 mod eigenvalues;
 mod electrothermal;
