@@ -11,23 +11,21 @@
 //! [`Device::recover`](crate::device::Device::recover).
 
 mod allowance;
+mod clock;
 mod purse;
 mod stopped;
 
 pub use allowance::Allowance;
+pub(crate) use clock::thread_cpu;
 pub use purse::{Purse, WINDOW};
 pub use stopped::Stopped;
 
+use clock::{CHECKS_PER_LOOK, CPU_INTERVAL};
 use std::cell::{Cell, RefCell};
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
-
-/// Checks between two looks at the clock; a look costs some 30 ns.
-const CHECKS_PER_LOOK: u32 = 16;
-/// Time between two looks at the thread's processor time, which the system tells in a file.
-const CPU_INTERVAL: Duration = Duration::from_millis(100);
 
 /// An allowance with what was used of it. Clones are the same budget.
 #[derive(Debug, Clone)]
@@ -257,12 +255,6 @@ impl Held {
         }
         Some(used)
     }
-}
-
-/// Processor time of this thread, where the system tells it (Linux); elsewhere deadlines alone hold.
-pub(crate) fn thread_cpu() -> Option<Duration> {
-    let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
-    text.split_whitespace().next()?.parse().ok().map(Duration::from_nanos)
 }
 
 #[cfg(test)]

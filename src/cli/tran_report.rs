@@ -102,10 +102,10 @@ pub(super) fn text(compiled: &Compiled, result: &TransientResult, joints: Option
             j.accelerations, j.singular_evaluations, j.coordinates, j.constraints, j.largest_gap_m
         ),
     };
-    let off = result.step_error.map_or_else(|| ", not compared".to_owned(), |e| format!(", off by {e:.1e} at most"));
+    let off = result.step_error.map_or_else(|| ", not compared".to_owned(), |e| format!(", off by about {e:.1e}"));
     format!(
         "{}\n{events}{} samples, {} steps ({} rejected){off}, {work}; {}",
-        report::columns(&["signal", "lowest", "highest", "at the end"], &rows),
+        report::columns(&["signal", "lowest sample", "highest sample", "at the end"], &rows),
         result.t.len(),
         c.steps,
         c.rejected,

@@ -72,6 +72,9 @@ mod tests {
         assert_eq!(setting("layer=\"p2\""), Ok(("layer".into(), Setting::Text("p2".into()))));
         assert_eq!(volts("heat=-500m"), Ok(("heat".into(), -0.5)));
         assert_eq!(setting("oz=pi/4"), Ok(("oz".into(), Setting::Number(std::f64::consts::FRAC_PI_4))));
+        // in a netlist a comment would begin there
+        assert!(number("0.1%").is_err() && volts("heat=200%").is_err() && setting("w=50%").is_err());
+        assert_eq!(setting("w='50%'"), Ok(("w".into(), Setting::Text("50%".into()))));
         assert!(volts("heat=ten").is_err() && setting("w").is_err() && setting("=1").is_err());
         assert_eq!(scaled("yoke.y:1M"), ("yoke.y".into(), Some(1e6)));
         assert_eq!(scaled("odd:name"), ("odd:name".into(), None));

@@ -24,8 +24,13 @@ impl Setting {
         }
         // On one line, so that messages show all of it.
         let line = text.replace(['\n', '\r'], " ");
+        let percent = line.split(['\'', '"']).step_by(2).any(|part| part.contains('%'));
         let bundle = Bundle::from_text("setting", &format!("param value = {line}"));
         let mut sink = Sink::new(&bundle.root);
+        if percent {
+            // it would begin a comment, and a share in percent become one in full
+            sink.error("E049", Span::NOWHERE, format!("`{line}` has a `%`"), "write 0.01 for 1 %");
+        }
         let program = parser::parse(&bundle, &mut sink);
         if !sink.failed() && !matches!(program.statements.as_slice(), [Statement::Param { .. }]) {
             sink.error("E049", Span::NOWHERE, format!("`{line}` is more than one value"), "give one value");

@@ -22,6 +22,7 @@ mod relative;
 mod relative_motion;
 mod scenes;
 mod schemes;
+mod swung;
 mod told;
 mod vm236;
 

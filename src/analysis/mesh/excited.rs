@@ -284,8 +284,19 @@ fn pushed(
     x.iter().all(|x| x.iter().all(|v| v.is_finite())).then_some(x)
 }
 
+/// The way from one state to another, if the stiffness all along were that at its end; none for a part that floats.
+pub(super) fn linear_way(model: &Compiled, from: &OperatingPoint, to: &OperatingPoint) -> Option<Vec<Pose>> {
+    let system = &model.parts.system;
+    let mut drive = system.electrics.drive();
+    system.electrics.apply(&to.sources, &to.rise, &mut drive);
+    let mut stiffness = BlockMatrix::new(&system.model.pattern);
+    let mut residual = to.q.clone();
+    system.tangent(&to.q, &drive, &mut stiffness, &mut residual);
+    pushed(model, from, &drive, &stiffness)
+}
+
 /// Largest displacement of a node [m], of a small motion `x`.
-fn reach(model: &Compiled, x: &[Pose]) -> f64 {
+pub(super) fn reach(model: &Compiled, x: &[Pose]) -> f64 {
     model.parts.nodes.iter().flatten().map(|p| p.displacement(x, true).norm()).fold(0.0, f64::max)
 }
 

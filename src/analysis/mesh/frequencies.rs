@@ -29,9 +29,12 @@ pub fn modes_fitted(
         Some((_, found)) => found,
         None => modes_with_curves(&fitted, count, voltages)?,
     };
-    let estimated_error = fitted.order.estimated_error;
+    let (estimated_error, loaded) = (fitted.order.estimated_error, about_equilibrium(compiled, voltages));
+    // what a mode says of itself knows nothing of the state that it is about
+    let all = |own: &Option<f64>| if loaded { own.zip(estimated_error).map(|(own, all)| own.max(all)) } else { *own };
+    let errors = result.errors.iter().map(all).collect();
     // the search has no more use of how they follow the deflection
-    Ok((fitted, ModesResult { estimated_error, per_deflection: 0.0, ..result }, curves))
+    Ok((fitted, ModesResult { errors, estimated_error, per_deflection: 0.0, ..result }, curves))
 }
 
 /// Modes with the shapes of their beams.

@@ -1,6 +1,7 @@
 //! What a sweep has found so far, in a file that a stop in the middle leaves readable: one line of JSON for each point as soon as it
 //! is done, behind a line that names the sweep. Whoever goes on reads the points back to the same bits; a last line that is cut off
 //! was not finished, and its point is computed again.
+//! Each line has the sum of its bytes, so that one that is damaged is none.
 
 use super::point::{Found, Outcome, Value};
 use super::spec::SweepSpec;
@@ -138,7 +139,9 @@ impl Journal {
             Self { path: path.to_owned(), file: Mutex::new(Open { file, good: good as u64, synced: Instant::now() }) };
         if good == 0 {
             let head = Head { bimorph: env!("CARGO_PKG_VERSION").to_owned(), sweep: name.to_owned() };
-            journal.line(&head)?;
+            let mut line = serde_json::to_vec(&head).map_err(|error| failed(error.into()))?;
+            line.push(b'\n');
+            journal.write(&line, |open| open.synced.elapsed() >= SYNC)?;
         }
         Ok((journal, known))
     }
@@ -157,7 +160,8 @@ impl Journal {
     /// # Errors
     /// [`JournalError::Io`].
     pub fn keep(&self, kept: &Kept) -> Result<(), JournalError> {
-        self.line(kept)
+        let line = lines(std::slice::from_ref(kept)).map_err(|error| self.failed(error))?;
+        self.write(&line, |open| open.synced.elapsed() >= SYNC)
     }
 
     /// Adds points, as text of [`lines`], and waits for the disk, where `sync` says so: all of them, or none.
@@ -171,12 +175,6 @@ impl Journal {
     /// Bytes of whole lines that it has.
     pub fn bytes(&self) -> u64 {
         self.file.lock().unwrap_or_else(PoisonError::into_inner).good
-    }
-
-    fn line(&self, of: &impl Serialize) -> Result<(), JournalError> {
-        let mut line = serde_json::to_vec(of).map_err(|error| self.failed(error.into()))?;
-        line.push(b'\n');
-        self.write(&line, |open| open.synced.elapsed() >= SYNC)
     }
 
     fn write(&self, lines: &[u8], sync: impl FnOnce(&Open) -> bool) -> Result<(), JournalError> {
@@ -221,7 +219,7 @@ fn read(path: &Path, name: &str, bytes: &[u8]) -> Result<(Vec<Kept>, usize), Jou
         good += line.len();
     }
     for line in lines {
-        let Ok(kept) = serde_json::from_slice::<Kept>(line) else { break };
+        let Some(kept) = opened(line) else { break };
         known.push(kept);
         good += line.len();
     }
@@ -235,10 +233,38 @@ fn read(path: &Path, name: &str, bytes: &[u8]) -> Result<(Vec<Kept>, usize), Jou
 pub fn lines(points: &[Kept]) -> io::Result<Vec<u8>> {
     let mut lines = Vec::new();
     for point in points {
-        serde_json::to_writer(&mut lines, point)?;
-        lines.push(b'\n');
+        lines.extend(sealed(serde_json::to_vec(point)?));
     }
     Ok(lines)
+}
+
+/// What stands before the sum of a line, and its length with what stands behind it.
+const SUM: &[u8] = b",\"sum\":\"";
+const SUMMED: usize = SUM.len() + 32 + 3;
+
+/// An object of JSON with the sum of its bytes, as a line.
+fn sealed(mut object: Vec<u8>) -> Vec<u8> {
+    let sum = sum(&object);
+    object.pop();
+    object.extend([SUM, format!("{sum:032x}\"}}\n").as_bytes()].concat());
+    object
+}
+
+fn sum(object: &[u8]) -> u128 {
+    let mut sum = Fnv::default();
+    sum.bytes(object);
+    sum.value()
+}
+
+/// The point of a line; none for one that is damaged.
+fn opened(line: &[u8]) -> Option<Kept> {
+    let (object, end) = line.split_at_checked(line.len().checked_sub(SUMMED)?)?;
+    let written = std::str::from_utf8(end.strip_prefix(SUM)?.strip_suffix(b"\"}\n")?).ok()?;
+    let object = [object, b"}"].concat();
+    if u128::from_str_radix(written, 16).ok()? != sum(&object) {
+        return None;
+    }
+    serde_json::from_slice(&object).ok()
 }
 
 impl Outcome {

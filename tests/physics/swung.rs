@@ -1,0 +1,116 @@
+//! A run whose stiffness changes on the way holds the tolerance of its mesh, or is told beyond it: contracts of `analysis::mesh` for transients.
+
+use bimorph::analysis::mesh::{Request, fitted, fitted_in_time};
+use bimorph::analysis::modes::modes;
+use bimorph::analysis::transient::{TransientOptions, TransientResult, transient};
+use bimorph::compile::{CompileOptions, compile};
+use bimorph::netlist::Bundle;
+
+/// A mass between two straight beams, which a step of force throws to where they are far stiffer than where it rests.
+const THROWN: &str = "process p = [Youngsmodulus=165e9 density=2300 h=20u]
+anchor p [a] []
+left beam2d p [a s] [l=250u w=1.6u]
+mass2d * [s] [m=4e-10]
+right beam2d p [s b] [l=250u w=1.6u]
+anchor p [b] []
+f2d * [s] [F=18u oz=pi/2]
+";
+
+/// A beam between anchors, with an arm at its middle, that a current heats beyond buckling.
+const HEATED: &str =
+    "process p = [Youngsmodulus=165e9 density=2300 h=2u thermalexpansion=2.6e-6 sheetresistance=20 thermcond=30 \
+specificheat=700 ambienttemperature=300]
+anchor p [a] []
+left beam2det p [a m] [l=180u w=2u]
+right beam2det p [m b] [l=180u w=2u]
+arm beam2d p [m t] [l=50u w=4u oz=pi/2]
+anchor p [b] []
+eground * [b] []
+heat port * [a] []
+";
+
+fn run(text: &str, signal: &str, stop: f64, volts: &[(&str, f64)], options: CompileOptions) -> TransientResult {
+    let model = compile(&Bundle::from_text("thrown.net", text), &options).unwrap();
+    let options = TransientOptions {
+        stop,
+        signals: vec![signal.into()],
+        tol: options.tol,
+        voltages: volts.iter().map(|(name, volts)| ((*name).to_owned(), *volts)).collect(),
+        ..TransientOptions::default()
+    };
+    let (model, _) = fitted_in_time(&model, &options).unwrap();
+    transient(&model, &options, &mut |_, _| {}, &mut |_| true).unwrap()
+}
+
+/// Root mean square of the difference over half the range.
+fn apart(found: &TransientResult, reference: &TransientResult) -> f64 {
+    let (a, b) = (&found.signals[0].2, &reference.signals[0].2);
+    let sum: f64 = a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum();
+    let range = b.iter().fold(f64::NEG_INFINITY, |m, x| m.max(*x)) - b.iter().fold(f64::INFINITY, |m, x| m.min(*x));
+    (sum / a.len() as f64).sqrt() / (0.5 * range)
+}
+
+/// The error of such a run is within the tolerance, and its estimate no smaller than a third of it. Before, the meshes of these runs were those of
+/// their ends and modes, and two to five times the tolerance off. The reference has 40 segments a beam and the steps of 1e-6; for the
+/// heated one it is itself 2e-4 off (by 80 segments), no reference for 1e-4.
+#[test]
+fn runs_far_from_their_ends_hold_the_tolerance() {
+    type Case<'a> = (&'a str, &'a str, f64, &'a [(&'a str, f64)], &'a [f64]);
+    let cases: [Case<'_>; 2] =
+        [(THROWN, "s.y", 100e-6, &[], &[1e-2, 1e-3, 1e-4]), (HEATED, "t.y", 400e-6, &[("heat", 1.9)], &[1e-2, 1e-3])];
+    for (text, signal, stop, volts, tolerances) in cases {
+        let fine = CompileOptions { tol: 1e-6, segments: Some(40), ..CompileOptions::default() };
+        let reference = run(text, signal, stop, volts, fine);
+        for &tol in tolerances {
+            let found = run(text, signal, stop, volts, CompileOptions { tol, ..CompileOptions::default() });
+            let (error, told) = (apart(&found, &reference), found.estimated_error.unwrap());
+            println!("{signal} {tol:e}: {error:.1e}, told {told:.1e}, {} unknowns", found.unknowns);
+            assert!(error <= tol && told <= 1.05 * tol, "{signal} {tol:e}: {error:e} {told:e}");
+            assert!(error <= 3.0 * told, "{signal} {tol:e}: {error:e} {told:e}");
+        }
+    }
+}
+
+/// Segments that are given are told what they are worth in such a run.
+#[test]
+fn given_segments_are_told() {
+    let with =
+        |segments: usize, tol: f64| CompileOptions { tol, segments: Some(segments), ..CompileOptions::default() };
+    let reference = run(THROWN, "s.y", 100e-6, &[], with(40, 1e-6));
+    for segments in [2, 4, 8] {
+        let found = run(THROWN, "s.y", 100e-6, &[], with(segments, 1e-3));
+        let (error, told) = (apart(&found, &reference), found.estimated_error.unwrap());
+        println!("{segments}: {error:.1e}, told {told:.1e}");
+        assert!(error <= 3.0 * told && told <= 10.0 * error, "{segments}: {error:e} {told:e}");
+    }
+}
+
+/// What a mode is told to be off by about a loaded state is no less than what that state makes of it: a clamped beam under a force that bends it far.
+/// The reference has 64 segments.
+#[test]
+fn modes_about_a_load_are_told() {
+    let text = "process p = [Youngsmodulus=165e9 density=2300 h=20u]
+anchor p [a] []
+left beam2d p [a s] [l=250u w=1.6u]
+right beam2d p [s b] [l=250u w=1.6u]
+anchor p [b] []
+f2d * [s] [F=60u oz=pi/2]
+";
+    let bundle = Bundle::from_text("loaded.net", text);
+    let with = |options: CompileOptions| {
+        let model = compile(&bundle, &options).unwrap();
+        bimorph::analysis::mesh::modes_fitted(&model, 3, &Vec::new()).unwrap().1
+    };
+    let fine = CompileOptions { tol: 1e-6, segments: Some(64), ..CompileOptions::default() };
+    let model = compile(&bundle, &fine).unwrap();
+    let model = fitted(&model, &Request::Modes { count: 3, voltages: &Vec::new() }).unwrap();
+    let reference = modes(&model, 3, &Vec::new()).unwrap();
+    for tol in [1e-2, 1e-3, 1e-4] {
+        let found = with(CompileOptions { tol, ..CompileOptions::default() });
+        for (k, told) in found.errors.iter().enumerate() {
+            let error = (found.frequencies_hz[k] / reference.frequencies_hz[k] - 1.0).abs();
+            let told = told.expect("told");
+            assert!(error <= 3.0 * told && told <= 1.05 * tol, "{tol:e}, mode {}: {error:e} {told:e}", k + 1);
+        }
+    }
+}
