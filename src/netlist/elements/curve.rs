@@ -110,17 +110,33 @@ pub(super) fn predisplaced(site: &mut Site<'_, '_>) -> Result<(), Reported> {
     site.between_arms(|site, ends| site.add_chain(ends, &points, width))
 }
 
-/// A beam whose width goes from `w1` to `w2` along it, as pieces of the mean width of each.
+/// Most that the width of a taper changes over a piece of it, as a logarithm: what bends is then within 7e-4 of ∫ M²/EI, masses and axial
+/// compliances within 1e-4.
+const STEEP: f64 = 0.025;
+
+/// Most pieces of a taper.
+const MOST_PIECES: usize = 400;
+
+/// A beam whose width goes from `w1` to `w2` along it, as pieces over which the width changes by one factor, each of the width whose compliance in
+/// bending is that of the piece: `1/w³ = ∫ dx/w(x)³ / l`.
 pub(super) fn taper(site: &mut Site<'_, '_>) -> Result<(), Reported> {
     let (length, w1, w2) = (site.positive("l")?, site.positive("w1")?, site.positive("w2")?);
     let direction = site.direction(site.instance.rotation)?;
     let name = site.name();
+    let steep = (w2 / w1).ln();
+    let pieces = ((steep.abs() / STEEP).ceil() as usize).clamp(CHORDS, MOST_PIECES);
+    let share = |k: usize| k as f64 / pieces as f64;
+    // where the width is w, the share (w − w1)/(w2 − w1) of the length is behind
+    let behind = |k: usize| if steep == 0.0 { share(k) } else { (steep * share(k)).exp_m1() / steep.exp_m1() };
+    let width = |k: usize| w1 * (steep * share(k)).exp();
     let mut a = site.node(0);
-    for k in 1..=CHORDS {
+    for k in 1..=pieces {
         let b =
-            if k == CHORDS { site.node(1) } else { site.drawing.add_node(format!("{name}.{k}"), site.instance.span) };
-        let width = w1 + (w2 - w1) * (k as f64 - 0.5) / CHORDS as f64;
-        let piece = site.beam(format!("{name}.{k}"), [a, b], width, Some(length / CHORDS as f64))?;
+            if k == pieces { site.node(1) } else { site.drawing.add_node(format!("{name}.{k}"), site.instance.span) };
+        let (from, to) = (width(k - 1), width(k));
+        let wider = to / from;
+        let mean = from * (2.0 * wider * wider / (1.0 + wider)).cbrt();
+        let piece = site.beam(format!("{name}.{k}"), [a, b], mean, Some(length * (behind(k) - behind(k - 1))))?;
         debug_assert_eq!(piece.angle, direction);
         site.drawing.add_beam(site.instance.span, piece, true);
         a = b;
