@@ -4,7 +4,7 @@
 use bimorph::compile::{CompileOptions, Compiled, compile};
 use bimorph::device::local::LocalDevice;
 use bimorph::device::{Device, Mode, OpenRequest, Trial, TrialReply};
-use bimorph::gaps::Ramp;
+use bimorph::domains::Ramp;
 use bimorph::multibody::planar::Pose;
 use bimorph::multibody::{BlockMatrix, forces};
 use bimorph::netlist::Bundle;

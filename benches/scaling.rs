@@ -11,8 +11,8 @@
 #[path = "../tests/topologies/mod.rs"]
 mod topologies;
 
-use bimorph::gaps::drive::Electrics;
-use bimorph::gaps::{Drive, Ramp, System};
+use bimorph::domains::drive::Electrics;
+use bimorph::domains::{Drive, Ramp, System};
 use bimorph::multibody::planar::Pose;
 use bimorph::multibody::rcr::{Linkage, Reduction};
 use bimorph::multibody::{BlockMatrix, BodyId, Model, forces};
@@ -41,7 +41,7 @@ fn measure(name: &str, coordinates: usize) -> (usize, [f64; 8]) {
     let implicit = implicit(&topology);
     let model = topology.model();
     let electrics = Electrics::default();
-    let system = System { model, gaps: Vec::new(), loads: Vec::new(), electrics, length_scale: 2e-6 };
+    let system = System { model, members: Vec::new(), loads: Vec::new(), electrics, length_scale: 2e-6 };
     let (n, model) = (system.bodies(), &system.model);
     let pattern = &model.pattern;
     let q = displaced(model);

@@ -9,8 +9,8 @@
 #[path = "../tests/topologies/mod.rs"]
 mod topologies;
 
-use bimorph::gaps::drive::Electrics;
-use bimorph::gaps::{Drive, System};
+use bimorph::domains::drive::Electrics;
+use bimorph::domains::{Drive, System};
 use bimorph::multibody::planar::Pose;
 use bimorph::multibody::{BlockMatrix, forces};
 use std::hint::black_box;
@@ -33,7 +33,7 @@ fn main() {
 fn report(name: &str, count: usize, units: usize, topology: &Topology) {
     let model = topology.model();
     let electrics = Electrics::default();
-    let system = System { model, gaps: Vec::new(), loads: Vec::new(), electrics, length_scale: 2e-6 };
+    let system = System { model, members: Vec::new(), loads: Vec::new(), electrics, length_scale: 2e-6 };
     let (n, pattern) = (system.bodies(), &system.model.pattern);
     let q: Vec<Pose> = (0..n).map(|k| Pose::new(1e-8 * (k % 3) as f64, 1e-8, 1e-3 * (k % 5) as f64)).collect();
     let drive = Drive { load: 1.0, ..Drive::default() };

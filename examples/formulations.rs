@@ -13,8 +13,8 @@
 use bimorph::analysis::integrator::Integrator;
 use bimorph::analysis::transient::{TransientOptions, transient};
 use bimorph::compile::{CompileOptions, Formulation, Scheme, compile};
+use bimorph::domains::{Ramp, System};
 use bimorph::equations::Joints;
-use bimorph::gaps::{Ramp, System};
 use bimorph::multibody::planar::Pose;
 use bimorph::netlist::{Bundle, Setting};
 use bimorph::solve::equilibrium::{Equilibrium, EquilibriumOptions};

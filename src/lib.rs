@@ -3,7 +3,7 @@
 //! # Layout
 //! Data flows one way. A [`netlist`] describes what was drawn ([`layout`] reads masks); it becomes a [`structure`] (materials, beams, plates,
 //! anchors, gaps, combs, ports, all in SI). [`options`] is the one table of what a model may be told. `discretize` turns beams into rigid bodies and flexible joints;
-//! `multibody` holds those bodies and the O(n+m) recursion over them; `gaps` are the forces and rest offsets that
+//! `multibody` holds those bodies and the O(n+m) recursion over them; `domains` are the forces and rest offsets that
 //! heat and voltage cause. `solve` advances or balances a model, [`refine`] chooses how fine it must be, [`analysis`]
 //! holds the verbs every front shares, and [`device`] is the electrical view that a circuit simulator drives. [`results`]
 //! writes tables and pictures, [`export`] a model for other simulators.
@@ -20,10 +20,10 @@ pub mod content;
 pub mod cosim;
 pub mod device;
 pub mod discretize;
+pub mod domains;
 pub mod equations;
 pub mod export;
 pub mod front;
-pub mod gaps;
 pub mod jobs;
 pub mod layout;
 pub mod multibody;

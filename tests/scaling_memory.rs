@@ -3,8 +3,8 @@
 #[path = "topologies/mod.rs"]
 mod topologies;
 
-use bimorph::gaps::System;
-use bimorph::gaps::drive::Electrics;
+use bimorph::domains::System;
+use bimorph::domains::drive::Electrics;
 use bimorph::multibody::rcr::{Linkage, Reduction, Task};
 use bimorph::solve::dormand_prince::Pair;
 use bimorph::solve::joint_dirk::{JointMethod, Rule};
@@ -30,7 +30,7 @@ fn bytes(name: &str, coordinates: usize) -> (usize, usize, usize) {
     let _profiler = dhat::Profiler::builder().testing().build();
     let model = drawing.model();
     let system =
-        System { model, gaps: Vec::new(), loads: Vec::new(), electrics: Electrics::default(), length_scale: 2e-6 };
+        System { model, members: Vec::new(), loads: Vec::new(), electrics: Electrics::default(), length_scale: 2e-6 };
     let n = system.bodies();
     let kept = (Rodas4::new(&system, &[]), Motion::zeros(n), Motion::zeros(n));
     let stats = dhat::HeapStats::get();

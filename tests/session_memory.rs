@@ -3,7 +3,7 @@
 use bimorph::compile::{CompileOptions, compile};
 use bimorph::device::local::LocalDevice;
 use bimorph::device::{Device, Mode, OpenRequest, Trial, TrialReply};
-use bimorph::gaps::Ramp;
+use bimorph::domains::Ramp;
 use bimorph::netlist::Bundle;
 use bimorph::solve::method::{Method, Motion};
 use bimorph::solve::rodas4::Rodas4;

@@ -1,9 +1,9 @@
-//! What a mechanism is after it was heated too far once: its hot arms shortened, see [`crate::gaps::backbending`].
+//! What a mechanism is after it was heated too far once: its hot arms shortened, see [`crate::domains::backbending`].
 use super::statics::operating_point;
 use super::{AnalysisError, PortVoltages};
 use crate::compile::Compiled;
 use crate::discretize::yielded;
-use crate::gaps::backbending::Strength;
+use crate::domains::backbending::Strength;
 use crate::multibody::BlockMatrix;
 use crate::multibody::forces::{RestStrain, add_offset_change, axial_change, axial_force};
 use crate::multibody::planar::Pose;

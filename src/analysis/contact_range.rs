@@ -3,10 +3,10 @@
 
 use super::AnalysisError;
 use crate::compile::Compiled;
-use crate::gaps::Domain;
+use crate::domains::Domain;
 use crate::multibody::planar::Pose;
 
-/// Refuses a configuration in which a gap is closed beyond the range of its law, see [`crate::gaps::contact`].
+/// Refuses a configuration in which a gap is closed beyond the range of its law, see [`crate::domains::contact`].
 ///
 /// # Errors
 /// [`AnalysisError::ContactRange`] with the gap.
@@ -37,7 +37,7 @@ pub(crate) fn comb_beyond_told(compiled: &Compiled, q: &[Pose]) -> Option<String
 pub(crate) fn comb_beyond<'a>(compiled: &'a Compiled, q: &[Pose]) -> Option<(&'a str, [f64; 2])> {
     let system = &compiled.parts.system;
     // combs are the first gaps, in their order
-    let beyond = compiled.structure.combs.iter().zip(&system.gaps).filter_map(|(comb, gap)| {
+    let beyond = compiled.structure.combs.iter().zip(&system.members).filter_map(|(comb, gap)| {
         let (approach, _) = gap.law()?;
         let (way, room) = (approach.value(q, system.model.linear), comb.finger[0] - comb.overlap);
         (comb.finger[0] > 0.0 && way > room * (1.0 + 1e-9)).then_some((comb.name.as_str(), [way, room]))

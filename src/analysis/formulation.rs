@@ -11,7 +11,7 @@ use super::AnalysisError;
 use super::integrator::Integrator;
 use super::transient::options::TransientOptions;
 use crate::compile::Compiled;
-use crate::gaps::System;
+use crate::domains::System;
 use crate::multibody::rcr::{Linkage, Parent};
 use crate::multibody::{BodyId, Model};
 use crate::solve::baseline::SolverKind;

@@ -11,7 +11,7 @@ use super::statics::{NodeMotion, StaticResult, electrical, source_vector};
 use super::{AnalysisError, BeamMotions, NodeMotions, PortVoltages};
 use crate::compile::Compiled;
 use crate::discretize::frame::{Elements, Frame, FrameGaps, FrameOptions, assemble};
-use crate::gaps::{At, Domain, Drive, Member, Point};
+use crate::domains::{At, Domain, Drive, Member, Point};
 use crate::multibody::BlockMatrix;
 use crate::multibody::factor::ZeroPivot;
 use crate::multibody::planar::Pose;

@@ -40,7 +40,7 @@ pub(super) fn left_out<'a>(compiled: &'a Compiled, q: &[Pose], volts: &[f64]) ->
     }
     let between = |a: NodeId, b: NodeId| (a.min(b), a.max(b));
     let beams: HashMap<_, _> = structure.beams.iter().rev().map(|beam| (between(beam.a, beam.b), beam)).collect();
-    let loads = (0..system.gaps.len()).filter_map(|g| system.line_load(g, q, volts[g]));
+    let loads = (0..system.members.len()).filter_map(|g| system.line_load(g, q, volts[g]));
     let yields = |a: NodeId, b: NodeId| -> f64 {
         beams.get(&between(a, b)).map_or(0.0, |beam| {
             let stiffness = beam.material.youngs_modulus * beam.thickness * beam.width.powi(3) / 12.0;

@@ -1,6 +1,6 @@
 //! The integrators by name, and the one place where a name becomes a type.
 
-use crate::gaps::{Ramp, System};
+use crate::domains::{Ramp, System};
 use crate::solve::SolveError;
 use crate::solve::adaptive::{Adaptive, Advance, Control, Observer};
 use crate::solve::avf::AverageField;

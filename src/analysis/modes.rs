@@ -7,7 +7,7 @@ use super::signal::{Signal, View};
 use super::statics::{NodeMotion, operating_point, told_at, too_hot};
 use super::{AnalysisError, BeamMotions, NodeMotions, PortVoltages};
 use crate::compile::Compiled;
-use crate::gaps::{Domain, Drive, Point};
+use crate::domains::{Domain, Drive, Point};
 use crate::multibody::BlockMatrix;
 use crate::multibody::forces::add_inertia;
 use crate::multibody::planar::Pose;
@@ -72,7 +72,7 @@ pub(super) fn about_equilibrium(compiled: &Compiled, voltages: &PortVoltages) ->
     let system = &compiled.parts.system;
     let driven = !voltages.is_empty() || system.electrics.fixed.iter().any(|v| *v != 0.0);
     if compiled.options.as_sugar {
-        return driven && system.gaps.iter().any(Domain::is_gap);
+        return driven && system.members.iter().any(Domain::is_gap);
     }
     driven
         || system.loads.iter().any(|l| l.moment != 0.0 || l.force.norm() > 0.0)

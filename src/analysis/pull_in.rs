@@ -13,7 +13,7 @@ use super::AnalysisError;
 use super::contact_range::within_contact_range;
 use super::statics::source_vector;
 use crate::compile::Compiled;
-use crate::gaps::{Domain, System};
+use crate::domains::{Domain, System};
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
 use crate::solve::SolveError;
@@ -51,10 +51,10 @@ pub fn pull_in(compiled: &Compiled, port: Option<&str>, max: f64) -> Result<Pull
     }
     let system = &compiled.parts.system;
     let (rows, heating) = (&system.electrics.gap_rows, &system.electrics.heating);
-    let pulls = |source: usize| (0..system.gaps.len()).any(|gap| rows[(gap, source)] != 0.0);
+    let pulls = |source: usize| (0..system.members.len()).any(|gap| rows[(gap, source)] != 0.0);
     // what is heated may be pushed to where another voltage closes a gap
-    let pushes =
-        system.gaps.iter().any(Domain::is_gap) && (0..heating.heaters.len()).any(|k| heating.current(k, source) != 0.0);
+    let pushes = system.members.iter().any(Domain::is_gap)
+        && (0..heating.heaters.len()).any(|k| heating.current(k, source) != 0.0);
     if !pulls(source) && !pushes {
         let names = &system.electrics.names;
         let others: Vec<&str> = (0..names.len()).filter(|k| pulls(*k)).map(|k| names[k].as_str()).collect();
@@ -149,7 +149,7 @@ impl Sweep<'_> {
     }
 
     fn touching(&self, q: &[Pose]) -> Vec<bool> {
-        (0..self.system.gaps.len()).map(|g| self.system.touches(g, q)).collect()
+        (0..self.system.members.len()).map(|g| self.system.touches(g, q)).collect()
     }
 
     /// The equilibrium at 0 V.
@@ -181,7 +181,7 @@ impl Sweep<'_> {
             let beyond = fold * (1.0 + PAST);
             match self.fall(&mut q, beyond) {
                 // nothing here could ever hold the part
-                Err(_) if (0..self.system.gaps.len()).all(|g| self.system.touching(g).is_none()) => {
+                Err(_) if (0..self.system.members.len()).all(|g| self.system.touching(g).is_none()) => {
                     return Ok(Closed::Falls { volts: fold });
                 }
                 fallen => fallen?,

@@ -5,7 +5,7 @@
 //! (Lord Rayleigh, *The Theory of Sound*, 1877, § 186), so that the frequency told is too high by about √(1 + J) − 1.
 
 use crate::compile::Compiled;
-use crate::gaps::Point;
+use crate::domains::Point;
 use crate::multibody::planar::Pose;
 use crate::structure::Beam;
 

@@ -9,7 +9,7 @@
 //! quotient changes in the second order only (Rayleigh).
 
 use crate::compile::Compiled;
-use crate::gaps::Drive;
+use crate::domains::Drive;
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
 

@@ -14,7 +14,7 @@ use super::transient::first_step::first_step;
 use super::transient::options::{STEP_SHARE, TransientOptions, check};
 use super::transient::record::LOOKS;
 use crate::compile::Compiled;
-use crate::gaps::{Drive, Ramp};
+use crate::domains::{Drive, Ramp};
 use crate::solve::baseline::SolverKind;
 use crate::solve::dense::interpolate;
 use crate::solve::time::method::Motion;
@@ -152,7 +152,7 @@ impl<'a> End<'a> {
             setup,
             ramp,
             stop: options.stop,
-            contacts: (0..system.gaps.len()).any(|g| system.touching(g).is_some()),
+            contacts: (0..system.members.len()).any(|g| system.touching(g).is_some()),
             looks: 0,
             stability: Stability::new(system),
             drive,

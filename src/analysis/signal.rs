@@ -2,7 +2,7 @@
 
 use super::AnalysisError;
 use crate::compile::Compiled;
-use crate::gaps::Point;
+use crate::domains::Point;
 use crate::multibody::planar::{self, Pose};
 use crate::multibody::{BodyId, Model};
 

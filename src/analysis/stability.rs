@@ -5,7 +5,7 @@
 //! direction is no fault while the motion goes along it, as in a snap or a pull-in; it is one while the motion has no share
 //! in it.
 
-use crate::gaps::{Drive, System};
+use crate::domains::{Drive, System};
 use crate::multibody::forces::add_inertia;
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, Model};

@@ -68,7 +68,7 @@ pub(crate) fn told_at(compiled: &Compiled, point: &OperatingPoint) -> Vec<String
 fn jump(compiled: &Compiled, point: &OperatingPoint) -> (bool, bool) {
     let system = &compiled.parts.system;
     let jumped = point.path.fold.is_some();
-    let touching = (0..system.gaps.len()).any(|g| system.touches(g, &point.q));
+    let touching = (0..system.members.len()).any(|g| system.touches(g, &point.q));
     (jumped && point.volts.iter().any(|v| *v != 0.0) && touching, jumped)
 }
 
@@ -286,7 +286,7 @@ pub(crate) fn node_motions(compiled: &Compiled, q: &[Pose]) -> Vec<(String, Node
 /// Displacement of points along every beam, ends included.
 pub(crate) fn beam_motions(compiled: &Compiled, q: &[Pose]) -> BeamMotions {
     let linear = compiled.parts.system.model.linear;
-    let at = |point: &crate::gaps::Point| {
+    let at = |point: &crate::domains::Point| {
         let moved = point.displacement(q, linear);
         NodeMotion { x: moved.x, y: moved.y, rz: point.rotation(q) }
     };

@@ -11,7 +11,7 @@ use super::formulation::Formulation;
 use super::joint_transient::joint_transient;
 use super::{AnalysisError, Watch};
 use crate::compile::Compiled;
-use crate::gaps::{Ramp, System};
+use crate::domains::{Ramp, System};
 use crate::solve::baseline::{Solver, SolverKind};
 use crate::solve::time::adaptive::{Advance, Observer};
 use crate::solve::time::method::{Motion, Work};

@@ -4,7 +4,7 @@ use super::failure::Failure;
 use super::model::{Context, ModelArgs, Named};
 use super::output;
 use bimorph::compile::{Compiled, Formulation};
-use bimorph::gaps::elements;
+use bimorph::domains::elements;
 use bimorph::netlist::Setting;
 use bimorph::structure::Structure;
 use clap::Args;

@@ -8,7 +8,7 @@ use super::states::Snapshot;
 use super::{Trial, TrialReply};
 use crate::analysis::signal::{Signal, View};
 use crate::compile::Compiled;
-use crate::gaps::System;
+use crate::domains::System;
 
 /// Share of the compilation's tolerance that one internal step may use.
 pub(super) const STEP_SHARE: f64 = 1e-2;

@@ -6,7 +6,7 @@ use super::session::Session;
 use super::states::Snapshot;
 use crate::analysis::signal::{self, Signal, View};
 use crate::compile::Compiled;
-use crate::gaps::{Domain, Point};
+use crate::domains::{Domain, Point};
 
 /// Quantities of a state as a whole, with what they are, by the names under which [`super::Device::look`] knows them beside signals.
 pub const WHOLE: [(&str, &str); 3] = [
@@ -24,7 +24,7 @@ pub(super) fn names(compiled: &Compiled) -> Vec<String> {
 
 /// Gaps that close, of those there are: plates and facing beams.
 fn closing(compiled: &Compiled) -> impl Iterator<Item = usize> {
-    compiled.parts.system.gaps.iter().enumerate().filter(|(_, gap)| gap.closes()).map(|(g, _)| g)
+    compiled.parts.system.members.iter().enumerate().filter(|(_, gap)| gap.closes()).map(|(g, _)| g)
 }
 
 impl Session {
@@ -35,7 +35,7 @@ impl Session {
     pub(super) fn look(&self, compiled: &Compiled, state: &Snapshot, name: &str) -> Result<f64, DeviceError> {
         let system = Self::system(&self.ports.system, compiled);
         let rows = &system.electrics.gap_rows;
-        let volts: Vec<f64> = (0..system.gaps.len())
+        let volts: Vec<f64> = (0..system.members.len())
             .map(|g| state.sources.iter().enumerate().map(|(s, v)| rows[(g, s)] * v).sum())
             .collect();
         let none = |hint: &str| DeviceError::UnknownSignal { name: name.into(), hint: hint.into() };

@@ -21,7 +21,7 @@ use super::{DeviceError, Token};
 use crate::analysis::signal::{Signal, View};
 use crate::budget;
 use crate::compile::Compiled;
-use crate::gaps::System;
+use crate::domains::System;
 use crate::multibody::agitation::{BOLTZMANN, damped};
 use crate::multibody::planar::Pose;
 use crate::solve::frequency::gyroscopic;

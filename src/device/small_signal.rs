@@ -9,7 +9,7 @@ use super::states::Snapshot;
 use super::{DeviceError, SmallSignal, Token};
 use crate::analysis::signal::{Signal, View};
 use crate::compile::Compiled;
-use crate::gaps::{Drive, System};
+use crate::domains::{Drive, System};
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
 use crate::solve::frequency::gyroscopic;

@@ -8,7 +8,7 @@ use super::states::Snapshot;
 use super::{Status, Trial, TrialReply};
 use crate::analysis::contact_range::within_contact_range;
 use crate::compile::Compiled;
-use crate::gaps::Ramp;
+use crate::domains::Ramp;
 use crate::multibody::planar::Pose;
 use crate::solve::path::SourcePath;
 use crate::solve::time::adaptive::{Advance, Control};

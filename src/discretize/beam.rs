@@ -8,7 +8,7 @@ pub use super::bar::{SHEAR_COEFFICIENT, bar};
 use super::junction_springs::End;
 use super::rigid::{Assembly, Lump};
 use super::scheme::{Bar, Cut, Pin};
-use crate::gaps::Point;
+use crate::domains::Point;
 use crate::multibody::{BodyName, Coupling, Joint};
 use crate::options::{CompileOptions, Junctions, Scheme};
 use crate::structure::Beam;

@@ -16,7 +16,7 @@
 use super::bar::bar;
 use super::rigid::Assembly;
 use super::{DiscretizeError, cubic, lay_spring, order};
-use crate::gaps::{Domain, Member, Point};
+use crate::domains::{Domain, Member, Point};
 use crate::multibody::linear_system::{LinearSystem, add_pair};
 use crate::multibody::planar::{JointFrame, Pose};
 use crate::multibody::{BodyId, BodyName, Joint};

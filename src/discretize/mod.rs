@@ -44,7 +44,7 @@ pub use crate::options::{Junctions, Scheme};
 pub use error::{DiscretizeError, MOST_SEGMENTS};
 
 use crate::budget;
-use crate::gaps::{Domain, Laid, Load, Member, Point, System};
+use crate::domains::{Domain, Laid, Load, Member, Point, System};
 use crate::multibody::{BodyId, Coupling, Damper, Joint, Model};
 use crate::options::CompileOptions;
 use crate::structure::Structure;
@@ -184,7 +184,7 @@ pub fn discretize_like(
     let gap_names = gaps.iter().filter(|laid| laid.member.is_gap()).map(|laid| laid.name.to_owned()).collect();
     let system = System {
         model,
-        gaps: gaps.into_iter().map(|laid| laid.member.moved(&moved)).collect(),
+        members: gaps.into_iter().map(|laid| laid.member.moved(&moved)).collect(),
         loads: loads.into_iter().map(|l| Load { point: moved(l.point), ..l }).collect(),
         electrics,
         length_scale: if scale.is_finite() { scale } else { 1e-6 },

@@ -5,10 +5,10 @@
 
 use super::error::DiscretizeError;
 use super::rigid::Assembly;
-use crate::gaps::drive::Electrics;
-use crate::gaps::network::{Circuit, CircuitError};
-use crate::gaps::thermal::{Heater, Heating};
-use crate::gaps::{Laid, Member};
+use crate::domains::drive::Electrics;
+use crate::domains::network::{Circuit, CircuitError};
+use crate::domains::thermal::{Heater, Heating};
+use crate::domains::{Laid, Member};
 use crate::structure::{GapVoltage, Structure};
 use nalgebra::{DMatrix, RowDVector};
 

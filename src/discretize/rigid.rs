@@ -4,7 +4,7 @@
 //! Until [`Assembly::finish_bodies`] every point is given from its group's reference point (the position of the group's
 //! first node); after it, from the centre of mass, in which the mass matrix is diagonal and constant.
 
-use crate::gaps::{Drawing, Laid, Member, Point};
+use crate::domains::{Drawing, Laid, Member, Point};
 use crate::multibody::planar::JointFrame;
 use crate::multibody::{Body, BodyId, BodyName, Drag, Joint};
 use crate::sets::Sets;

@@ -1,7 +1,7 @@
 //! A system in relative joint coordinates: the springs of the tree's joints act on the coordinates, everything else (closures,
 //! gaps, loads, dampers) on the bodies.
 
-use crate::gaps::System;
+use crate::domains::System;
 use crate::multibody::relative::{Tree, Unfit};
 
 /// A system on a tree. Immutable; shared by sessions.

@@ -1,12 +1,12 @@
 //! Gap functions as expressions that SPICE and Verilog-A both read: of `u`, the text of an approach in micrometres.
 //!
-//! They are those of [`crate::gaps::capacitor`], [`crate::gaps::contact`] and [`crate::gaps::stop`], with `min` and `max` in the place of
+//! They are those of [`crate::domains::capacitor`], [`crate::domains::contact`] and [`crate::domains::stop`], with `min` and `max` in the place of
 //! cases, so that no branch divides by what another one keeps away from 0.
 
 use super::lumped::Law;
-use crate::gaps::capacitor::Capacitor;
-use crate::gaps::contact::{Contact, PRESSURE, TOUCH};
-use crate::gaps::stop::{SOFT, Stop};
+use crate::domains::capacitor::Capacitor;
+use crate::domains::contact::{Contact, PRESSURE, TOUCH};
+use crate::domains::stop::{SOFT, Stop};
 
 /// C(u) [F].
 pub(super) fn capacitance(capacitor: &Capacitor, u: &str) -> String {

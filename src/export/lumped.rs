@@ -6,8 +6,8 @@
 //! M·ẍ + C·ẋ + K·x = f₀ + Σ_g n_g·(½·V_g²·C_g′(u_g) − P_g(u_g)) + Σ_q b_q·f_q − M·a        u_g = n_gᵀ·x
 //! Q_g = C_g(u_g)·V_g,      V_g = Σ rows·voltages,      i = G·voltages + Σ rows·dQ_g/dt
 //! ```
-//! with the gap functions C_g of [`crate::gaps::capacitor`] and what bears where parts touch, P_g of [`crate::gaps::contact`] and
-//! [`crate::gaps::stop`]. Nothing is linearised, and no operating point is needed.
+//! with the gap functions C_g of [`crate::domains::capacitor`] and what bears where parts touch, P_g of [`crate::domains::contact`] and
+//! [`crate::domains::stop`]. Nothing is linearised, and no operating point is needed.
 
 mod model;
 mod sliding;
@@ -21,9 +21,9 @@ use crate::compile::Compiled;
 use crate::device::PortKind;
 use crate::device::ports::{Answer, Ports};
 use crate::device::scale::Scale;
-use crate::gaps::capacitor::Capacitor;
-use crate::gaps::drive::Electrics;
-use crate::gaps::{Domain, Input, Member, System};
+use crate::domains::capacitor::Capacitor;
+use crate::domains::drive::Electrics;
+use crate::domains::{Domain, Input, Member, System};
 pub use model::{Coordinate, Law, Lumped, LumpedGap, Reading};
 use nalgebra::{DMatrix, DVector};
 use sliding::{UNHELD, along, axis, coordinates, dampers, springs};
@@ -140,7 +140,7 @@ fn gaps(
         let along = along(coordinates, &approach.a, approach.axis) - along(coordinates, &approach.b, approach.axis);
         Ok(LumpedGap { name, along, law, by_port, constant })
     };
-    system.gaps.iter().enumerate().filter(acts).map(gap).collect()
+    system.members.iter().enumerate().filter(acts).map(gap).collect()
 }
 
 /// What a signal reads.

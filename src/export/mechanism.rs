@@ -8,7 +8,7 @@ use crate::analysis::statics::operating_point;
 use crate::compile::Compiled;
 use crate::device::PortKind;
 use crate::device::ports::Ports;
-use crate::gaps::{Drive, System};
+use crate::domains::{Drive, System};
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
 use crate::solve::SolveError;
@@ -138,7 +138,7 @@ impl<'a> Mechanism<'a> {
                 }
             }
             for tau in taus {
-                let of = |(h, slope): (&crate::gaps::thermal::Heater, &f64)| {
+                let of = |(h, slope): (&crate::domains::thermal::Heater, &f64)| {
                     let own = Some(h.time_constant).filter(|tau| *tau > 0.0);
                     if own == tau { *slope } else { 0.0 }
                 };

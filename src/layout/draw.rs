@@ -7,7 +7,7 @@
 
 use super::lines::{Line, Lines};
 use super::process::Process;
-use crate::gaps::elements;
+use crate::domains::elements;
 use std::collections::HashMap;
 
 /// Pads whose sizes are not given [m].

@@ -1,7 +1,7 @@
 //! The axial force that each beam carries at an operating point.
 
 use crate::discretize::Discretized;
-use crate::gaps::{Drive, Point};
+use crate::domains::{Drive, Point};
 use crate::multibody::BodyId;
 use crate::multibody::forces::axial_force;
 use crate::multibody::planar::Pose;

@@ -5,7 +5,7 @@
 //! Bent beams keep their length to O(h⁴), so that Newton's method settles from there within a few iterations.
 
 use crate::discretize::Discretized;
-use crate::gaps::Point;
+use crate::domains::Point;
 use crate::multibody::BodyId;
 use crate::multibody::planar::{self, Pose};
 use crate::structure::Structure;

@@ -8,7 +8,7 @@
 //! "Theory of Elastic Stability" (1961), §1.12.
 
 use crate::discretize::Discretized;
-use crate::gaps::{Load, Point};
+use crate::domains::{Load, Point};
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, BodyId};
 use crate::solve::frequency::eigen::lowest_modes;

@@ -10,7 +10,7 @@ use super::groups::{Groups, MARGIN};
 use super::look::{Seen, look};
 use super::order_error::{relative, strain_shares};
 use crate::discretize::{DiscretizeError, Discretized, discretize_with};
-use crate::gaps::Point;
+use crate::domains::Point;
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, BodyId};
 use crate::options::CompileOptions;

@@ -83,7 +83,7 @@ impl LaneReference {
             return None;
         }
         let none = Eight::NONE;
-        let point = |p: &crate::gaps::Point| LanePoint { body: body(p.body), arm: [none; 2], lump: [none; 3] };
+        let point = |p: &crate::domains::Point| LanePoint { body: body(p.body), arm: [none; 2], lump: [none; 3] };
         let span = |span: &Span| LaneSpan {
             points: span.points.iter().map(point).collect(),
             along: [none; 2],

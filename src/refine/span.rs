@@ -6,7 +6,7 @@
 use crate::discretize::bar::bar;
 use crate::discretize::cubic;
 use crate::discretize::scheme::{Bar, Part};
-use crate::gaps::Point;
+use crate::domains::Point;
 use crate::multibody::BodyId;
 use crate::multibody::planar::Pose;
 use crate::options::CompileOptions;

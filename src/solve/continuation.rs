@@ -28,7 +28,7 @@ pub use traced::{Event, PathEnd, PathPoint, Traced};
 use corrector::{Place, Plane};
 
 use super::SolveError;
-use crate::gaps::System;
+use crate::domains::System;
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
 use family::Blend;

@@ -15,7 +15,7 @@ pub mod path;
 pub mod side_by_side;
 
 use super::SolveError;
-use crate::gaps::{Domain, Drive, System};
+use crate::domains::{Domain, Drive, System};
 use crate::multibody::BlockMatrix;
 use crate::multibody::factor::ZeroPivot;
 use crate::multibody::planar::Pose;
@@ -236,7 +236,7 @@ impl Equilibrium {
     /// upon the closed branch by chance.
     fn leaps(&self, system: &System, from: &[Pose]) -> bool {
         let far = |(gap, volts): (usize, &f64)| {
-            if *volts == 0.0 || !system.gaps[gap].closes() {
+            if *volts == 0.0 || !system.members[gap].closes() {
                 return false;
             }
             let (before, after) = (system.distance(gap, from), system.distance(gap, &self.trial));

@@ -124,7 +124,7 @@ pub const DIRECTIONS: [&str; 3] = ["along x", "along y", "about z"];
 
 impl SolveError {
     pub(crate) fn step_failed(
-        system: &crate::gaps::System,
+        system: &crate::domains::System,
         t: f64,
         dt: f64,
         why: WhyFailed,
@@ -135,7 +135,7 @@ impl SolveError {
         Self::StepFailed { t, dt, why, body, direction: DIRECTIONS[direction] }
     }
 
-    pub(crate) fn singular(system: &crate::gaps::System, pivot: ZeroPivot) -> Self {
+    pub(crate) fn singular(system: &crate::domains::System, pivot: ZeroPivot) -> Self {
         Self::Singular {
             body: system.model.bodies[pivot.body].name.to_string(),
             direction: DIRECTIONS[pivot.direction],

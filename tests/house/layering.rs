@@ -8,7 +8,7 @@ use std::path::Path;
 const FLOORS: [&[&str]; 11] = [
     &["budget", "sets"],
     &["structure", "multibody"],
-    &["gaps"],
+    &["domains"],
     &["netlist", "layout", "results"],
     &["options", "equations", "front"],
     &["content", "discretize", "solve"],

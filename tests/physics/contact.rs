@@ -5,7 +5,7 @@ use bimorph::analysis::pull_in::pull_in;
 use bimorph::analysis::statics::static_equilibrium;
 use bimorph::analysis::transient::{TransientOptions, transient};
 use bimorph::compile::{CompileOptions, Compiled};
-use bimorph::gaps::contact::{DEEPEST, TOUCH};
+use bimorph::domains::contact::{DEEPEST, TOUCH};
 use bimorph::solve::time::event::Direction;
 
 pub(crate) const EPS: f64 = 8.854e-12;

@@ -7,7 +7,7 @@ use bimorph::analysis::integrator::Integrator;
 use bimorph::analysis::joint_transient::{JointReport, joint_transient};
 use bimorph::analysis::transient::{TransientOptions, TransientResult, transient};
 use bimorph::compile::{CompileOptions, Compiled};
-use bimorph::gaps::Ramp;
+use bimorph::domains::Ramp;
 use bimorph::multibody::rcr::Reduction;
 use bimorph::netlist::Setting;
 use bimorph::solve::dormand_prince::{DormandPrince, Tolerances};

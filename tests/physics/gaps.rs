@@ -6,7 +6,7 @@ use bimorph::analysis::modes::modes;
 use bimorph::analysis::pull_in::pull_in;
 use bimorph::analysis::statics::static_equilibrium;
 use bimorph::compile::CompileOptions;
-use bimorph::gaps::{At, Domain, Point};
+use bimorph::domains::{At, Domain, Point};
 use bimorph::multibody::planar::Pose;
 use bimorph::multibody::{BlockMatrix, BodyId};
 use nalgebra::{DMatrix, DVector};

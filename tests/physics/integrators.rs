@@ -4,7 +4,7 @@ use crate::{ARM, model};
 use bimorph::analysis::integrator::Integrator;
 use bimorph::analysis::transient::{TransientOptions, transient};
 use bimorph::compile::{CompileOptions, Compiled};
-use bimorph::gaps::{Ramp, System};
+use bimorph::domains::{Ramp, System};
 use bimorph::netlist::Setting;
 use bimorph::solve::SolveError;
 use bimorph::solve::adaptive::Control;

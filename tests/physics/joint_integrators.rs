@@ -8,7 +8,7 @@ use bimorph::analysis::integrator::Integrator;
 use bimorph::analysis::joint_transient::{JointReport, joint_transient};
 use bimorph::analysis::transient::{TransientOptions, TransientResult, transient};
 use bimorph::compile::{CompileOptions, Compiled};
-use bimorph::gaps::Ramp;
+use bimorph::domains::Ramp;
 use bimorph::netlist::Setting;
 use bimorph::solve::adaptive::Control;
 use bimorph::solve::dormand_prince::Pair;

@@ -3,8 +3,8 @@
 use crate::model;
 use bimorph::analysis::transient::{TransientOptions, TransientResult, transient};
 use bimorph::compile::{CompileOptions, Compiled, Formulation, Scheme, compile};
+use bimorph::domains::Ramp;
 use bimorph::equations::Joints;
-use bimorph::gaps::Ramp;
 use bimorph::multibody::relative::{Tree, Unfit};
 use bimorph::netlist::{Bundle, Setting};
 use bimorph::solve::time::joint_rodas4::JointRodas4;

@@ -1,7 +1,7 @@
 //! Arms one percent below and above their Euler load: the signs of the pivots tell stable from unstable.
 
 use super::frame::cantilever;
-use bimorph::gaps::System;
+use bimorph::domains::System;
 use bimorph::multibody::planar::Pose;
 use bimorph::multibody::{BlockMatrix, BodyId};
 use bimorph::solve::continuation::{Branch, Continuation, ContinuationOptions};

@@ -1,7 +1,7 @@
 //! Elastic beams as rigid bodies at nodes with joints between them: the compliant formulation, built by hand.
 
-use bimorph::gaps::drive::Electrics;
-use bimorph::gaps::{Load, Point, Ramp, System};
+use bimorph::domains::drive::Electrics;
+use bimorph::domains::{Load, Point, Ramp, System};
 use bimorph::multibody::planar::JointFrame;
 use bimorph::multibody::{Body, BodyId, Joint, Model};
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
@@ -106,7 +106,7 @@ impl Frame {
         };
         let loads = loads.iter().map(|&(id, f)| Load { point: at(id), force: f.into(), moment: 0.0 }).collect();
         let electrics = Electrics { names: Vec::new(), ..Electrics::default() };
-        (System { model, gaps: Vec::new(), loads, electrics, length_scale: 1e-6 }, place)
+        (System { model, members: Vec::new(), loads, electrics, length_scale: 1e-6 }, place)
     }
 }
 

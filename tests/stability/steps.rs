@@ -1,7 +1,7 @@
 //! Steps that are too long for the fast motions of a stiff bank: which methods blow up.
 
 use super::frame::{bank, quiet};
-use bimorph::gaps::System;
+use bimorph::domains::System;
 use bimorph::multibody::BodyId;
 use bimorph::multibody::planar::Pose;
 use bimorph::solve::adaptive::{Adaptive, Control};

@@ -1,7 +1,7 @@
 //! Stiffness ratios 1e3 … 1e8: beams whose joints are ever stiffer along them.
 
 use super::frame::{cantilever, quiet};
-use bimorph::gaps::System;
+use bimorph::domains::System;
 use bimorph::multibody::planar::Pose;
 use bimorph::solve::adaptive::{Adaptive, Control};
 use bimorph::solve::equilibrium::{Equilibrium, EquilibriumOptions};

@@ -2,7 +2,7 @@
 
 use bimorph::analysis::transient::first_step;
 use bimorph::compile::{CompileOptions, Compiled, compile};
-use bimorph::gaps::Ramp;
+use bimorph::domains::Ramp;
 use bimorph::netlist::{Bundle, Setting};
 use bimorph::solve::time::adaptive::{Adaptive, Control};
 use bimorph::solve::time::method::Motion;

@@ -4,7 +4,7 @@ use super::{BEAMS, swept};
 use bimorph::analysis::mesh::{self, Request};
 use bimorph::analysis::modes::modes;
 use bimorph::compile::{CompileOptions, Compiled, compile};
-use bimorph::gaps::System;
+use bimorph::domains::System;
 use bimorph::jobs::sweep::{Shard, SweepAnalysis};
 use bimorph::multibody::BlockMatrix;
 use bimorph::multibody::planar::Pose;

@@ -9,7 +9,7 @@ use super::variant::Variant;
 use crate::analysis::AnalysisError;
 use crate::analysis::integrator::Integrator;
 use crate::analysis::statics::{operating_point, source_vector};
-use crate::gaps::Ramp;
+use crate::domains::Ramp;
 use crate::solve::baseline::{Solver, SolverKind};
 use crate::solve::method::{Method, Motion};
 use crate::solve::rodas4::Rodas4;

@@ -7,7 +7,7 @@ use super::super::{AnalysisError, Watch};
 use super::{balance, force, singular, steady};
 use crate::compile::Compiled;
 use crate::discretize::frame::Frame;
-use crate::gaps::{Point, Ramp};
+use crate::domains::{Point, Ramp};
 use crate::multibody::planar::Pose;
 use crate::solve::baseline::frame_motion::Newmark;
 use crate::solve::baseline::sparse::Sparse;

@@ -7,7 +7,7 @@ use crate::analysis::statics::{OperatingPoint, operating_point};
 use crate::compile::Compiled;
 use crate::device::ports::Ports;
 use crate::device::small_signal::{Moved, Perturbed};
-use crate::gaps::{Drive, System};
+use crate::domains::{Drive, System};
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
 use crate::solve::frequency::refined::Refined;

@@ -13,7 +13,7 @@ use super::named::Row;
 use crate::analysis::AnalysisError;
 use crate::analysis::signal::Signal;
 use crate::device::small_signal::{Constituent, Law, Moved};
-use crate::gaps::{Drive, System};
+use crate::domains::{Drive, System};
 use crate::multibody::BlockMatrix;
 use crate::multibody::forces::{add_damping, add_inertia};
 use crate::multibody::planar::Pose;

@@ -4,7 +4,7 @@ use super::super::AnalysisError;
 use super::super::formulation::Formulation;
 use super::super::transient::record::Carrier;
 use super::report::JointReport;
-use crate::gaps::{Ramp, System};
+use crate::domains::{Ramp, System};
 use crate::multibody::rcr::Linkage;
 use crate::multibody::rcr::Reduction;
 use crate::solve::dormand_prince::SecondOrder;

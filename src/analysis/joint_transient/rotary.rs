@@ -40,7 +40,7 @@ fn apart(compiled: &Compiled, elastic: &OperatingPoint, turning: &OperatingPoint
     let nodes = || compiled.parts.nodes.iter().flatten();
     let moved = nodes().map(|p| p.displacement(&elastic.q, linear).norm()).fold(0.0, f64::max);
     let between =
-        |p: &crate::gaps::Point| (p.displacement(&elastic.q, linear) - p.displacement(&turning.q, linear)).norm();
+        |p: &crate::domains::Point| (p.displacement(&elastic.q, linear) - p.displacement(&turning.q, linear)).norm();
     let most = nodes().map(between).fold(0.0, f64::max);
     (moved > 0.0).then_some(most / moved)
 }

@@ -20,7 +20,7 @@ use super::meshed::{chosen, meshed};
 use super::warnings::{of_rotary, of_steps};
 use crate::compile::Compiled;
 use crate::discretize::DiscretizeError;
-use crate::gaps::Drive;
+use crate::domains::Drive;
 use crate::multibody::forces::add_damping;
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, Model};

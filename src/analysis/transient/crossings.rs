@@ -5,7 +5,7 @@ use super::super::signal::{Signal, View};
 use super::options::TransientOptions;
 use super::result::Event;
 use crate::compile::Compiled;
-use crate::gaps::Ramp;
+use crate::domains::Ramp;
 use crate::solve::dense::interpolate;
 use crate::solve::time::event::Detector;
 use crate::solve::time::method::Motion;
@@ -29,7 +29,7 @@ fn watched(compiled: &Compiled, options: &TransientOptions<'_>) -> Result<Vec<Wa
         .map(|(name, level)| Signal::find(compiled, name).map(|signal| watch(name.clone(), signal, *level, false)));
     let system = &compiled.parts.system;
     let touching =
-        (0..system.gaps.len()).filter_map(|g| system.touching(g).map(|[touch, _]| (g, touch))).map(|(g, touch)| {
+        (0..system.members.len()).filter_map(|g| system.touching(g).map(|[touch, _]| (g, touch))).map(|(g, touch)| {
             let name = format!("{}.gap", compiled.parts.gap_names[g]);
             Ok(watch(name, Signal::Distance(g), touch, true))
         });

@@ -1,6 +1,6 @@
 //! How long the first step in time is.
 
-use crate::gaps::System;
+use crate::domains::System;
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
 

@@ -10,7 +10,7 @@ use super::options::{TransientOptions, check};
 use super::result::{Counters, TransientResult};
 use super::samples::Samples;
 use crate::compile::Compiled;
-use crate::gaps::Ramp;
+use crate::domains::Ramp;
 use crate::multibody::Body;
 use crate::solve::time::adaptive::{Advance, Observer};
 use crate::solve::time::method::{Motion, Work};

@@ -3,7 +3,7 @@
 use super::super::signal::{Signal, View};
 use super::options::TransientOptions;
 use crate::compile::Compiled;
-use crate::gaps::Ramp;
+use crate::domains::Ramp;
 use crate::solve::dense::interpolate;
 use crate::solve::time::method::Motion;
 

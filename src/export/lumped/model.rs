@@ -1,7 +1,7 @@
 //! The model of rigid parts that slide: coordinates, springs and dampers, gaps, and what is read.
 
 use super::super::linear::{Port, SignalShown};
-pub use crate::gaps::Law;
+pub use crate::domains::Law;
 use nalgebra::{DMatrix, DVector, Vector2};
 
 /// Way of one part along one direction.

@@ -3,7 +3,7 @@
 
 use super::super::ExportError;
 use super::model::Coordinate;
-use crate::gaps::{Point, System};
+use crate::domains::{Point, System};
 use crate::multibody::BodyId;
 use crate::multibody::forces::{add_damping, add_elastic};
 use crate::multibody::planar::Pose;

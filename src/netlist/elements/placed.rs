@@ -2,7 +2,7 @@
 
 use super::super::sink::Reported;
 use super::arguments::Site;
-use crate::gaps::elements;
+use crate::domains::elements;
 use crate::structure::Placed;
 
 /// An element of a domain's own.

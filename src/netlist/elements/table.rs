@@ -3,7 +3,7 @@
 use super::super::sink::Reported;
 use super::arguments::Site;
 use super::{arm, beam, circuit, comb, curve, gap, load, lumped, pinned, placed, pressure, section, stop, support};
-use crate::gaps::elements;
+use crate::domains::elements;
 use std::sync::LazyLock;
 
 /// An element of the language.

@@ -5,7 +5,7 @@
 
 use super::family::Blend;
 use super::options::ContinuationOptions;
-use crate::gaps::System;
+use crate::domains::System;
 use crate::multibody::BlockMatrix;
 use crate::multibody::factor::ZeroPivot;
 use crate::multibody::planar::Pose;

@@ -4,7 +4,7 @@
 //! the pull of gaps and the heat of resistors with the square of voltages. Its derivative is therefore the central
 //! difference over any interval, exactly, and [`Blend::slope`] is that, whatever a gap function's law in q.
 
-use crate::gaps::{Drive, Load, System};
+use crate::domains::{Drive, Load, System};
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
 use thiserror::Error;
@@ -59,7 +59,8 @@ impl Blend {
             });
         let same_points =
             from.loads.len() == to.loads.len() && from.loads.iter().zip(&to.loads).all(|(x, y)| x.point == y.point);
-        let same = same_joints && same_points && a.bodies == b.bodies && a.dampers == b.dampers && from.gaps == to.gaps;
+        let same =
+            same_joints && same_points && a.bodies == b.bodies && a.dampers == b.dampers && from.members == to.members;
         if !same {
             return Err(NotAFamily::Mechanism);
         }

@@ -29,7 +29,7 @@ impl Continuation {
     /// True when a step stayed on its branch: it closed or opened no gap by much, and ends near where the tangent led.
     fn keeps_branch(&self, family: &Blend, here: &Place, next: &Place, step: f64) -> bool {
         let system = family.system();
-        let leap = (0..system.gaps.len()).filter(|&g| system.touching(g).is_some()).any(|g| {
+        let leap = (0..system.members.len()).filter(|&g| system.touching(g).is_some()).any(|g| {
             let (a, b) = (system.room(g, &here.q), system.room(g, &next.q));
             (a - b).abs() > self.options.closing * a.min(b)
         });

@@ -5,7 +5,7 @@
 
 use super::path::LoadPath;
 use super::{Equilibrium, Path, size};
-use crate::gaps::System;
+use crate::domains::System;
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
 use crate::solve::SolveError;

@@ -1,7 +1,7 @@
 //! Paths of drives that an equilibrium follows.
 
-use crate::gaps::Drive;
-use crate::gaps::drive::Electrics;
+use crate::domains::Drive;
+use crate::domains::drive::Electrics;
 
 /// A path of drives: fills in the drive, or its rate of change, at s in 0…1.
 pub trait LoadPath {

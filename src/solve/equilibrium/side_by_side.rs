@@ -11,7 +11,7 @@ pub use storage::LaneEquilibrium;
 
 use super::path::LoadPath;
 use super::{EquilibriumOptions, LEAP, STALLED};
-use crate::gaps::{Domain, Drive, System};
+use crate::domains::{Domain, Drive, System};
 use crate::multibody::lanes::{Eight, LANES, LanePose, Real, across};
 use crate::multibody::planar::Pose;
 use kernels::{Task, Work};
@@ -214,7 +214,7 @@ impl LaneEquilibrium {
     /// As `leaps` of [`super::Equilibrium`].
     fn leaps(&self, lane: usize, way: &Way<'_>, drive: &Drive) -> bool {
         let system = way.system;
-        let closes = |(gap, volts): &(usize, &f64)| **volts != 0.0 && system.gaps[*gap].closes();
+        let closes = |(gap, volts): &(usize, &f64)| **volts != 0.0 && system.members[*gap].closes();
         let mut closing = drive.volts.iter().enumerate().filter(closes).peekable();
         if closing.peek().is_none() {
             return false;

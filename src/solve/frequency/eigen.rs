@@ -18,7 +18,7 @@ pub use super::mass::mass_product;
 use super::mass::shifted;
 use super::refined::{ROUNDING, Refined};
 use super::subspace;
-use crate::gaps::{Drive, System};
+use crate::domains::{Drive, System};
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, Model};
 use crate::solve::SolveError;

@@ -8,7 +8,7 @@
 //! SIAM J. Sci. Stat. Comput. 7 (1986).
 
 use super::harmonic::{ComplexPose, Harmonic};
-use crate::gaps::System;
+use crate::domains::System;
 use nalgebra::Complex;
 
 /// Vectors at most: more modes than take part in any band.

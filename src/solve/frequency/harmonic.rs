@@ -4,7 +4,7 @@
 //! resonance of one of its branches can have a small pivot, so each solution is refined once against its own residual.
 
 use super::refined::Refined;
-use crate::gaps::System;
+use crate::domains::System;
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
 use crate::solve::SolveError;

@@ -8,7 +8,7 @@
 //! problem", SIAM J. Numer. Anal. 10 (1973).
 
 use super::harmonic::{ComplexPose, Harmonic};
-use crate::gaps::System;
+use crate::domains::System;
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
 use nalgebra::Complex;

@@ -7,7 +7,7 @@
 //! Reference: C. B. Moler, "Iterative refinement in floating point", J. ACM 14 (1967); J. Demmel et al., "Error bounds from
 //! extra-precise iterative refinement", ACM Trans. Math. Software 32 (2006).
 
-use crate::gaps::{Drive, System};
+use crate::domains::{Drive, System};
 use crate::multibody::double::{Double, DoublePose};
 use crate::multibody::planar::{Block, Pose};
 use crate::multibody::precise::PreciseTangent;

@@ -23,7 +23,7 @@ pub use storage::LaneModes;
 pub(crate) use vectors::{dot, weigh};
 
 use super::eigen::Modes;
-use crate::gaps::System;
+use crate::domains::System;
 use crate::multibody::lanes::{Eight, LANES, LanePose, Real, across};
 use crate::multibody::planar::Pose;
 use kernels::{Task, Work};

@@ -11,7 +11,7 @@
 use super::method::{Method, Motion, StepFailure, Work};
 use super::rodas4::Rodas4;
 use super::step_size;
-use crate::gaps::{Ramp, System};
+use crate::domains::{Ramp, System};
 use crate::multibody::planar::Pose;
 use crate::multibody::{BodyId, Model};
 use crate::solve::frequency::eigen::mass_product;

@@ -6,7 +6,7 @@
 
 use super::implicit::{Equation, Implicit, Sample};
 use super::method::{Method, Motion, StepFailure, Work};
-use crate::gaps::{Ramp, System};
+use crate::domains::{Ramp, System};
 use crate::multibody::planar::Pose;
 use crate::solve::linear::{LinearSolver, Recursion};
 use std::fmt::Debug;

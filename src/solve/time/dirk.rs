@@ -11,7 +11,7 @@
 use super::implicit::{Equation, Implicit, Sample};
 use super::method::{Method, Motion, StepFailure, Work};
 use super::tableau::Tableau;
-use crate::gaps::{Ramp, System};
+use crate::domains::{Ramp, System};
 use crate::multibody::forces;
 use crate::multibody::planar::Pose;
 use crate::solve::linear::{LinearSolver, Recursion};

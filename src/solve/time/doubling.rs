@@ -6,7 +6,7 @@
 //! Reference: E. Hairer, S. P. Nørsett, G. Wanner, "Solving Ordinary Differential Equations I" (1993), §II.4, eq. 4.4.
 
 use super::method::{Method, Motion, StepFailure, Work};
-use crate::gaps::{Ramp, System};
+use crate::domains::{Ramp, System};
 
 /// A method of order 2 with step doubling.
 #[derive(Debug, Clone)]

@@ -3,8 +3,8 @@
 use super::joint_rodas4::JointRodas4;
 use super::method::{Method, Motion, StepFailure, Work};
 use super::rodas4::Rodas4;
+use crate::domains::{Ramp, System};
 use crate::equations::Joints;
-use crate::gaps::{Ramp, System};
 use std::sync::Arc;
 
 /// The method in one of the formulations; one comparison a step.

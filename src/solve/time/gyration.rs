@@ -9,7 +9,7 @@
 //! 2|Ω|γh + |Ω̇|(γh)² a term, some 10⁻⁵ for a gyroscope at its own steps, and the sum is exact to rounding.
 
 use super::method::StepFailure;
-use crate::gaps::inputs::Frame;
+use crate::domains::inputs::Frame;
 use crate::multibody::planar::Pose;
 use crate::multibody::{Body, Model};
 

@@ -9,7 +9,7 @@
 //! rotation times the model's length scale), or when rounding lets corrections shrink no further.
 
 use super::method::{Motion, StepFailure, Work};
-use crate::gaps::{Drive, Ramp, System};
+use crate::domains::{Drive, Ramp, System};
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, forces};
 use crate::solve::linear::LinearSolver;

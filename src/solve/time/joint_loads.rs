@@ -5,7 +5,7 @@
 //! one: the rate of that prescribed length is taken as zero, so that inertia feels its slow change only through the
 //! bodies it moves. A time constant of heat much longer than the period of what moves makes this right.
 
-use crate::gaps::{Drive, Ramp, System};
+use crate::domains::{Drive, Ramp, System};
 use crate::multibody::forces;
 use crate::multibody::planar::Pose;
 use crate::multibody::rcr::{AddedInertia, Closure, Linkage, Reduction};

@@ -22,8 +22,8 @@ mod tableau;
 
 use super::method::{Method, Motion, StepFailure, Work};
 use super::rodas4::tableau::{ALPHA, GAMMA, GAMMA_I, moves_on};
+use crate::domains::{Drive, Ramp, System};
 use crate::equations::Joints;
-use crate::gaps::{Drive, Ramp, System};
 use crate::multibody::forces;
 use crate::multibody::planar::Pose;
 use crate::multibody::relative::JointMatrix;

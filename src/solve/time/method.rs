@@ -1,7 +1,7 @@
 //! What every integrator of M·q̈ + C·q̇ + r(q, t) = 0 is: a method that takes one step from a motion and tells how wrong
 //! the step may be. [`super::adaptive`] drives any of them, chosen at compile time.
 
-use crate::gaps::{Ramp, System};
+use crate::domains::{Ramp, System};
 use crate::multibody::factor::ZeroPivot;
 use crate::multibody::planar::Pose;
 use serde::{Deserialize, Serialize};

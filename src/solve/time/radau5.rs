@@ -12,7 +12,7 @@
 
 use super::implicit::largest;
 use super::method::{Method, Motion, StepFailure, Work};
-use crate::gaps::{Drive, Ramp, System};
+use crate::domains::{Drive, Ramp, System};
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, forces};
 use nalgebra::{Complex, Matrix3, Vector3};

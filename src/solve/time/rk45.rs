@@ -5,7 +5,7 @@
 
 use super::dormand_prince::{DormandPrince, SecondOrder};
 use super::method::{Method, Motion, StepFailure, Work};
-use crate::gaps::{Drive, Ramp, System};
+use crate::domains::{Drive, Ramp, System};
 use crate::multibody::forces;
 use crate::multibody::planar::Pose;
 use crate::solve::{DIRECTIONS, SolveError};

@@ -25,7 +25,7 @@ pub(in crate::solve) mod tableau;
 
 pub use super::method::Motion;
 use super::method::{Method, StepFailure, Work};
-use crate::gaps::{Drive, Ramp, System};
+use crate::domains::{Drive, Ramp, System};
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, forces};
 use crate::solve::linear::{LinearSolver, Recursion};

@@ -10,7 +10,7 @@ use super::adaptive::{FLOOR, MAX_REJECTED, contact_error, dragged};
 use super::method::Motion;
 use super::rodas4::lanes::{Lane, LaneRodas4};
 use super::step_size;
-use crate::gaps::{Ramp, System};
+use crate::domains::{Ramp, System};
 use crate::multibody::lanes::LANES;
 
 /// Exponent of the step-size rule: the estimated error falls with the fourth power of the step.
@@ -71,7 +71,7 @@ impl<'a> Running<'a> {
             tol,
             watcher,
             mass: system.model.bodies.iter().map(|b| b.mass).sum(),
-            contacts: (0..system.gaps.len()).any(|g| system.touching(g).is_some()),
+            contacts: (0..system.members.len()).any(|g| system.touching(g).is_some()),
             s: 0.0,
             h,
             rejected: 0,

@@ -1,7 +1,7 @@
 //! Lines of combs, gaps, stops and what domains have of their own.
 
 use super::{OfStructure, unmirrored};
-use crate::gaps::elements;
+use crate::domains::elements;
 use crate::structure::{Beam, GapVoltage, NodeId};
 use std::collections::{BTreeMap, HashMap, HashSet};
 

@@ -1,6 +1,6 @@
 //! What equilibria of variants side by side are found with.
 
-use crate::gaps::System;
+use crate::domains::System;
 use crate::multibody::lanes::joint::LanePlaced;
 use crate::multibody::lanes::{Eight, LANES, LaneMatrix, LaneModel, LanePose, STILL};
 use crate::multibody::planar::Pose;
@@ -62,7 +62,7 @@ impl LaneEquilibrium {
             vanished: [false; LANES],
             blocks: acted.iter().flat_map(between).collect(),
             acted,
-            gaps: first.gaps.len(),
+            gaps: first.members.len(),
             q: vec![Pose::zeros(); n],
             r: vec![Pose::zeros(); n],
             own: BlockMatrix::new(pattern),
@@ -75,7 +75,7 @@ impl LaneEquilibrium {
         self.model.fits(&system.model)
             && system.electrics.inputs.is_empty()
             && self.expansion.len() == system.electrics.heating.heaters.len()
-            && self.gaps == system.gaps.len()
+            && self.gaps == system.members.len()
             && self.acted == system.acted_on()
     }
 }

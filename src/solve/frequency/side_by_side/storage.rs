@@ -1,7 +1,7 @@
 //! What modes of variants side by side are found with.
 
 use super::ritz::{MOST, Small};
-use crate::gaps::System;
+use crate::domains::System;
 use crate::multibody::lanes::joint::LanePlaced;
 use crate::multibody::lanes::{Eight, LANES, LaneMatrix, LaneModel, LanePose, LanePrecise, PrecisePose, STILL};
 use crate::multibody::planar::Pose;

@@ -4,8 +4,8 @@
 //! values with their derivatives, so that partials are those of the numbers that the step returns.
 
 use super::stages::Stages;
+use crate::domains::{Drive, Ramp};
 use crate::equations::Joints;
-use crate::gaps::{Drive, Ramp};
 use crate::multibody::planar::Pose;
 use crate::multibody::relative::kinematics::Placed;
 use crate::multibody::relative::number::Dual;

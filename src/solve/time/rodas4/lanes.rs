@@ -15,7 +15,7 @@ pub use storage::{Lane, LaneRodas4};
 use kernels::{Task, Work};
 
 use super::tableau::{ALPHA, moves_on};
-use crate::gaps::{Ramp, System};
+use crate::domains::{Ramp, System};
 use crate::multibody::lanes::{LANES, across};
 use crate::solve::time::method::Motion;
 
@@ -25,7 +25,7 @@ impl LaneRodas4 {
         self.model.fits(&system.model)
             && system.electrics.inputs.is_empty()
             && self.heat.count() == system.electrics.heating.heaters.len()
-            && self.drives[0].volts.len() == system.gaps.len()
+            && self.drives[0].volts.len() == system.members.len()
             && self.acted == system.acted_on()
     }
 

@@ -2,7 +2,7 @@
 
 use super::stages::Stages;
 use super::tableau::GAMMA;
-use crate::gaps::{Drive, Ramp, System};
+use crate::domains::{Drive, Ramp, System};
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, Model, Pattern};
 use crate::solve::linear::LinearSolver;

@@ -1,10 +1,10 @@
 //! Free strains of heated beams in each lane: exponentials variant by variant, what they do to each heater in all lanes at once.
 //!
-//! As [`crate::gaps::drive::Ramp`] has them for sources that hold their voltages: towards a rise that stays the same.
+//! As [`crate::domains::drive::Ramp`] has them for sources that hold their voltages: towards a rise that stays the same.
 
-use crate::gaps::Ramp;
-use crate::gaps::lag::Lag;
-use crate::gaps::thermal::Heater;
+use crate::domains::Ramp;
+use crate::domains::lag::Lag;
+use crate::domains::thermal::Heater;
 use crate::multibody::lanes::{Eight, LANES, Real, Wide};
 
 /// Time constants that a heater is compared with: those of the last heaters.

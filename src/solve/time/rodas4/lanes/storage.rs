@@ -2,7 +2,7 @@
 
 use super::heat::LaneHeat;
 use super::motion::{LaneMotion, Norms};
-use crate::gaps::{Drive, Ramp, System};
+use crate::domains::{Drive, Ramp, System};
 use crate::multibody::lanes::joint::LanePlaced;
 use crate::multibody::lanes::{Eight, LANES, LaneMatrix, LaneModel, LanePose, STILL, Wide, load};
 use crate::multibody::planar::Pose;

@@ -1,4 +1,4 @@
-//! Gap functions: what heat and voltage do to a mechanism.
+//! Domains: what heat, voltage, contact and loads do to a mechanism.
 //!
 //! Two kinds (Popa et al., "Computationally efficient dynamic modeling of MEMS", Q4): a *rest offset* of a joint (thermal
 //! expansion ∝ V², residual stress) and a *force law* between two bodies (comb, plates, contact). Force laws come from a
@@ -14,6 +14,7 @@
 //! | [`capacitor`] | C(u) of a comb and of parallel plates |
 //! | [`contact`] | pressure between surfaces that touch |
 //! | [`domain`] | the trait of all that acts; [`member`]: which there are, and how each call finds its own |
+//! | [`dashpot`] | a damper to the ground |
 //! | [`drawn`], [`element`] | from a drawing to them; elements of their own |
 //! | [`electrodes`], [`facing_beams`], [`stop_pair`] | combs and plates; beams that face each other; stops |
 //! | [`load`], [`point_force`], [`moving_frame`] | dead loads; forces that sources give; the motion of the frame |

@@ -16,8 +16,8 @@ use nalgebra::Vector2;
 pub struct System {
     /// Bodies and joints.
     pub model: Model,
-    /// Gaps, in the order of [`Drive::volts`].
-    pub gaps: Vec<Member>,
+    /// What acts across gaps and on bodies, in the order of [`Drive::volts`]: gaps first.
+    pub members: Vec<Member>,
     /// Dead loads.
     pub loads: Vec<Load>,
     /// Ports, sources, heaters.
@@ -53,7 +53,7 @@ impl System {
     /// has its own way with joints needs only this of a system.
     pub fn add_body_forces(&self, q: &[Pose], drive: &Drive, r: &mut [Pose]) {
         let at = self.at(q);
-        for (gap, &volts) in self.gaps.iter().zip(&drive.volts).filter(|(gap, volts)| gap.acts(**volts)) {
+        for (gap, &volts) in self.members.iter().zip(&drive.volts).filter(|(gap, volts)| gap.acts(**volts)) {
             gap.add_force(at, volts, r);
         }
         for load in &self.loads {
@@ -65,13 +65,13 @@ impl System {
     /// True where [`System::add_body_forces`] adds anything.
     pub(crate) fn is_acted_on(&self, drive: &Drive) -> bool {
         !(self.loads.is_empty() && drive.inputs.is_empty() && drive.push.is_empty())
-            || self.gaps.iter().zip(&drive.volts).any(|(gap, volts)| gap.acts(*volts))
+            || self.members.iter().zip(&drive.volts).any(|(gap, volts)| gap.acts(*volts))
     }
 
     /// `tangent +=` the share of gaps, contacts and dead loads in ∂r/∂q.
     pub fn add_body_tangent(&self, q: &[Pose], drive: &Drive, tangent: &mut BlockMatrix<f64, 3>) {
         let (at, pattern) = (self.at(q), &self.model.pattern);
-        for (gap, &volts) in self.gaps.iter().zip(&drive.volts).filter(|(gap, volts)| gap.acts(**volts)) {
+        for (gap, &volts) in self.members.iter().zip(&drive.volts).filter(|(gap, volts)| gap.acts(**volts)) {
             gap.add_tangent(at, volts, pattern, tangent);
         }
         for load in &self.loads {
@@ -111,7 +111,7 @@ impl System {
     /// The share of gaps, loads and inputs in that, held directions not removed.
     pub fn add_body_drive_force(&self, q: &[Pose], drive: &Drive, change: &Drive, out: &mut [Pose]) {
         let at = self.at(q);
-        for ((gap, &volts), &dv) in self.gaps.iter().zip(&drive.volts).zip(&change.volts) {
+        for ((gap, &volts), &dv) in self.members.iter().zip(&drive.volts).zip(&change.volts) {
             if dv != 0.0 {
                 gap.add_force_change(at, volts, dv, out);
             }
@@ -149,7 +149,7 @@ impl System {
         for load in &self.loads {
             load.levers(at, drive.load, &mut lever);
         }
-        for (gap, &volts) in self.gaps.iter().zip(&drive.volts) {
+        for (gap, &volts) in self.members.iter().zip(&drive.volts) {
             gap.levers(at, volts, &mut lever);
         }
     }
@@ -162,7 +162,7 @@ impl System {
                 bodies.push(k);
             }
         };
-        self.gaps.iter().for_each(|gap| gap.bodies(&mut see));
+        self.members.iter().for_each(|gap| gap.bodies(&mut see));
         self.loads.iter().for_each(|load| load.bodies(&mut see));
         bodies.sort_unstable();
         bodies.dedup();

@@ -10,17 +10,17 @@ use crate::multibody::forces;
 use crate::multibody::planar::Pose;
 
 impl System {
-    /// Potential Π(q) at a drive [J]; see [`crate::gaps::energy`].
+    /// Potential Π(q) at a drive [J]; see [`crate::domains::energy`].
     pub fn potential(&self, q: &[Pose], drive: &Drive) -> f64 {
         let mut sum = forces::strain_energy(&self.model, q, &drive.rest());
-        for g in 0..self.gaps.len() {
+        for g in 0..self.members.len() {
             if drive.volts[g] != 0.0 {
                 sum -= 0.5 * self.capacitance(g, q) * drive.volts[g] * drive.volts[g];
             }
         }
         sum += self.contact_energy(q);
         let at = self.at(q);
-        for (gap, &volts) in self.gaps.iter().zip(&drive.volts) {
+        for (gap, &volts) in self.members.iter().zip(&drive.volts) {
             sum += gap.energy(at, volts);
         }
         for load in &self.loads {

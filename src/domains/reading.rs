@@ -7,52 +7,52 @@ use crate::multibody::planar::Pose;
 impl System {
     /// Capacitance of a gap [F].
     pub fn capacitance(&self, gap: usize, q: &[Pose]) -> f64 {
-        self.gaps[gap].capacitance(self.at(q))
+        self.members[gap].capacitance(self.at(q))
     }
 
     /// Change of a gap's capacitance with a change `dq` of the configuration [F].
     pub fn capacitance_slope(&self, gap: usize, q: &[Pose], dq: &[Pose]) -> f64 {
-        self.gaps[gap].capacitance_change(self.at(q), dq)
+        self.members[gap].capacitance_change(self.at(q), dq)
     }
 
     /// Distance left in a gap [m]: overlap of a comb, gap of plates, smallest gap of facing beams, way left to the nearer side of
     /// a stop.
     pub fn distance(&self, gap: usize, q: &[Pose]) -> f64 {
-        self.gaps[gap].distance(self.at(q))
+        self.members[gap].distance(self.at(q))
     }
 
     /// Change of a gap's distance with a change `dq` of the configuration [m].
     pub fn distance_slope(&self, gap: usize, q: &[Pose], dq: &[Pose]) -> f64 {
-        self.gaps[gap].distance_change(self.at(q), dq)
+        self.members[gap].distance_change(self.at(q), dq)
     }
 
     /// Force with which `volts` [V] pull the two sides of a gap together, ½V²·∂C/∂u, u the approach of both ends alike [N]; 0 of
     /// a stop.
     pub fn pull(&self, gap: usize, q: &[Pose], volts: f64) -> f64 {
-        0.5 * volts * volts * self.gaps[gap].pull(self.at(q))
+        0.5 * volts * volts * self.members[gap].pull(self.at(q))
     }
 
     /// Change of [`Self::pull`] with a change `dq` of the configuration and `dv` [V] of the voltage [N].
     pub fn pull_slope(&self, gap: usize, q: &[Pose], volts: f64, dq: &[Pose], dv: f64) -> f64 {
-        let (slope, change) = self.gaps[gap].pull_and_change(self.at(q), dq);
+        let (slope, change) = self.members[gap].pull_and_change(self.at(q), dq);
         volts * slope * dv + 0.5 * volts * volts * change
     }
 
     /// The mean load with which voltage closes a gap between facing beams, less that of contact [N/m], and the least distance [m]; none for
     /// other gaps.
     pub fn line_load(&self, gap: usize, q: &[Pose], volts: f64) -> Option<(f64, f64)> {
-        self.gaps[gap].line_load(self.at(q), volts)
+        self.members[gap].line_load(self.at(q), volts)
     }
 
     /// Distance at which the parts of a gap touch, and the least one that its law of contact knows [m]; none: they never do.
     pub fn touching(&self, gap: usize) -> Option<[f64; 2]> {
-        self.gaps[gap].touching()
+        self.members[gap].touching()
     }
 
     /// What is left of a gap until it could not be closed further [m]: its distance; of a stop the way and, beyond it, what a touch
     /// takes.
     pub fn room(&self, gap: usize, q: &[Pose]) -> f64 {
-        self.gaps[gap].room(self.at(q))
+        self.members[gap].room(self.at(q))
     }
 
     /// True when a gap is so far closed that its contact force acts.
@@ -62,7 +62,7 @@ impl System {
 
     /// The first gap that is closed beyond the range of its law of contact, with the distance that is left [m].
     pub fn overrun(&self, q: &[Pose]) -> Option<(usize, f64)> {
-        (0..self.gaps.len()).find_map(|g| {
+        (0..self.members.len()).find_map(|g| {
             let [_, least] = self.touching(g)?;
             let left = self.distance(g, q);
             (left < least).then_some((g, left))
@@ -71,11 +71,11 @@ impl System {
 
     /// Energy stored where parts touch [J].
     pub fn contact_energy(&self, q: &[Pose]) -> f64 {
-        self.gaps.iter().map(|gap| gap.contact_energy(self.at(q))).sum()
+        self.members.iter().map(|gap| gap.contact_energy(self.at(q))).sum()
     }
 
     /// Work of the contact forces at `q` over a small change `dq`, each gap's taken positive [J].
     pub fn contact_work(&self, q: &[Pose], dq: &[Pose]) -> f64 {
-        self.gaps.iter().map(|gap| gap.contact_work(self.at(q), dq).abs()).sum()
+        self.members.iter().map(|gap| gap.contact_work(self.at(q), dq).abs()).sum()
     }
 }
