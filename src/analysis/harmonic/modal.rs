@@ -236,6 +236,22 @@ impl Sum {
         seen * pushed * nearest * if self.rates[row] { s.norm() } else { 1.0 }
     }
 
+    /// What a mode brings to a row at rest, for the push at its own frequency: its peak is so high times its quality. Not a number for one that
+    /// there is not.
+    pub(crate) fn share(&self, row: usize, mode: usize) -> Complex<f64> {
+        let Some(lambda) = self.lambda.get(mode) else { return Complex::from(f64::NAN) };
+        let s = Complex::new(0.0, lambda.max(0.0).sqrt());
+        let force: Complex<f64> =
+            self.laws.iter().enumerate().map(|(c, law)| law.factor(s) * self.push[(mode, c)]).sum();
+        force * self.seen[(row, mode)] / *lambda
+    }
+
+    /// λ of a mode [rad²/s²], and one over its quality [1]; not numbers for one that there is not.
+    pub(crate) fn resonance(&self, mode: usize) -> (f64, f64) {
+        let lambda = self.lambda.get(mode).copied().unwrap_or(f64::NAN);
+        (lambda, self.damping.get((mode, mode)).map_or(f64::NAN, |damping| damping.abs() / lambda.max(0.0).sqrt()))
+    }
+
     /// Nothing damps any of its modes.
     pub(super) fn undamped(&self) -> bool {
         self.damping.iter().all(|d| *d == 0.0)

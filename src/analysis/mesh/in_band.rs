@@ -8,7 +8,10 @@
 //! |H| + |dH/d ln f|
 //! ```
 //! which is e for a curve that is e too high, and e too for one that is shifted by the share e. Frequencies next to a resonance of the
-//! first mesh are left out: what is there is known from the frequency of the mode.
+//! first mesh are left out: what is there is known from the frequency of the mode, and from what it brings to the signal, which is compared
+//! as well, relative to itself where its peak stands above what the others bring there: a mode next to a zero is a peak and a zero of its own only
+//! where the two are told apart. Modes within a hundredth of one another
+//! are taken together, as they may be mixed in any way.
 //!
 //! The responses that are compared are sums over the modes to twice the band with static correction: what such a sum leaves out is the
 //! same on both meshes. With too many modes in the band they are exact, and no modes are compared.
@@ -25,7 +28,9 @@ use crate::refine::counted;
 use crate::refine::doubling::{self, Output};
 use crate::refine::model_order::{self, Aim, ModelOrder};
 use nalgebra::Complex;
+use std::cell::OnceCell;
 use std::f64::consts::TAU;
+use std::ops::Range;
 
 /// Frequencies that are compared.
 const COMPARED: usize = 24;
@@ -36,6 +41,10 @@ const NEAR: f64 = 0.02;
 /// Signals that are compared at most, and modes.
 const MOST_SIGNALS: usize = 32;
 const MOST_MODES: usize = 64;
+/// Modes are alike whose frequencies differ by a smaller share.
+const ALIKE: f64 = 0.01;
+/// Modes below this share of the highest λ are rigid motions.
+const RIGID: f64 = 1e-9;
 /// Sizes below this share of the largest of a signal over the band are errors of that.
 const SMALL: f64 = 1e-9;
 
@@ -111,6 +120,8 @@ struct Sample {
     inside: usize,
     /// Modes of a sum.
     modes: usize,
+    /// Groups of modes within the band whose frequencies are alike, by the first mesh.
+    groups: OnceCell<Vec<Range<usize>>>,
 }
 
 impl Sample {
@@ -130,7 +141,7 @@ impl Sample {
             frequencies = apart;
         }
         frequencies.retain(|f| exact.at(Complex::new(0.0, TAU * f)).is_some());
-        Ok(Self { frequencies, inside, modes })
+        Ok(Self { frequencies, inside, modes, groups: OnceCell::new() })
     }
 
     fn outputs(&self, model: &Compiled, options: &HarmonicOptions) -> Result<Vec<Output>, AnalysisError> {
@@ -146,6 +157,11 @@ impl Sample {
                 *output = Output { value: frequency(lambda), scale: scale(frequency(lambda)) };
             }
             sum = Some(Sum::new(&exact, &found)?);
+            let inside = &found.lambda[..self.inside.min(found.lambda.len())];
+            self.groups.get_or_init(|| groups(inside));
+        }
+        if let Some(sum) = &sum {
+            (0..exact.rows.len()).for_each(|row| outputs.extend(self.shares(sum, row)));
         }
         let mut values: Vec<Vec<(Complex<f64>, f64)>> = Vec::new();
         for frequency in &self.frequencies {
@@ -176,4 +192,35 @@ impl Sample {
         }
         Ok(outputs)
     }
+
+    /// What the modes within the band bring to a row, those that are alike together.
+    fn shares(&self, sum: &Sum, row: usize) -> Vec<Output> {
+        let groups = self.groups.get().map_or(&[][..], Vec::as_slice);
+        let shares: Vec<Complex<f64>> =
+            groups.iter().map(|group| group.clone().map(|j| sum.share(row, j)).sum()).collect();
+        let most = shares.iter().map(|share| share.norm()).filter(|size| size.is_finite()).fold(0.0, f64::max);
+        let lambda: Vec<f64> = groups.iter().map(|group| sum.resonance(group.start).0).collect();
+        let output = |(k, share): (usize, &Complex<f64>)| {
+            // what the others bring there, above which its peak stands or not
+            let others = (0..shares.len()).filter(|other| *other != k);
+            let level: f64 = others.map(|j| shares[j].norm() * (lambda[j] / (lambda[j] - lambda[k])).abs()).sum();
+            let seen = level * sum.resonance(groups[k].start).1;
+            let scale = share.norm().max(seen).max(modal::UNSEEN * most).max(f64::MIN_POSITIVE);
+            [Output { value: share.re, scale }, Output { value: share.im, scale }]
+        };
+        shares.iter().enumerate().flat_map(output).collect()
+    }
+}
+
+/// Groups of modes that are alike; rigid motions are in none.
+fn groups(lambda: &[f64]) -> Vec<Range<usize>> {
+    let highest = lambda.last().copied().unwrap_or(0.0);
+    let first = lambda.iter().position(|l| *l > RIGID * highest).unwrap_or(lambda.len());
+    let alike = |a: &f64, b: &f64| *b <= (1.0 + ALIKE).powi(2) * a;
+    let mut start = first;
+    let group = |modes: &[f64]| {
+        start += modes.len();
+        start - modes.len()..start
+    };
+    lambda[first..].chunk_by(alike).map(group).collect()
 }
