@@ -6,6 +6,7 @@
 mod ac;
 mod ac_report;
 mod access;
+mod busiest;
 mod chance;
 mod chart;
 mod check;

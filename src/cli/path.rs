@@ -3,7 +3,7 @@
 use super::failure::Failure;
 use super::model::{Context, ModelArgs, Named, warn_of, warn_of_mesh};
 use super::output::OutputArgs;
-use super::{progress, report, statics, value};
+use super::{busiest, progress, report, statics, value};
 use bimorph::analysis::continuation::{ContinuationRequest, ContinuationResult, CriticalPoint, Growing, trace};
 use bimorph::analysis::mesh::path_fitted;
 use bimorph::analysis::statics::NodeMotion;
@@ -134,8 +134,9 @@ impl PathCommand {
         };
         let bar = progress::bar("path");
         if request.signals.is_empty() {
+            request.signals = busiest::every(first);
             let found = trace(first, &request, &mut progress::watch_with(&bar, CHEAPER))?;
-            request.signals = busiest(&found);
+            request.signals = busiest::busiest(&found.signals);
         }
         let result = path_fitted(first, &request, &mut progress::watch_with(&bar, CHEAPER));
         bar.finish_and_clear();
@@ -320,12 +321,6 @@ impl PathCommand {
         );
         text
     }
-}
-
-/// x and y of the node that is displaced most at the end.
-fn busiest(result: &ContinuationResult) -> Vec<String> {
-    let most = result.last.iter().max_by(|a, b| a.1.x.hypot(a.1.y).total_cmp(&b.1.x.hypot(b.1.y)));
-    most.map(|(name, _)| vec![format!("{name}.x"), format!("{name}.y")]).unwrap_or_default()
 }
 
 #[cfg(test)]

@@ -46,7 +46,7 @@ fn tables_are_those_of_this_process() {
     for wrong in ["--detach", "--share", "--release-after 5"] {
         assert_eq!(bench.run(&format!("{SWEEP}:5 {wrong}")).status, 2, "{wrong} is nothing without --to");
     }
-    assert!(bench.run(&format!("{SWEEP}:5 {to} --release-after 0")).stderr.contains("above 0 s"));
+    assert!(bench.run(&format!("{SWEEP}:5 {to} --release-after 0")).stderr.contains("from 1 ms"));
 }
 
 /// Ctrl-C lets go of a sweep and says how to go on; it goes on until it is cancelled, and what it has is a table all the same.

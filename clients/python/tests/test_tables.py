@@ -80,3 +80,26 @@ def test_a_table_goes_to_parquet_and_back(client: bimorph.Client, tmp_path: path
     assert moved[0] == 0.0 and moved[1] != 0.0 and moved[4] == pytest.approx(moved[1] / 2, rel=1e-2)
     with pytest.raises(bimorph.BimorphError, match="W.v"):
         client.sweep(netlist, {"W.v": [0.0]}, bimorph.Static(outputs=["m.x"]))
+
+
+def test_points_that_go_together_and_options(client: bimorph.Client) -> None:
+    """Names in a tuple are a list of points, which is an axis like any other; options vary as parameters do, flags as True and False."""
+    netlist = bimorph.Netlist.text(PLATE)
+    held = bimorph.Static(outputs=["m.x"])
+    corners = {("k", "drive.v"): [(1.0, 0.0), (2.0, 3.0)], "option.tol": [1e-2, 1e-4]}
+    table = client.sweep(netlist, corners, held)
+    assert table.parameters == ["k", "drive.v", "option.tol"]
+    assert [tuple(row.parameters.values()) for row in table.rows] == [
+        (1.0, 0.0, 1e-2),
+        (1.0, 0.0, 1e-4),
+        (2.0, 3.0, 1e-2),
+        (2.0, 3.0, 1e-4),
+    ]
+    alone = client.sweep(netlist, {"k": [2.0]}, bimorph.Static(outputs=["m.x"], voltages={"drive": 3.0}), tol=1e-4)
+    assert table.rows[3].results == alone.rows[0].results
+    flags = client.sweep(netlist, {"option.linear": [True, False], "k": [1.0]}, held)
+    assert flags.column("option.linear") == ["true", "false"]
+    with pytest.raises(ValueError, match="2 names"):
+        client.sweep(netlist, {("k", "drive.v"): [(1.0,)]}, held)
+    with pytest.raises(bimorph.BimorphError, match="one of tol, band"):
+        client.sweep(netlist, {"option.tool": [1.0]}, held)

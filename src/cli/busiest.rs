@@ -1,0 +1,41 @@
+//! The node that moves most on a path: what is shown where nobody says.
+
+use bimorph::compile::Compiled;
+
+/// Nodes among which it is sought.
+const MOST_NODES: usize = 1000;
+
+/// x and y of every node.
+pub(super) fn every(compiled: &Compiled) -> Vec<String> {
+    let nodes = compiled.structure.nodes.iter().filter(|node| node.mechanical).take(MOST_NODES);
+    nodes.flat_map(|node| [format!("{}.x", node.name), format!("{}.y", node.name)]).collect()
+}
+
+/// x and y of the node that is displaced most anywhere on the way, by the signals of [`every`] one.
+pub(super) fn busiest(signals: &[(String, String, Vec<f64>)]) -> Vec<String> {
+    let far = |pair: &[(String, String, Vec<f64>)]| {
+        let at = pair[0].2.iter().zip(&pair[1].2);
+        at.map(|(x, y)| x.hypot(*y)).fold(0.0, f64::max)
+    };
+    let pair = signals.chunks_exact(2).max_by(|a, b| far(a).total_cmp(&far(b)));
+    pair.map(|pair| pair.iter().map(|(name, _, _)| name.clone()).collect()).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What moves on the way and is back at its end counts; at its end nothing tells nodes apart.
+    #[test]
+    fn the_way_counts() {
+        let signal = |name: &str, values: &[f64]| (name.to_owned(), "m".to_owned(), values.to_vec());
+        let signals = [
+            signal("m.x", &[2e-6, 1e-6, 0.0]),
+            signal("m.y", &[0.0, 0.0, 0.0]),
+            signal("e.x", &[0.0, 0.0, 0.0]),
+            signal("e.y", &[0.0, 0.0, 0.0]),
+        ];
+        assert_eq!(busiest(&signals), ["m.x", "m.y"]);
+        assert!(busiest(&[]).is_empty());
+    }
+}
