@@ -266,8 +266,7 @@ fn the_told_error_is_the_mesh() {
 }
 
 /// A mode that a force hardly excites, next to a zero, is a peak above what the others bring: its height is within the tolerance, and the zero, where
-/// the beams swing as if the plate between them were held, is told. Before, peaks were 1 % off at 1e-3, and zeros were told at 1e-4 alone.
-/// The reference has 96 segments a beam.
+/// the beams swing as if the plate were held, is told (before: 1 % off at 1e-3, zeros at 1e-4 alone). The reference has 96 segments a beam.
 #[test]
 fn weak_peaks_and_their_zeros() {
     let text = "process p = [Youngsmodulus=160e9 density=2330 h=20u viscosity=1.8e-5 fluid=2u]\nplate2d p [s] [l=100u w=100u]\n\

@@ -26,7 +26,7 @@ use std::fmt::Write;
 /// y [m] and rz [rad] from the drawn place; "temperatures_k", "currents_a", "charges_c" and "permanent_strains" by name.
 ///
 /// The estimated error is of the displacement of each node as a vector, of a thirtieth of the largest where a node moves less. A small
-/// component, or a small rotation beside large displacements, may be off by more of itself: take a smaller --tol for it.
+/// component, or a small rotation beside large displacements, may be off by more of itself: take a smaller tolerance for it.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  bimorph static bank.net --port heat=2.2\n  \
                         bimorph static stage.net --set F=100u --json\n  \
