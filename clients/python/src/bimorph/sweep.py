@@ -255,7 +255,8 @@ def _axes(parameters: Axes) -> list[Any]:
     axes = []
     for key, values in parameters.items():
         names = (key,) if isinstance(key, str) else tuple(key)
-        rows = [(value,) for value in values] if isinstance(key, str) else [tuple(row) for row in values]
+        points: Sequence[Any] = values
+        rows: list[tuple[Value, ...]] = [(point,) if isinstance(key, str) else tuple(point) for point in points]
         wrong = next((row for row in rows if len(row) != len(names)), None)
         if not names or wrong is not None:
             raise ValueError(f"{key!r}: expected a value for each of {len(names)} names at every point, got {wrong!r}")
