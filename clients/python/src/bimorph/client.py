@@ -183,8 +183,9 @@ class Client:
         With ``share`` it is the one that computes the same, if this client has one there, running or done. ``release_after`` [s] lets the
         server cancel it when it has had no connection of this client for so long; None: it runs on.
         """
-        if release_after is not None and not release_after > 0:
-            raise ValueError(f"release_after: expected a time above 0 s, or None, got {release_after}")
+        if release_after == 0:
+            # on the wire that means never
+            raise ValueError("release_after: expected a time above 0 s, or None, got 0")
         request = jobs_pb2.SubmitJobRequest(
             bundle=self._bundle(netlist, include),
             options=options_to_wire(set or {}, options),
