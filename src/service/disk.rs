@@ -1,6 +1,7 @@
 //! What is done to files so that they outlive the machine: bytes are written and waited for before anything names them or is said of
 //! them. All of it goes through here, in whose tests the order can be looked at.
 
+use crate::jobs::sweep::journal::{Journal, JournalError, Kept};
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write};
 use std::os::unix::fs::OpenOptionsExt;
@@ -20,6 +21,7 @@ pub(super) struct Disk {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Done {
     Written(std::path::PathBuf, Vec<u8>),
+    Added(std::path::PathBuf, Vec<u8>),
     Synced(std::path::PathBuf),
     Renamed(std::path::PathBuf, std::path::PathBuf),
     FolderSynced(std::path::PathBuf),
@@ -33,11 +35,6 @@ impl Disk {
             #[cfg(test)]
             done: std::sync::Mutex::default(),
         }
-    }
-
-    /// Whether it is waited for.
-    pub(super) fn waits(&self) -> bool {
-        self.sync
     }
 
     /// Writes a file, over what it held before. When this returns its bytes outlive the machine; a new name does not yet.
@@ -54,6 +51,41 @@ impl Disk {
             file.sync_data()?;
             #[cfg(test)]
             self.note(Done::Synced(path.to_owned()));
+        }
+        Ok(())
+    }
+
+    /// Opens the journal of a sweep, or makes it, with the points that it has. When this returns these outlive the machine, and so does
+    /// its first line: without it nothing behind it would be read. A new name does not yet.
+    ///
+    /// # Errors
+    /// What the system said.
+    pub(super) fn journal(&self, path: &Path, sweep: &str) -> Result<(Journal, Vec<Kept>), JournalError> {
+        let failed = |source| JournalError::Io { path: path.to_owned(), source };
+        drop(private().open(path).map_err(failed)?);
+        let (journal, points) = Journal::open(path, sweep, true)?;
+        #[cfg(test)]
+        self.note(Done::Written(path.to_owned(), fs::read(path).map_err(failed)?));
+        if self.sync {
+            journal.sync()?;
+            #[cfg(test)]
+            self.note(Done::Synced(path.to_owned()));
+        }
+        Ok((journal, points))
+    }
+
+    /// Adds lines to a journal, all or none. When this returns they outlive the machine.
+    ///
+    /// # Errors
+    /// What the system said.
+    pub(super) fn append(&self, journal: &Journal, lines: &[u8]) -> Result<(), JournalError> {
+        journal.keep_all(lines, self.sync)?;
+        #[cfg(test)]
+        {
+            self.note(Done::Added(journal.path().to_owned(), lines.to_vec()));
+            if self.sync {
+                self.note(Done::Synced(journal.path().to_owned()));
+            }
         }
         Ok(())
     }

@@ -172,6 +172,20 @@ impl Journal {
         self.write(lines, |_| sync)
     }
 
+    /// Waits until what it has is on the disk.
+    ///
+    /// # Errors
+    /// [`JournalError::Io`].
+    pub fn sync(&self) -> Result<(), JournalError> {
+        let open = self.file.lock().unwrap_or_else(PoisonError::into_inner);
+        open.file.sync_data().map_err(|source| self.failed(source))
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
     /// Bytes of whole lines that it has.
     pub fn bytes(&self) -> u64 {
         self.file.lock().unwrap_or_else(PoisonError::into_inner).good
@@ -206,12 +220,17 @@ impl Journal {
     }
 }
 
-/// The points of a journal, and how many of its bytes they are. A line that is cut off, and a head that is, are as if they had never been.
+/// The points of a journal, and how many of its bytes they are. A line that is cut off, and a head that is, or that a disk left blank, are as
+/// if they had never been.
 fn read(path: &Path, name: &str, bytes: &[u8]) -> Result<(Vec<Kept>, usize), JournalError> {
     let whole = bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |last| last + 1);
     let mut lines = bytes[..whole].split_inclusive(|byte| *byte == b'\n');
     let (mut known, mut good) = (Vec::new(), 0);
     if let Some(line) = lines.next() {
+        // room that a disk made and never filled: the power went
+        if line.contains(&0) {
+            return Ok((known, good));
+        }
         let head: Option<Head> = serde_json::from_slice(line).ok();
         if head.is_none_or(|head| head.sweep != name) {
             return Err(JournalError::Other { path: path.to_owned() });

@@ -2,7 +2,6 @@
 //! and `jobs/ID.end` how it ended. A job is there when its first file is; whatever moment the server ends at, a row that was given out is in
 //! the journal, and a job without its last file goes on. All of it counts among the bytes of the folder of states.
 
-use super::super::disk::private;
 use super::super::snapshots::checksum;
 use super::super::store::Store;
 use super::super::survey::is_id;
@@ -197,9 +196,7 @@ impl JobFile {
     pub(super) fn open(&mut self) -> io::Result<Vec<Kept>> {
         let path = self.path("rows");
         let before = self.size("rows");
-        // nobody else may read it
-        drop(private().open(&path)?);
-        let (journal, rows) = Journal::open(&path, &self.sweep, true).map_err(io_error)?;
+        let (journal, rows) = self.store.disk().journal(&path, &self.sweep).map_err(io_error)?;
         let bytes = journal.bytes();
         if bytes > before {
             self.take(usize::try_from(bytes - before).unwrap_or(usize::MAX))?;
@@ -227,10 +224,7 @@ impl JobFile {
         let lines = journal::lines(rows)?;
         self.take(lines.len())?;
         let Some(journal) = &self.journal else { return Err(io::Error::other("its journal is closed")) };
-        journal
-            .keep_all(&lines, self.store.disk().waits())
-            .map_err(io_error)
-            .inspect_err(|_| self.give_back(lines.len()))
+        self.store.disk().append(journal, &lines).map_err(io_error).inspect_err(|_| self.give_back(lines.len()))
     }
 
     /// Keeps how it ended. When this returns it is on the disk. Its few bytes may go beyond the bound: what is full must be able to end.

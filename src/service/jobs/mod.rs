@@ -11,6 +11,8 @@ mod holders;
 mod job;
 mod older;
 mod pages;
+#[cfg(test)]
+mod power_cuts;
 mod reading;
 pub(super) mod registry;
 mod rows;

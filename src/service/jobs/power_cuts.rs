@@ -1,0 +1,89 @@
+//! A machine may lose its power at any moment of a job: a job that was answered is there, with every row that was given out, and one
+//! that was told to have ended has ended.
+
+use super::super::power_cuts::{Bytes, Machine};
+use super::super::store::Store;
+use super::asked::Asked;
+use super::folder::{self, End, Found};
+use crate::jobs::sweep::journal::Kept;
+use std::sync::Arc;
+
+const ID: &str = "0123456789abcdef0123456789abcdef";
+const REQUEST: &[u8] = b"what was asked";
+
+fn asked() -> Asked {
+    Asked {
+        owner: String::new(),
+        request: "by name".into(),
+        content: String::new(),
+        share: false,
+        release_after_s: 0.0,
+        sequence: 1,
+        submitted_ms: 0,
+        version: "0".into(),
+        sweep: "00000000000000000000000000000002".into(),
+        part: String::new(),
+        model: String::new(),
+        netlist: "a.net".into(),
+        points: 12,
+    }
+}
+
+fn row(point: usize) -> Kept {
+    let values = vec![("yoke.y".into(), "m".into(), Some(1e-9 / (1 + point) as f64))];
+    Kept { point, values, estimated_error: Some(1e-4), warning: "w".repeat(30 * point), error: None }
+}
+
+/// What was answered.
+#[derive(Debug, Clone, Copy)]
+enum Answered {
+    Job,
+    Rows(usize),
+    End,
+}
+
+/// Whenever the power goes, and whatever becomes of what was not waited for.
+#[test]
+fn nothing_that_a_job_gave_out_is_lost_with_the_power() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let store = Arc::new(Store::open(folder.path(), true, 1 << 20).expect("opens"));
+    let done = || store.disk().done.lock().expect("nobody panicked").clone();
+    let mut answered = Vec::new();
+    let mut file = folder::begin(&store, ID, &asked(), REQUEST).expect("there is room");
+    assert!(file.open().expect("opens").is_empty());
+    answered.push((Answered::Job, done().len()));
+    for (first, last) in [(0, 1), (1, 5), (5, 6), (6, 12)] {
+        file.append(&(first..last).map(row).collect::<Vec<_>>()).expect("kept");
+        answered.push((Answered::Rows(last), done().len()));
+    }
+    let end = End { code: 0, message: String::new(), rows: 12, failed: 0, ended_ms: 7, bytes: 0 };
+    file.end(&end).expect("kept");
+    answered.push((Answered::End, done().len()));
+    drop(file);
+    let done = done();
+    for power in 0..=done.len() {
+        let machine = Machine::after(&done[..power]);
+        let before = || answered.iter().filter(|(_, when)| *when <= power).map(|(what, _)| *what);
+        let rows = before().filter_map(|what| if let Answered::Rows(n) = what { Some(n) } else { None }).max();
+        for bytes in Bytes::ALL {
+            for new_names in [false, true] {
+                let case = format!("{bytes:?}, {new_names}, after {power} of {}", done.len());
+                let found = machine.found(folder.path(), bytes, new_names);
+                let store = Arc::new(Store::open(found.path(), true, 1 << 20).expect("opens"));
+                let Some(Found { asked: known, request, end, mut file, .. }) = folder::find(&store, ID) else {
+                    assert_eq!(before().count(), 0, "lost: {case}");
+                    continue;
+                };
+                assert_eq!((&known, &*request), (&asked(), REQUEST), "{case}");
+                let ended = before().any(|what| matches!(what, Answered::End));
+                assert!(!ended || end.as_ref().is_some_and(|end| end.bytes == file.row_bytes()), "goes on: {case}");
+                // an end that is there says how many rows there are, and so they are
+                let all = end.filter(|end| end.bytes == file.row_bytes()).map(|_| file.read_rows().expect(&case));
+                let there = file.open().unwrap_or_else(|error| panic!("{error}: {case}"));
+                assert!(there.len() >= rows.unwrap_or(0), "{} of {rows:?} rows: {case}", there.len());
+                assert!(there.iter().enumerate().all(|(k, kept)| *kept == row(k)), "{case}");
+                assert!(all.is_none_or(|all| all.len() == 12), "{case}");
+            }
+        }
+    }
+}
