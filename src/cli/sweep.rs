@@ -187,6 +187,10 @@ impl Sweep {
             return Ok((sweep::run(spec, bundle, options, &|p| report(bar, p))?, None));
         };
         let (journal, known) = Journal::open(&path, &journal::name(spec, bundle, options), self.resume)?;
+        if journal.damaged() > 0 {
+            let (lines, path) = (journal.damaged(), path.display());
+            bar.suspend(|| eprintln!("{path}: {lines} of its lines are damaged: their points are computed again"));
+        }
         if !known.is_empty() {
             bar.suspend(|| eprintln!("{} points are there from before", known.len()));
         }

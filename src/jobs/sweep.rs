@@ -12,6 +12,7 @@ mod distribution;
 mod error;
 mod family;
 pub mod journal;
+mod means;
 pub mod parse;
 pub mod part;
 mod pieces;

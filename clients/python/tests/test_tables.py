@@ -76,6 +76,8 @@ def test_a_table_goes_to_parquet_and_back(client: bimorph.Client, tmp_path: path
     assert back.column("m.x").to_pylist() == [row.results.get("m.x") for row in table.rows]
     assert back.column("drive.v").to_pylist() == [0.0, 1.0, 1e3] * 2
     assert back.schema.field("m.x").metadata == {b"unit": b"m"} and back.schema.metadata[b"parameters"] == b"2"
+    empty = bimorph.Table(table.parameters, table.results, table.units, [])
+    assert empty.to_arrow().schema.equals(table.to_arrow().schema, check_metadata=True)
     moved = table.column("m.x")
     assert moved[0] == 0.0 and moved[1] != 0.0 and moved[4] == pytest.approx(moved[1] / 2, rel=1e-2)
     with pytest.raises(bimorph.BimorphError, match="W.v"):

@@ -8,9 +8,9 @@ pub trait Crew: Sync {
     /// How many pieces it may run at once.
     fn size(&self) -> usize;
 
-    /// Runs the pieces 0 to `count`, each once, on any thread, and comes back when all are over. A crew that is told to stop leaves out the
-    /// rest.
-    fn run(&self, count: usize, piece: &(dyn Fn(usize) + Sync));
+    /// Runs the pieces 0 to `count`, each once, on any thread, and comes back when all are over. A piece says whether to go on: after one
+    /// that says no, and when the crew is told to stop, the rest are left out.
+    fn run(&self, count: usize, piece: &(dyn Fn(usize) -> bool + Sync));
 }
 
 /// Threads of its own, all at work at once.
@@ -38,7 +38,9 @@ impl Crew for Pool {
         self.0.current_num_threads()
     }
 
-    fn run(&self, count: usize, piece: &(dyn Fn(usize) + Sync)) {
-        self.0.install(|| (0..count).into_par_iter().for_each(piece));
+    fn run(&self, count: usize, piece: &(dyn Fn(usize) -> bool + Sync)) {
+        let run = |number| if piece(number) { Ok(()) } else { Err(()) };
+        // who said no has said why
+        let _ = self.0.install(|| (0..count).into_par_iter().try_for_each(run));
     }
 }

@@ -17,7 +17,7 @@ use crate::netlist::{Setting, Source};
 use crate::refine::model_order::ModelOrder;
 use crate::structure::Beam;
 use std::borrow::Cow;
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 /// Shares of the tolerance for which meshes are searched, from coarse to fine.
 const SHARES: [f64; 3] = [0.6, 0.2, 0.06];
@@ -26,7 +26,7 @@ const SHARES: [f64; 3] = [0.6, 0.2, 0.06];
 pub(super) struct Family<'a> {
     spec: &'a SweepSpec,
     source: &'a Source,
-    options: &'a CompileOptions,
+    options: Arc<CompileOptions>,
     /// The analysis at the middle of the grid, for which meshes are searched.
     analysis: Cow<'a, SweepAnalysis>,
     first: OnceLock<Option<Compiled>>,
@@ -34,7 +34,7 @@ pub(super) struct Family<'a> {
 }
 
 impl<'a> Family<'a> {
-    pub(super) fn new(spec: &'a SweepSpec, source: &'a Source, options: &'a CompileOptions) -> Self {
+    pub(super) fn new(spec: &'a SweepSpec, source: &'a Source, options: Arc<CompileOptions>) -> Self {
         let analysis = spec.analysis_at(&middle(spec));
         Self { spec, source, options, analysis, first: OnceLock::new(), meshes: Default::default() }
     }
@@ -88,7 +88,7 @@ impl<'a> Family<'a> {
 
     /// The middle of the grid.
     fn middle(&self) -> Option<Compiled> {
-        let options = at(self.options, &middle(self.spec));
+        let options = at(&self.options, &middle(self.spec));
         draw(self.source, &options).ok()?.compile().ok()
     }
 }

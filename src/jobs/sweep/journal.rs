@@ -83,6 +83,7 @@ pub enum JournalError {
 pub struct Journal {
     path: PathBuf,
     file: Mutex<Open>,
+    damaged: usize,
 }
 
 #[derive(Debug)]
@@ -116,7 +117,8 @@ pub fn name(spec: &SweepSpec, bundle: &Bundle, options: &CompileOptions) -> Stri
 }
 
 impl Journal {
-    /// Opens or makes the file of the sweep `name`. Gives the points that it has, if `resume` says to go on from them.
+    /// Opens or makes the file of the sweep `name`. Gives the points that it has, if `resume` says to go on from them; [`Journal::damaged`]
+    /// tells of lines that are none. Its first line is on the disk when this returns: without it nothing behind it would be read.
     ///
     /// # Errors
     /// [`JournalError`]: a file is there and `resume` is not said, it is of another sweep, or the file system refuses.
@@ -133,26 +135,23 @@ impl Journal {
         if bytes.contains(&b'\n') && !resume {
             return Err(JournalError::Exists { path: path.to_owned() });
         }
-        let (known, good) = read(path, name, &bytes)?;
+        let Lines { known, good, damaged } = read(path, name, &bytes)?;
         file.set_len(good as u64).and_then(|()| file.seek(SeekFrom::End(0))).map_err(failed)?;
-        let journal =
-            Self { path: path.to_owned(), file: Mutex::new(Open { file, good: good as u64, synced: Instant::now() }) };
+        let open = Open { file, good: good as u64, synced: Instant::now() };
+        let journal = Self { path: path.to_owned(), file: Mutex::new(open), damaged };
         if good == 0 {
-            let head = Head { bimorph: env!("CARGO_PKG_VERSION").to_owned(), sweep: name.to_owned() };
-            let mut line = serde_json::to_vec(&head).map_err(|error| failed(error.into()))?;
-            line.push(b'\n');
-            journal.write(&line, |open| open.synced.elapsed() >= SYNC)?;
+            journal.write(&head(name).map_err(failed)?, |_| true)?;
         }
         Ok((journal, known))
     }
 
-    /// The points of the sweep `name` in a file, up to the first line that is damaged. Changes nothing.
+    /// The points of the sweep `name` in a file, but for those of lines that are damaged. Changes nothing.
     ///
     /// # Errors
     /// [`JournalError`]: it is of another sweep, or the file system refuses.
     pub fn read(path: &Path, name: &str) -> Result<Vec<Kept>, JournalError> {
         let bytes = std::fs::read(path).map_err(|source| JournalError::Io { path: path.to_owned(), source })?;
-        read(path, name, &bytes).map(|(known, _)| known)
+        read(path, name, &bytes).map(|lines| lines.known)
     }
 
     /// Adds a point.
@@ -172,13 +171,9 @@ impl Journal {
         self.write(lines, |_| sync)
     }
 
-    /// Waits until what it has is on the disk.
-    ///
-    /// # Errors
-    /// [`JournalError::Io`].
-    pub fn sync(&self) -> Result<(), JournalError> {
-        let open = self.file.lock().unwrap_or_else(PoisonError::into_inner);
-        open.file.sync_data().map_err(|source| self.failed(source))
+    /// Lines that were damaged when it was opened: their points are to be computed again.
+    pub fn damaged(&self) -> usize {
+        self.damaged
     }
 
     /// Where it is.
@@ -220,29 +215,47 @@ impl Journal {
     }
 }
 
-/// The points of a journal, and how many of its bytes they are. A line that is cut off, and a head that is, or that a disk left blank, are as
-/// if they had never been.
-fn read(path: &Path, name: &str, bytes: &[u8]) -> Result<(Vec<Kept>, usize), JournalError> {
+/// What a journal has.
+#[derive(Default)]
+struct Lines {
+    known: Vec<Kept>,
+    /// Bytes of whole lines.
+    good: usize,
+    /// Lines that are whole and no points.
+    damaged: usize,
+}
+
+/// The first line of the journal of the sweep `name`.
+fn head(name: &str) -> io::Result<Vec<u8>> {
+    let head = Head { bimorph: env!("CARGO_PKG_VERSION").to_owned(), sweep: name.to_owned() };
+    let mut line = serde_json::to_vec(&head)?;
+    line.push(b'\n');
+    Ok(line)
+}
+
+/// Reads a journal. A line that is cut off at its end is as if it had never been, and so is a first line that a disk made room for and did not
+/// fill before the power went.
+fn read(path: &Path, name: &str, bytes: &[u8]) -> Result<Lines, JournalError> {
     let whole = bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |last| last + 1);
     let mut lines = bytes[..whole].split_inclusive(|byte| *byte == b'\n');
-    let (mut known, mut good) = (Vec::new(), 0);
+    let mut found = Lines::default();
     if let Some(line) = lines.next() {
-        // room that a disk made and never filled: the power went
-        if line.contains(&0) {
-            return Ok((known, good));
+        let named: Option<Head> = serde_json::from_slice(line).ok();
+        if named.is_none_or(|head| head.sweep != name) {
+            let own = head(name).is_ok_and(|head| {
+                bytes.len() == head.len() && bytes.iter().zip(&head).all(|(byte, own)| [0, *own].contains(byte))
+            });
+            return if own { Ok(found) } else { Err(JournalError::Other { path: path.to_owned() }) };
         }
-        let head: Option<Head> = serde_json::from_slice(line).ok();
-        if head.is_none_or(|head| head.sweep != name) {
-            return Err(JournalError::Other { path: path.to_owned() });
-        }
-        good += line.len();
+        found.good = whole;
     }
     for line in lines {
-        let Some(kept) = opened(line) else { break };
-        known.push(kept);
-        good += line.len();
+        match opened(line).and_then(|object| serde_json::from_slice(&object).ok()) {
+            Some(kept) => found.known.push(kept),
+            None => found.damaged += 1,
+        }
     }
-    Ok((known, good))
+    Ok(found)
 }
 
 /// Points as the lines of a journal.
@@ -262,7 +275,7 @@ const SUM: &[u8] = b",\"sum\":\"";
 const SUMMED: usize = SUM.len() + 32 + 3;
 
 /// An object of JSON with the sum of its bytes, as a line.
-fn sealed(mut object: Vec<u8>) -> Vec<u8> {
+pub(crate) fn sealed(mut object: Vec<u8>) -> Vec<u8> {
     let sum = sum(&object);
     object.pop();
     object.extend([SUM, format!("{sum:032x}\"}}\n").as_bytes()].concat());
@@ -275,15 +288,12 @@ fn sum(object: &[u8]) -> u128 {
     sum.value()
 }
 
-/// The point of a line; none for one that is damaged.
-fn opened(line: &[u8]) -> Option<Kept> {
+/// The object of such a line; none for one that is damaged.
+pub(crate) fn opened(line: &[u8]) -> Option<Vec<u8>> {
     let (object, end) = line.split_at_checked(line.len().checked_sub(SUMMED)?)?;
     let written = std::str::from_utf8(end.strip_prefix(SUM)?.strip_suffix(b"\"}\n")?).ok()?;
     let object = [object, b"}"].concat();
-    if u128::from_str_radix(written, 16).ok()? != sum(&object) {
-        return None;
-    }
-    serde_json::from_slice(&object).ok()
+    (u128::from_str_radix(written, 16).ok()? == sum(&object)).then_some(object)
 }
 
 impl Outcome {
@@ -354,6 +364,20 @@ mod tests {
             assert_eq!(again.last(), Some(&kept(7)), "{cut}");
             assert_eq!(again.len(), known.len() + 1);
         }
+        // a line that is damaged costs its own point alone, and is told
+        let mut bytes = whole.clone();
+        bytes[ends[2] - 9] ^= 1;
+        std::fs::write(&path, &bytes).unwrap();
+        let (journal, known) = Journal::open(&path, "sweep", true).unwrap();
+        let points: Vec<usize> = known.iter().map(|kept| kept.point).collect();
+        assert_eq!((points, journal.damaged()), (vec![0, 2, 3, 9], 1));
+        drop(journal);
+        assert_eq!(std::fs::read(&path).unwrap(), bytes);
+        // and a first line that is damaged is none of this sweep: nothing is removed
+        bytes[3] = 0;
+        std::fs::write(&path, &bytes).unwrap();
+        assert!(matches!(Journal::open(&path, "sweep", true), Err(JournalError::Other { .. })));
+        assert_eq!(std::fs::read(&path).unwrap(), bytes);
         std::fs::write(&path, &whole).unwrap();
         let (open, _) = Journal::open(&path, "sweep", true).unwrap();
         assert!(matches!(Journal::open(&path, "sweep", true), Err(JournalError::Busy { .. })));

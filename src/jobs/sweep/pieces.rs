@@ -1,17 +1,19 @@
 //! The points of a sweep in pieces: as many at once as are laid out side by side.
 
+use super::axis;
 use super::crew::Crew;
 use super::error::SweepError;
 use super::family::Family;
+use super::means::Means;
 use super::point::{self, Failed, Outcome};
 use super::spec::{SweepAnalysis, SweepSpec};
 use super::together::{self, Together};
 use super::transient::{self, Transients};
-use crate::budget::{self, Budget, Stopped};
+use crate::budget::Stopped;
 use crate::compile::CompileOptions;
 use crate::netlist::{Bundle, Source};
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, OnceLock};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 /// Runs points of a sweep by a crew. `each` is told of every one as soon as it is done, from any thread, and says whether to go on; `take` is
 /// given those of a piece once all of it are done. Whether all were run.
@@ -27,7 +29,7 @@ pub(super) fn run(
     take: &(dyn Fn(Vec<Outcome>) + Sync),
 ) -> Result<bool, SweepError> {
     let stop = AtomicBool::new(false);
-    let (budget, full) = (budget::current(), OnceLock::new());
+    let (means, full) = (Means::here(), OnceLock::new());
     let end = |why: SweepError| {
         let _ = full.set(why);
         stop.store(true, Ordering::Relaxed);
@@ -40,75 +42,111 @@ pub(super) fn run(
             end(SweepError::Owner(why));
             return false;
         }
-        match budget.as_ref().map(|budget| budget.take(outcome.bytes())) {
-            Some(Err(Stopped::Bytes { most, .. })) => end(SweepError::TooLarge { most }),
-            Some(Err(why)) => end(SweepError::Owner(why)),
-            Some(Ok(())) | None => {}
+        match means.take(outcome.bytes()) {
+            Err(Stopped::Bytes { most, .. }) => end(SweepError::TooLarge { most }),
+            Err(why) => end(SweepError::Owner(why)),
+            Ok(()) => {}
         }
         if !each(outcome) {
             stop.store(true, Ordering::Relaxed);
         }
         go_on()
     };
-    for (options, numbers) in spec.by_options(options, numbers) {
-        let variants = Variants::new(spec, &source, &options);
-        let at_once = variants.at_once(numbers.len(), crew.size());
-        crew.run(numbers.len().div_ceil(at_once), &|piece| {
-            let piece = numbers.chunks(at_once).nth(piece).unwrap_or_default();
-            match go_on().then(|| variants.run(piece, budget.as_ref(), &counted, &go_on)).flatten() {
-                Some(outcomes) => take(outcomes),
-                None => stop.store(true, Ordering::Relaxed),
-            }
-        });
-    }
+    let at_once = at_once(spec, numbers.len(), crew.size());
+    let groups: Vec<Group<'_>> =
+        spec.by_options(numbers).into_iter().map(|numbers| Group::new(numbers, at_once)).collect();
+    let pieces: Vec<(&Group<'_>, &[usize])> =
+        groups.iter().flat_map(|group| group.numbers.chunks(at_once).map(move |piece| (group, piece))).collect();
+    crew.run(pieces.len(), &|number| {
+        let (group, piece) = pieces[number];
+        let variants = || group.variants(spec, &source, options);
+        match go_on().then(|| variants().run(piece, &means, &counted, &go_on)).flatten() {
+            Some(outcomes) => take(outcomes),
+            None => stop.store(true, Ordering::Relaxed),
+        }
+        group.leave();
+        go_on()
+    });
     let more = go_on();
     full.into_inner().map_or(Ok(more), Err)
 }
 
-/// Points with the same options.
+/// How many of `points` are a piece: no thread goes without while another has many. A row does not depend on who is beside it.
+fn at_once(spec: &SweepSpec, points: usize, threads: usize) -> usize {
+    match spec.analysis {
+        SweepAnalysis::Transient { .. } => transient::CHUNK,
+        SweepAnalysis::PullIn { .. } => 1,
+        _ if spec.has_variants() => points.div_ceil(2 * threads.max(1)).clamp(1, together::CHUNK),
+        _ => 1,
+    }
+}
+
+/// Points with the same options; what they share is there from their first piece to their last.
+struct Group<'a> {
+    numbers: Vec<usize>,
+    variants: Mutex<Option<Arc<Variants<'a>>>>,
+    /// Pieces that are not over.
+    left: AtomicUsize,
+}
+
+impl<'a> Group<'a> {
+    fn new(numbers: Vec<usize>, at_once: usize) -> Self {
+        let left = AtomicUsize::new(numbers.len().div_ceil(at_once));
+        Self { numbers, variants: Mutex::default(), left }
+    }
+
+    fn held(&self) -> MutexGuard<'_, Option<Arc<Variants<'a>>>> {
+        self.variants.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn variants(&self, spec: &'a SweepSpec, source: &'a Source, options: &CompileOptions) -> Arc<Variants<'a>> {
+        let new = || Arc::new(Variants::new(spec, source, axis::chosen(options, &spec.settings(self.numbers[0]))));
+        Arc::clone(self.held().get_or_insert_with(new))
+    }
+
+    /// A piece is over.
+    fn leave(&self) {
+        if self.left.fetch_sub(1, Ordering::Relaxed) == 1 {
+            *self.held() = None;
+        }
+    }
+}
+
+/// What points with the same options have in common.
 struct Variants<'a> {
     spec: &'a SweepSpec,
     source: &'a Source,
-    options: &'a CompileOptions,
+    options: Arc<CompileOptions>,
     family: Arc<Family<'a>>,
     together: Together<'a>,
     transients: Transients<'a>,
 }
 
 impl<'a> Variants<'a> {
-    fn new(spec: &'a SweepSpec, source: &'a Source, options: &'a CompileOptions) -> Self {
-        let family = Arc::new(Family::new(spec, source, options));
-        let together = Together::new(spec, source, options, Arc::clone(&family));
-        Self { spec, source, options, family, together, transients: Transients::new(spec, source, options) }
-    }
-
-    /// How many of `points` are a piece: no thread goes without while another has many. A row does not depend on who is beside it.
-    fn at_once(&self, points: usize, threads: usize) -> usize {
-        match self.spec.analysis {
-            SweepAnalysis::Transient { .. } => transient::CHUNK,
-            SweepAnalysis::PullIn { .. } => 1,
-            _ if self.family.shares() => points.div_ceil(2 * threads.max(1)).clamp(1, together::CHUNK),
-            _ => 1,
-        }
+    fn new(spec: &'a SweepSpec, source: &'a Source, options: CompileOptions) -> Self {
+        let options = Arc::new(options);
+        let family = Arc::new(Family::new(spec, source, Arc::clone(&options)));
+        let together = Together::new(spec, source, Arc::clone(&options), Arc::clone(&family));
+        let transients = Transients::new(spec, source, Arc::clone(&options));
+        Self { spec, source, options, family, together, transients }
     }
 
     /// A piece; none where it was to stop.
     fn run(
         &self,
         numbers: &[usize],
-        budget: Option<&Budget>,
+        means: &Means,
         counted: &(dyn Fn(&Outcome) -> bool + Sync),
         go_on: &(dyn Fn() -> bool + Sync),
     ) -> Option<Vec<Outcome>> {
         match self.spec.analysis {
             SweepAnalysis::Transient { .. } => {
-                self.transients.run(numbers, budget, &|outcome| outcome.is_none_or(counted) && go_on())
+                self.transients.run(numbers, means, &|outcome| outcome.is_none_or(counted) && go_on())
             }
-            SweepAnalysis::Static { .. } | SweepAnalysis::Modes { .. } => self.together.run(numbers, budget, counted),
+            SweepAnalysis::Static { .. } | SweepAnalysis::Modes { .. } => self.together.run(numbers, means, counted),
             SweepAnalysis::PullIn { .. } => {
                 let one = |&number: &usize| {
-                    let part = budget.map(Budget::part);
-                    let outcome = point::run(self.spec, number, self.source, self.options, &self.family, part);
+                    let outcome = point::run(self.spec, number, self.source, &self.options, &self.family, means);
                     counted(&outcome).then_some(outcome)
                 };
                 numbers.iter().map(one).collect()

@@ -3,18 +3,18 @@
 use super::axis::{VOLTS, at, chosen};
 use super::error::SweepError;
 use super::family::Family;
+use super::means::Means;
 use super::spec::{SweepAnalysis, SweepSpec};
 use crate::analysis::mesh::given::{Answer, Judged, judged, searched};
 use crate::analysis::mesh::{self, Request};
 use crate::analysis::signal::Signal;
 use crate::analysis::{AnalysisError, statics};
-use crate::budget::{self, Budget, Stopped};
+use crate::budget::{self, Stopped};
 use crate::compile::{CompileError, CompileOptions, draw};
 use crate::netlist::{Setting, Severity, Source};
 use std::borrow::Cow;
 use std::collections::HashSet;
 use std::fmt;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// What columns of a static sweep are called.
 const OUTPUTS: &str = "NODE.x, NODE.y, NODE.rz, BEAM.T, PORT.i or PORT.q";
@@ -96,27 +96,18 @@ impl Outcome {
     }
 }
 
-/// Runs point `number`, under `part` of the sweep's budget.
+/// Runs point `number`.
 pub(super) fn run(
     spec: &SweepSpec,
     number: usize,
     source: &Source,
     options: &CompileOptions,
     family: &Family<'_>,
-    part: Option<Budget>,
+    means: &Means,
 ) -> Outcome {
     let settings = spec.settings(number);
-    let values = guarded(part, || solve(spec, &settings, source, options, family));
+    let values = means.guarded(|| solve(spec, &settings, source, options, family));
     Outcome { number, parameters: settings.into_iter().map(|(_, value)| value).collect(), values }
-}
-
-/// Runs a job under a part of the budget. A fault inside is the error of that job: it must not take the other points with it.
-pub(super) fn guarded<T>(part: Option<Budget>, job: impl FnOnce() -> Result<T, String>) -> Result<T, Failed> {
-    let outcome = catch_unwind(AssertUnwindSafe(|| match part {
-        Some(part) => Ok(budget::within(&part, job)??),
-        None => Ok(job()?),
-    }));
-    outcome.unwrap_or_else(|_| Err("internal fault at this point".to_owned().into()))
 }
 
 /// Refuses parameters and outputs that the netlist does not have: at every point they would be an error.

@@ -1,13 +1,15 @@
 //! What to sweep: the points of a grid and their parameters.
 
-use super::axis::{self, SweepParameter, VOLTS, Varied, varied};
+use super::axis::{SweepParameter, VOLTS, Varied, varied};
 use super::error::{SweepError, bad};
 use super::samples::Samples;
 use crate::analysis::mesh::Request;
-use crate::compile::CompileOptions;
 use crate::netlist::Setting;
 use std::borrow::Cow;
 use std::collections::{BTreeMap, HashSet};
+
+/// Points of a shard, at most: their numbers are laid out.
+const MOST_POINTS: usize = 100_000_000;
 
 /// What to sweep.
 #[derive(Debug, Clone, PartialEq)]
@@ -155,10 +157,10 @@ impl SweepSpec {
         self.grid_points().is_ok_and(|points| points > sorts.fold(1, usize::saturating_mul))
     }
 
-    /// Points of the grid, those together that have the same options, with these.
-    pub(super) fn by_options(&self, options: &CompileOptions, numbers: &[usize]) -> Vec<(CompileOptions, Vec<usize>)> {
+    /// Points of the grid, those together that have the same options.
+    pub(super) fn by_options(&self, numbers: &[usize]) -> Vec<Vec<usize>> {
         if self.parameters.iter().all(|axis| axis.option().is_none()) {
-            return vec![(options.clone(), numbers.to_vec())];
+            return vec![numbers.to_vec()];
         }
         let mut groups: BTreeMap<Vec<usize>, Vec<usize>> = BTreeMap::new();
         for &number in numbers {
@@ -166,8 +168,7 @@ impl SweepSpec {
             let of_options = self.parameters.iter().zip(places).filter(|(axis, _)| axis.option().is_some());
             groups.entry(of_options.map(|(_, place)| place).collect()).or_default().push(number);
         }
-        let with = |numbers: Vec<usize>| (axis::chosen(options, &self.settings(numbers[0])), numbers);
-        groups.into_values().map(with).collect()
+        groups.into_values().collect()
     }
 
     /// Numbers of the points this shard runs.
@@ -186,6 +187,11 @@ impl SweepSpec {
             }
         }
         let points = self.grid_points()?;
+        let own = points.saturating_sub(index).div_ceil(count);
+        if own > MOST_POINTS {
+            let text = format!("at most {MOST_POINTS} points at once; give each of several machines a --shard of them");
+            return Err(bad("parameters".into(), &text, &format!("{own}")));
+        }
         self.parameters.iter().try_for_each(SweepParameter::check)?;
         self.check_samples()?;
         self.check_ports()?;

@@ -7,14 +7,14 @@
 
 use super::axis::at;
 use super::family::Family;
-use super::point::{self, Found, Outcome, brief, guarded};
+use super::means::Means;
+use super::point::{self, Found, Outcome, brief};
 use super::spec::SweepSpec;
 use crate::analysis::PortVoltages;
 use crate::analysis::mesh::Request;
 use crate::analysis::mesh::given::{Finer, Judged, finer, judged_modes, judged_static};
 use crate::analysis::modes_side_by_side::ModesSideBySide;
 use crate::analysis::statics_side_by_side::StaticsSideBySide;
-use crate::budget::Budget;
 use crate::compile::{CompileOptions, Compiled, draw};
 use crate::netlist::Source;
 use crate::refine::model_order::ModelOrder;
@@ -29,7 +29,7 @@ const MOST: usize = 1000;
 pub(super) struct Together<'a> {
     spec: &'a SweepSpec,
     source: &'a Source,
-    options: &'a CompileOptions,
+    options: Arc<CompileOptions>,
     family: Arc<Family<'a>>,
     lanes: OnceLock<Option<Lanes>>,
 }
@@ -98,7 +98,7 @@ impl<'a> Together<'a> {
     pub(super) fn new(
         spec: &'a SweepSpec,
         source: &'a Source,
-        options: &'a CompileOptions,
+        options: Arc<CompileOptions>,
         family: Arc<Family<'a>>,
     ) -> Self {
         Self { spec, source, options, family, lanes: OnceLock::new() }
@@ -108,10 +108,10 @@ impl<'a> Together<'a> {
     pub(super) fn run(
         &self,
         numbers: &[usize],
-        budget: Option<&Budget>,
+        means: &Means,
         finished: &(dyn Fn(&Outcome) -> bool + Sync),
     ) -> Option<Vec<Outcome>> {
-        let mut found = self.side_by_side(numbers, budget);
+        let mut found = self.side_by_side(numbers, means);
         let mut outcomes = Vec::with_capacity(numbers.len());
         for (&number, found) in numbers.iter().zip(&mut found) {
             let outcome = match found.take() {
@@ -119,9 +119,7 @@ impl<'a> Together<'a> {
                     let parameters = self.spec.settings(number).into_iter().map(|(_, value)| value).collect();
                     Outcome { number, parameters, values: Ok(found) }
                 }
-                None => {
-                    point::run(self.spec, number, self.source, self.options, &self.family, budget.map(Budget::part))
-                }
+                None => point::run(self.spec, number, self.source, &self.options, &self.family, means),
             };
             if !finished(&outcome) {
                 return None;
@@ -132,30 +130,30 @@ impl<'a> Together<'a> {
     }
 
     /// What points have from lanes; none for those that have to run alone, which also say what is wrong with them.
-    fn side_by_side(&self, numbers: &[usize], budget: Option<&Budget>) -> Vec<Option<Found>> {
+    fn side_by_side(&self, numbers: &[usize], means: &Means) -> Vec<Option<Found>> {
         let none = || numbers.iter().map(|_| None).collect();
         if !self.family.shares() || matches!(self.lanes.get(), Some(None)) {
             return none();
         }
         let request = self.spec.analysis.request().filter(|request| !matches!(request, Request::PullIn { .. }));
         let Some(request) = request.filter(|_| self.spec.ports().next().is_none()) else { return none() };
-        let part = || budget.map(Budget::part);
-        let prepare = |&number: &usize| guarded(part(), || self.prepare(number, &request)).ok().flatten();
+        let prepare = |&number: &usize| means.guarded(|| self.prepare(number, &request)).ok().flatten();
         let prepared: Vec<Option<Compiled>> = numbers.iter().map(prepare).collect();
         let variants: Vec<&Compiled> = prepared.iter().flatten().collect();
         let Some(lanes) = self.lanes.get().and_then(Option::as_ref) else { return none() };
-        let Ok(judged) = guarded(part(), || Ok(lanes.judged(&variants, &request))) else { return none() };
+        let Ok(judged) = means.guarded(|| Ok(lanes.judged(&variants, &request))) else { return none() };
         let mut judged = judged.into_iter();
         let found = |compiled: &Option<Compiled>| {
             let judged = compiled.as_ref().and_then(|_| judged.next().flatten())?;
-            if judged.holds { point::found(judged, self.spec, self.options).ok() } else { None }
+            if judged.holds { point::found(judged, self.spec, &self.options).ok() } else { None }
         };
         prepared.iter().map(found).collect()
     }
 
     /// A point on the first mesh that points share, where it has a part in it.
     fn prepare(&self, number: usize, request: &Request<'_>) -> Result<Option<Compiled>, String> {
-        let drawn = draw(self.source, &at(self.options, &self.spec.settings(number))).map_err(|error| brief(&error))?;
+        let drawn =
+            draw(self.source, &at(&self.options, &self.spec.settings(number))).map_err(|error| brief(&error))?;
         let Some((first, segments)) = self.family.first_mesh(&drawn) else { return Ok(None) };
         let order = ModelOrder { segments: segments.clone(), estimated_error: None, modes_in_band: 0, passes: 0 };
         let lanes = self.lanes.get_or_init(|| Lanes::new(&first.with_order(order.clone()).ok()?, request));

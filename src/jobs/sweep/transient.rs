@@ -9,7 +9,8 @@
 
 use super::axis::{SweepParameter, at};
 use super::family::{alike, middle};
-use super::point::{Failed, Found, Outcome, Value, brief, guarded};
+use super::means::Means;
+use super::point::{Failed, Found, Outcome, Value, brief};
 use super::samples::Samples;
 use super::spec::{SweepAnalysis, SweepSpec};
 use crate::analysis::AnalysisError;
@@ -18,13 +19,12 @@ use crate::analysis::side_by_side::{self, RunEnd};
 use crate::analysis::signal::Signal;
 use crate::analysis::step_error;
 use crate::analysis::transient::{TransientOptions, transient};
-use crate::budget::Budget;
 use crate::compile::{CompileOptions, Compiled, draw};
 use crate::netlist::{Setting, Source};
 use crate::refine::model_order::ModelOrder;
 use crate::structure::Beam;
 use std::collections::BTreeSet;
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 /// Points that are laid out at once.
 pub(super) const CHUNK: usize = 64;
@@ -55,12 +55,12 @@ struct Prepared {
 pub(super) struct Transients<'a> {
     spec: &'a SweepSpec,
     source: &'a Source,
-    options: &'a CompileOptions,
+    options: Arc<CompileOptions>,
     mesh: OnceLock<Option<Shared>>,
 }
 
 impl<'a> Transients<'a> {
-    pub(super) fn new(spec: &'a SweepSpec, source: &'a Source, options: &'a CompileOptions) -> Self {
+    pub(super) fn new(spec: &'a SweepSpec, source: &'a Source, options: Arc<CompileOptions>) -> Self {
         Self { spec, source, options, mesh: OnceLock::new() }
     }
 
@@ -68,12 +68,11 @@ impl<'a> Transients<'a> {
     pub(super) fn run(
         &self,
         numbers: &[usize],
-        budget: Option<&Budget>,
+        means: &Means,
         finished: &(dyn Fn(Option<&Outcome>) -> bool + Sync),
     ) -> Option<Vec<Outcome>> {
-        let part = || budget.map(Budget::part);
         let go_on = || finished(None);
-        let prepare = |&number: &usize| guarded(part(), || self.prepare(&self.spec.settings(number), &go_on));
+        let prepare = |&number: &usize| means.guarded(|| self.prepare(&self.spec.settings(number), &go_on));
         let prepared: Vec<Result<Prepared, Failed>> = numbers.iter().map(prepare).collect();
         let variants: Vec<(usize, &Compiled)> =
             prepared.iter().enumerate().filter_map(|(k, p)| Some((k, &p.as_ref().ok()?.compiled))).collect();
@@ -82,7 +81,7 @@ impl<'a> Transients<'a> {
         let same = self.spec.ports().next().is_none();
         let side_by_side = same.then(|| {
             let options = self.transient(&[]);
-            guarded(part(), || {
+            means.guarded(|| {
                 side_by_side::ends(&compiled, &options, &mut || finished(None)).map_err(|error| error.to_string())
             })
         });
@@ -99,7 +98,7 @@ impl<'a> Transients<'a> {
             let values = match (prepared, end) {
                 (Err(error), _) => Err(error.clone()),
                 (Ok(point), Some(end)) => self.found(point, &options, end).map_err(Failed::from),
-                (Ok(point), None) => guarded(part(), || self.found(point, &options, alone(&point.compiled, &options)?)),
+                (Ok(point), None) => means.guarded(|| self.found(point, &options, alone(&point.compiled, &options)?)),
             };
             let parameters = settings.into_iter().map(|(_, value)| value).collect();
             let outcome = Outcome { number, parameters, values };
@@ -128,7 +127,7 @@ impl<'a> Transients<'a> {
 
     /// A point on its mesh.
     fn prepare(&self, settings: &[(String, Setting)], go_on: &dyn Fn() -> bool) -> Result<Prepared, String> {
-        let drawn = draw(self.source, &at(self.options, settings)).map_err(|error| brief(&error))?;
+        let drawn = draw(self.source, &at(&self.options, settings)).map_err(|error| brief(&error))?;
         let options = self.transient(settings);
         let shared =
             if self.spec.has_variants() { self.mesh.get_or_init(|| self.search(go_on)).as_ref() } else { None };
@@ -150,7 +149,7 @@ impl<'a> Transients<'a> {
     fn search(&self, go_on: &dyn Fn() -> bool) -> Option<Shared> {
         let mut shared: Option<Shared> = None;
         for settings in probes(self.spec) {
-            let drawn = draw(self.source, &at(self.options, &settings));
+            let drawn = draw(self.source, &at(&self.options, &settings));
             let Some(compiled) = drawn.ok().and_then(|drawn| drawn.compile().ok()) else { continue };
             let Ok(order) = mesh::order_in_time(&compiled, &self.transient(&settings)) else { continue };
             match &mut shared {
@@ -167,7 +166,7 @@ impl<'a> Transients<'a> {
         }
         let mut shared = shared?;
         let settings = middle(self.spec);
-        let drawn = draw(self.source, &at(self.options, &settings)).ok();
+        let drawn = draw(self.source, &at(&self.options, &settings)).ok();
         let middle = drawn.filter(|drawn| alike(&shared.beams, &drawn.structure.beams));
         let middle = middle.and_then(|drawn| drawn.on(shared.order.clone()).ok());
         shared.step_error = middle.and_then(|compiled| steps(&compiled, self.transient(&settings), go_on));

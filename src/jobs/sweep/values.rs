@@ -39,7 +39,7 @@ impl Values {
             Self::Linear { low, high, count } => (place < *count).then(|| {
                 let last = place + 1 == *count && *count > 1;
                 let share = place as f64 / count.saturating_sub(1).max(1) as f64;
-                Setting::Number(if last { *high } else { low + (high - low) * share })
+                Setting::Number(if last { *high } else { whole(low + (high - low) * share, (*low, *high)) })
             }),
         }
     }
@@ -66,6 +66,13 @@ impl Values {
             }
         }
     }
+}
+
+/// A number between two whole ones that is whole but for rounding is so: a count stays one.
+fn whole(x: f64, (low, high): (f64, f64)) -> f64 {
+    let near = x.round();
+    let rounding = 4.0 * f64::EPSILON * low.abs().max(high.abs());
+    if low.fract() == 0.0 && high.fract() == 0.0 && (x - near).abs() <= rounding { near } else { x }
 }
 
 impl From<Vec<Setting>> for Values {
@@ -95,6 +102,11 @@ mod tests {
         assert_eq!((axis.get(7), axis.len(), axis.ends(), list.ends()), (None, 7, Some((0, 6)), Some((0, 6))));
         let down = Values::Linear { low: 3.0, high: 1.0, count: 3 };
         assert_eq!((down.ends(), down.get(1)), (Some((2, 0)), Some(Setting::Number(2.0))));
+        for last in 2..=200 {
+            let counts = Values::Linear { low: 1.0, high: f64::from(last), count: last as usize };
+            let listed: Values = (1..=last).map(|n| Setting::Number(f64::from(n))).collect::<Vec<_>>().into();
+            assert_eq!(counts, listed);
+        }
         let one = Values::Linear { low: 3.0, high: 9.0, count: 1 };
         assert_eq!((one.get(0), one.ends()), (Some(Setting::Number(3.0)), Some((0, 0))));
         let none = Values::Linear { low: 3.0, high: 9.0, count: 0 };

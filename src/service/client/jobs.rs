@@ -105,6 +105,10 @@ impl Client {
         options: &CompileOptions,
         how: Submission,
     ) -> Result<String, ClientError> {
+        if how.release_after.is_some_and(|time| time.is_zero()) {
+            let text = "release_after: expected a time above 0 s, or none, got 0";
+            return Err(self.error(&Status::invalid_argument(text)));
+        }
         let unique = || Ids::default().make().map_err(|status| self.error(&status));
         let request = proto::SubmitJobRequest {
             bundle: Some(bundle_to_wire(bundle)),

@@ -5,7 +5,7 @@ use super::super::proto;
 use super::super::turns::client;
 use crate::content::Fnv;
 use crate::jobs::sweep::part::Part;
-use crate::jobs::sweep::{SweepSpec, journal};
+use crate::jobs::sweep::{SweepParameter, SweepSpec, journal};
 use crate::netlist::Bundle;
 use crate::options::CompileOptions;
 use prost::Message;
@@ -95,7 +95,13 @@ impl Asked {
             hash.text(&self.version);
         }
         hash.bytes(&self.release_after_s.to_bits().to_le_bytes());
-        hash.bytes(&convert::sweep::spec_to_wire(spec).encode_to_vec());
+        // values are the same however they are said
+        let listed = |axis: &SweepParameter| SweepParameter {
+            values: axis.values.iter().collect::<Vec<_>>().into(),
+            ..axis.clone()
+        };
+        let spec_listed = SweepSpec { parameters: spec.parameters.iter().map(listed).collect(), ..spec.clone() };
+        hash.bytes(&convert::sweep::spec_to_wire(&spec_listed).encode_to_vec());
         self.content = format!("{:032x}", hash.value());
         if self.share {
             self.request.clone_from(&self.content);

@@ -110,6 +110,8 @@ impl Calls {
 
 /// What waits for the disk and computes nothing: in nobody's turn and on nobody's account, so that who has used up what is his may stop what
 /// runs.
-async fn aside(job: impl FnOnce() -> Result<(), Status> + Send + 'static) -> Result<(), Status> {
+pub(super) async fn aside<T: Send + 'static>(
+    job: impl FnOnce() -> Result<T, Status> + Send + 'static,
+) -> Result<T, Status> {
     tokio::task::spawn_blocking(job).await.unwrap_or_else(|_| Err(status::fault()))
 }

@@ -166,8 +166,11 @@ impl JobFile {
         let head = read_head(&bytes).ok_or_else(strange)?;
         // one that is damaged is as if it had never been: the job goes on
         let end = there("end")?.and_then(|bytes| {
-            let told = |error: &serde_json::Error| tracing::warn!(job = self.id, %error, "its end cannot be read, so it goes on");
-            serde_json::from_slice(&bytes).inspect_err(told).ok()
+            let end: Option<End> = journal::opened(&bytes).and_then(|object| serde_json::from_slice(&object).ok());
+            if end.is_none() {
+                tracing::warn!(job = self.id, "its end is damaged, so it goes on");
+            }
+            end
         });
         Ok(Some((head, end)))
     }
@@ -197,6 +200,13 @@ impl JobFile {
         let path = self.path("rows");
         let before = self.size("rows");
         let (journal, rows) = self.store.disk().journal(&path, &self.sweep).map_err(io_error)?;
+        if journal.damaged() > 0 {
+            tracing::warn!(
+                job = self.id,
+                lines = journal.damaged(),
+                "lines of its journal are damaged: their points are computed again"
+            );
+        }
         let bytes = journal.bytes();
         if bytes > before {
             self.take(usize::try_from(bytes - before).unwrap_or(usize::MAX))?;
@@ -233,7 +243,8 @@ impl JobFile {
     /// What the system said.
     pub(super) fn end(&self, end: &End) -> io::Result<()> {
         let end = End { bytes: self.journal.as_ref().map_or_else(|| self.row_bytes(), Journal::bytes), ..end.clone() };
-        let (bytes, path, unfinished) = (serde_json::to_vec(&end)?, self.path("end"), self.path("new"));
+        let (bytes, path, unfinished) =
+            (journal::sealed(serde_json::to_vec(&end)?), self.path("end"), self.path("new"));
         let before = usize::try_from(self.size("end")).unwrap_or(usize::MAX);
         self.store.room().count(0, bytes.len());
         self.bytes.fetch_add(bytes.len(), Ordering::Relaxed);

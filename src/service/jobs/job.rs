@@ -12,11 +12,11 @@ use super::standing::{Standing, Stop, state_of};
 use super::wire;
 use crate::budget::{Budget, Stopped};
 use crate::jobs::sweep::journal::Kept;
-use crate::jobs::sweep::{SweepError, SweepSpec};
+use crate::jobs::sweep::{SweepError, SweepSpec, SweepTable};
 use proto::job_metadata::State;
 use std::collections::BTreeSet;
 use std::io;
-use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, Weak};
 use std::time::{Duration, Instant};
 use tokio::runtime::Handle;
 use tokio::sync::watch;
@@ -36,6 +36,8 @@ pub(super) struct Job {
     pub(super) standing: watch::Sender<Standing>,
     /// None: on the disk alone.
     pub(super) rows: Mutex<Option<Rows>>,
+    /// Its table, while somebody reads it.
+    pub(super) table: Mutex<Weak<SweepTable>>,
     waiting: Mutex<Waiting>,
     /// Where it is kept; none: nowhere, or not any more.
     pub(super) file: Mutex<Option<JobFile>>,
@@ -75,6 +77,7 @@ impl Job {
             options,
             standing: watch::Sender::new(standing),
             rows: Mutex::new(rows),
+            table: Mutex::default(),
             waiting: Mutex::default(),
             kept: file.is_some(),
             file: Mutex::new(file),
@@ -102,7 +105,11 @@ impl Job {
 
     /// Whether it goes on, or has ended with all of its rows, and is not told to stop.
     pub(super) fn lives(&self) -> bool {
-        self.stop.get().is_none() && !matches!(self.standing.borrow().state, State::Cancelled | State::Failed)
+        match self.standing.borrow().state {
+            State::Done => !matches!(self.stop.get(), Some(Stop::Deleted)),
+            State::Cancelled | State::Failed => false,
+            State::Waiting | State::Running | State::Unspecified => self.stop.get().is_none(),
+        }
     }
 
     /// Whether this server has no more use for it: it has ended, and not because another one should go on with it.
@@ -281,7 +288,6 @@ impl Job {
             standing.end = Some(end);
         });
         drop(file);
-        self.budget.give_back();
         self.unload();
     }
 

@@ -2,6 +2,7 @@
 
 use super::super::proto;
 use super::super::shared::{Calls, Reply};
+use super::calls::aside;
 use super::job::Job;
 use super::streams::{self, SweepStream, TableStream};
 use proto::job_metadata::State;
@@ -33,7 +34,7 @@ impl Calls {
             return Err(Status::failed_precondition(text.trim_end()));
         }
         let place = self.sending()?;
-        let table = self.0.desk.run(move || job.table()).await?;
+        let table = aside(move || job.table()).await?;
         Ok(Response::new(TableStream::new(table, place, &self.0.shutdown)))
     }
 

@@ -5,7 +5,7 @@ use super::job::{Job, held};
 use super::rows::{Reading, Rows};
 use crate::jobs::sweep::journal::Kept;
 use crate::jobs::sweep::{self, SweepTable};
-use std::sync::MutexGuard;
+use std::sync::{Arc, MutexGuard};
 use std::time::Instant;
 use tonic::Status;
 
@@ -49,19 +49,26 @@ impl Job {
         let file = held(&self.file);
         if file.is_some() && self.has_ended() && !self.is_watched() {
             *held(&self.rows) = None;
+            self.budget.give_back();
         }
     }
 
-    /// The whole table, of a job that has all of its rows.
+    /// The whole table, of a job that has all of its rows: one for all who read it at a time.
     ///
     /// # Errors
     /// As they are read.
-    pub(super) fn table(&self) -> Result<SweepTable, Status> {
+    pub(super) fn table(&self) -> Result<Arc<SweepTable>, Status> {
+        let mut shared = held(&self.table);
+        if let Some(table) = shared.upgrade() {
+            return Ok(table);
+        }
         let rows = self.loaded()?;
         let with = |kept: Kept| (self.spec.settings(kept.point).into_iter().map(|(_, value)| value).collect(), kept);
         let found = rows.iter().flat_map(Rows::found).map(with).collect();
         drop(rows);
         self.unload();
-        Ok(sweep::table_of(self.spec.names().map(str::to_owned).collect(), found))
+        let table = Arc::new(sweep::table_of(self.spec.names().map(str::to_owned).collect(), found));
+        *shared = Arc::downgrade(&table);
+        Ok(table)
     }
 }

@@ -11,7 +11,7 @@ use super::super::turns::client;
 use super::super::work::{allowance, of_client};
 use super::super::{convert, proto, status};
 use super::asked::Asked;
-use super::folder::{self, Found, JobFile};
+use super::folder::{self, End, Found, JobFile};
 use super::job::Job;
 use super::pages::{Page, token};
 use super::rows::Rows;
@@ -98,6 +98,12 @@ impl Jobs {
         limits: &Limits,
     ) -> Result<Arc<Job>, Status> {
         let Task { spec, bundle, options } = task;
+        // before anything is laid out for each value
+        let violation = |error: SweepError| status::bad_request(&error.to_string(), [spec_violation(&error)]);
+        let points = spec.grid_points().map_err(violation)?;
+        if points > limits.sweep_points {
+            return Err(status::limit("sweep_points", limits.sweep_points, points));
+        }
         let asked = asked.with(&spec, &bundle, &options);
         let again = |job: Arc<Job>| {
             job.touch(client().number);
@@ -106,11 +112,6 @@ impl Jobs {
         let before = already(&self.kept(), &asked)?;
         if let Some(before) = before {
             return again(before);
-        }
-        let violation = |error: SweepError| status::bad_request(&error.to_string(), [spec_violation(&error)]);
-        let points = spec.grid_points().map_err(violation)?;
-        if points > limits.sweep_points {
-            return Err(status::limit("sweep_points", limits.sweep_points, points));
         }
         let points = spec.point_numbers().map_err(violation)?.len() as u64;
         sweep::check_names(&spec, &bundle, &options).map_err(violation)?;
@@ -166,7 +167,8 @@ impl Jobs {
         let purse = accounts.of(&asked.owner).map(|account| Arc::clone(&account.purse));
         let budget = Budget::new(Allowance { purse, ..allowance(limits) });
         // what it was told of is there: its rows are read when somebody asks for them
-        if let Some(end) = end.clone().filter(|end| end.bytes == file.row_bytes()) {
+        let whole = |end: &End| end.code != Code::Ok as i32 || end.rows == asked.points;
+        if let Some(end) = end.clone().filter(|end| end.bytes == file.row_bytes() && whole(end)) {
             let (state, rows, failed) = (state_of(end.code), end.rows, end.failed);
             let standing = Standing { state, rows, failed, end: Some(end), ..Standing::default() };
             let job = Job::new(id.clone(), (asked, spec, wire_options), budget, Some(file), (None, standing));

@@ -85,19 +85,25 @@ impl Crew for Taken<'_> {
         self.crews.places
     }
 
-    fn run(&self, count: usize, piece: &(dyn Fn(usize) + Sync)) {
+    fn run(&self, count: usize, piece: &(dyn Fn(usize) -> bool + Sync)) {
+        let over = CancellationToken::new();
         self.pool.threads().in_place_scope(|scope| {
             for number in 0..count {
                 let place = self.crews.runtime.block_on(async {
                     tokio::select! {
                         place = self.crews.turns.place(self.client) => Some(place),
                         () = self.stopped.cancelled() => None,
+                        () = over.cancelled() => None,
                     }
                 });
-                let Some(place) = place.filter(|_| !self.stopped.is_cancelled()) else { return };
+                let stopped = self.stopped.is_cancelled() || over.is_cancelled();
+                let Some(place) = place.filter(|_| !stopped) else { return };
                 (self.begin)();
+                let over = over.clone();
                 scope.spawn(move |_| {
-                    piece(number);
+                    if !piece(number) {
+                        over.cancel();
+                    }
                     drop(place);
                 });
             }
@@ -133,6 +139,7 @@ mod tests {
                 while crews.turns.waiting() < more {
                     std::thread::yield_now();
                 }
+                true
             });
         };
         std::thread::scope(|scope| {

@@ -55,6 +55,16 @@ async fn next<T>(
     }
 }
 
+/// One less looks at a job: rows of one that has ended need not stay in memory.
+fn unwatched(job: &Arc<Job>, standing: watch::Receiver<Standing>) {
+    drop(standing);
+    if job.has_ended() {
+        let job = Arc::clone(job);
+        // it may wait for who reads a disk
+        tokio::task::spawn_blocking(move || job.unload());
+    }
+}
+
 /// Why there is nothing more, if anybody is still to be told.
 fn say_last<T>(sender: &mpsc::Sender<Result<T, Status>>, why: Option<Status>) {
     if let Some(why) = why {
@@ -73,14 +83,15 @@ pub(super) fn watch<T: Send + 'static>(job: Arc<Job>, shutdown: &Shutdown, say: 
             let said =
                 if now.gone && now.end.is_none() { Err(status::not_found("job", &job.id)) } else { Ok(say(&job)) };
             if sender.send(said).await.is_err() || last {
-                return;
+                break;
             }
             if let Next::Over(why) = next(&mut standing, &sender, &shutdown).await {
                 say_last(&sender, why);
-                return;
+                break;
             }
             tokio::time::sleep(WATCH_INTERVAL).await;
         }
+        unwatched(&job, standing);
     });
     Box::pin(ReceiverStream::new(receiver))
 }
@@ -98,11 +109,7 @@ pub(super) fn rows(
     tokio::spawn(async move {
         let _place = place;
         send_rows(&job, (first, only_finished), &mut standing, &sender, &shutdown).await;
-        drop(standing);
-        if job.has_ended() {
-            // it may wait for who reads a disk
-            tokio::task::spawn_blocking(move || job.unload());
-        }
+        unwatched(&job, standing);
     });
     Box::pin(ReceiverStream::new(receiver))
 }
@@ -169,9 +176,9 @@ async fn chunk(job: &Arc<Job>, mut reading: Reading, end: u64) -> (Result<proto:
 }
 
 /// A table on its way: columns first, then rows in as few messages as fit, each made when the one before is taken. A
-/// reader that is slow holds a place and one message, and no thread.
+/// reader that is slow holds a place, one message and its share in the table, and no thread.
 pub(in super::super) struct TableStream {
-    table: SweepTable,
+    table: Arc<SweepTable>,
     /// Rows sent; none before the first message.
     sent: Option<usize>,
     ending: Pin<Box<WaitForCancellationFutureOwned>>,
@@ -180,7 +187,7 @@ pub(in super::super) struct TableStream {
 
 impl TableStream {
     /// A table from its first row on.
-    pub(super) fn new(table: SweepTable, place: OwnedSemaphorePermit, shutdown: &Shutdown) -> Self {
+    pub(super) fn new(table: Arc<SweepTable>, place: OwnedSemaphorePermit, shutdown: &Shutdown) -> Self {
         Self { table, sent: None, ending: Box::pin(shutdown.ending.clone().cancelled_owned()), _place: place }
     }
 

@@ -32,8 +32,9 @@ def arrow(columns: Mapping[str, Sequence[Any]], units: Mapping[str, str], about:
         import pyarrow
     except ImportError:
         raise ImportError("to_arrow() needs pyarrow: pip install pyarrow") from None
-    # a column without a value is one of numbers all the same: parts of a sweep have one schema
-    kinds = {name: pyarrow.float64() if name in units else None for name in columns}
+    # a column without a value is of its kind all the same: parts of a sweep have one schema
+    kinds = {name: pyarrow.float64() if name in units or all(x is None for x in values) else None for name, values in columns.items()}
+    kinds |= {"point": pyarrow.int64(), "warning": pyarrow.string(), "error": pyarrow.string()}
     arrays = {name: pyarrow.array(_alike(values), type=kinds[name]) for name, values in columns.items()}
     unit = {name: {"unit": units[name]} if name in units else None for name in arrays}
     fields = [pyarrow.field(name, array.type, metadata=unit[name]) for name, array in arrays.items()]

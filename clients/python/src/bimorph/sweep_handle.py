@@ -114,13 +114,7 @@ class Sweep:
         points = self._persistent_status().points
         rows: list[_Found] = []
         parameters: list[str] = []
-        known: set[int] = set()
         for chunk in self._chunks(0):
-            for found in chunk.found:
-                if found.row.point in known:
-                    point = found.row.point
-                    raise BimorphError(f"point {point} came twice: the server has lost rows and computed them again; wait anew")
-                known.add(found.row.point)
             rows.extend(chunk.found)
             parameters = chunk.parameters
             if progress is not None:
@@ -131,7 +125,8 @@ class Sweep:
         """Its rows as they are finished, from the one numbered ``first`` on: rows are numbered in that order, and keep their numbers. No more
         of them are held than a message has. A network that fails meanwhile costs it nothing.
 
-        Raises :class:`BimorphError` after the last row when it ends without all of them.
+        Raises :class:`BimorphError` after the last row when it ends without all of them, and where a server has lost rows and computed them
+        again, of which the numbers are then others.
         """
         for chunk in self._chunks(first):
             for found in chunk.found:
@@ -176,9 +171,15 @@ class Sweep:
     def _chunks(self, first: int) -> Iterator[_Chunk]:
         """Rows as they come, from one on; where the network fails, from the next one on."""
         breaks = 0
+        known: set[int] = set()
         while True:
             try:
                 for chunk in self._fetch(first):
+                    for found in chunk.found:
+                        point = found.row.point
+                        if point in known:
+                            raise BimorphError(f"point {point} came twice: the server has lost rows and computed them again; ask anew")
+                        known.add(point)
                     first += len(chunk.found)
                     breaks = 0
                     yield chunk
