@@ -111,7 +111,7 @@ fn source(compiled: &Compiled, port: Option<&str>) -> Result<usize, AnalysisErro
         None => (!names.is_empty()).then_some(0),
     };
     found.ok_or_else(|| AnalysisError::BadRequest {
-        what: format!("port \"{}\"", port.unwrap_or("")),
+        what: port.map_or_else(|| "pull-in".to_owned(), |port| format!("port \"{port}\"")),
         detail: match names.len() {
             0 => "the netlist has no port and no voltage source to sweep".into(),
             _ => format!("the netlist's ports and sources are {}", names.join(", ")),
@@ -211,7 +211,10 @@ impl Sweep<'_> {
         let shut = self.touching(q).iter().position(|touches| *touches);
         let way_out = match shut {
             Some(gap) => format!("`{}` is closed already before that", self.compiled.parts.gap_names[gap]),
-            None => "raise the largest voltage".to_owned(),
+            None => {
+                "raise the largest voltage; a comb, whose force does not grow as it closes, pulls nothing in at any"
+                    .to_owned()
+            }
         };
         AnalysisError::NoEquilibrium { detail: format!("{name} pulls nothing in up to {max} V; {way_out}") }
     }

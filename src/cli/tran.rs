@@ -175,7 +175,7 @@ impl Tran {
             context: self.model.context_of(start.unwrap_or(compiled), compiled).with(&result.warnings),
         };
         let title = self.model.title();
-        let mut text = text(compiled, &result, joints.as_ref());
+        let mut text = text(compiled, &result, joints.as_ref(), &self.events);
         if let Some(taken) = &taken {
             text += &format!("formulation auto took {taken}\n");
         }

@@ -67,7 +67,12 @@ pub(super) fn picture(title: &str, result: &TransientResult) -> Picture {
 /// Crossings that are listed: a part that bounces has many.
 const MOST_EVENTS: usize = 20;
 
-pub(super) fn text(compiled: &Compiled, result: &TransientResult, joints: Option<&JointReport>) -> String {
+pub(super) fn text(
+    compiled: &Compiled,
+    result: &TransientResult,
+    joints: Option<&JointReport>,
+    asked: &[(String, f64)],
+) -> String {
     let rows: Vec<Vec<String>> = result
         .signals
         .iter()
@@ -94,6 +99,10 @@ pub(super) fn text(compiled: &Compiled, result: &TransientResult, joints: Option
         .collect();
     if let Some(more) = result.events.len().checked_sub(MOST_EVENTS).filter(|more| *more > 0) {
         events.push_str(&format!("and {more} crossings more: --json has all\n"));
+    }
+    let crossed = |name: &str, level: f64| result.events.iter().any(|e| e.signal == name && e.level == level);
+    for (name, level) in asked.iter().filter(|(name, level)| !crossed(name, *level)) {
+        events.push_str(&format!("{name} does not cross {level:e}\n"));
     }
     let work = match joints {
         None => format!("{} factorizations, {} solves", c.factorizations, c.solves),

@@ -21,6 +21,9 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+/// How long a folder that another holds is waited for.
+const PATIENCE: Duration = Duration::from_secs(1);
+
 /// The folder of a server.
 #[derive(Debug)]
 pub(super) struct Store {
@@ -67,10 +70,15 @@ impl Store {
         let above = folder.parent().filter(|path| !path.as_os_str().is_empty()).unwrap_or(Path::new("."));
         [folder, above].iter().try_for_each(|folder| disk.keep_names(folder)).map_err(wrong)?;
         let lock = private().open(folder.join("lock")).map_err(wrong)?;
-        match lock.try_lock() {
-            Ok(()) => {}
-            Err(fs::TryLockError::WouldBlock) => return Err(StoreError::InUse { path: folder.to_owned() }),
-            Err(fs::TryLockError::Error(reason)) => return Err(wrong(reason)),
+        // one that is about to end, or a process that it was about to begin, may still hold it
+        let patience = Instant::now() + PATIENCE;
+        loop {
+            match lock.try_lock() {
+                Ok(()) => break,
+                Err(fs::TryLockError::WouldBlock) if Instant::now() < patience => std::thread::sleep(PATIENCE / 50),
+                Err(fs::TryLockError::WouldBlock) => return Err(StoreError::InUse { path: folder.to_owned() }),
+                Err(fs::TryLockError::Error(reason)) => return Err(wrong(reason)),
+            }
         }
         let found = Survey::of(folder).map_err(wrong)?;
         for path in found.left {

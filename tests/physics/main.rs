@@ -20,6 +20,7 @@ mod near_folds;
 mod paths;
 mod relative;
 mod relative_motion;
+mod responses;
 mod scenes;
 mod schemes;
 mod swung;

@@ -21,6 +21,7 @@ use crate::solve::eigen::{Modes, RELIABLE, lowest_modes};
 use crate::solve::frequency::refined::{ROUNDING, Refined};
 use crate::solve::subspace;
 use nalgebra::{Complex, DMatrix, DVector};
+use std::ops::Range;
 
 /// Modes beyond those asked for that an iteration of a block takes along, and the change of λ at which it ends [1].
 const GUARDS: usize = 6;
@@ -224,16 +225,21 @@ impl Sum {
     /// What a row could see at most, were the mode that it sees best the one that is pushed most and nearest to its resonance: below a share
     /// [`UNSEEN`] of that a value is rounding, as across the axis of a symmetric part.
     pub(crate) fn most(&self, s: Complex<f64>, row: usize) -> f64 {
+        let nearest = (0..self.lambda.len())
+            .map(|j| 1.0 / (s * s + s * self.damping[(j, j)] + self.lambda[j]).norm())
+            .fold(0.0, f64::max);
+        self.both(s, row) * nearest * if self.rates[row] { s.norm() } else { 1.0 }
+    }
+
+    /// What it sees of the mode that it sees best, times the push of the mode that is pushed most.
+    fn both(&self, s: Complex<f64>, row: usize) -> f64 {
         let modes = 0..self.lambda.len();
         let seen = modes.clone().map(|j| self.seen[(row, j)].abs()).fold(0.0, f64::max);
         let force = |j: usize| -> f64 {
             let part = |(c, law): (usize, &Law)| law.factor(s).norm() * self.push[(j, c)].abs();
             self.laws.iter().enumerate().map(part).sum()
         };
-        let pushed = modes.clone().map(force).fold(0.0, f64::max);
-        let nearest =
-            modes.map(|j| 1.0 / (s * s + s * self.damping[(j, j)] + self.lambda[j]).norm()).fold(0.0, f64::max);
-        seen * pushed * nearest * if self.rates[row] { s.norm() } else { 1.0 }
+        seen * modes.map(force).fold(0.0, f64::max)
     }
 
     /// What a mode brings to a row at rest, for the push at its own frequency: its peak is so high times its quality. Not a number for one that
@@ -246,10 +252,29 @@ impl Sum {
         force * self.seen[(row, mode)] / *lambda
     }
 
-    /// λ of a mode [rad²/s²], and one over its quality [1]; not numbers for one that there is not.
-    pub(crate) fn resonance(&self, mode: usize) -> (f64, f64) {
+    /// The same for the most that a row could see of a mode, whatever it sees: below a share [`UNSEEN`] of it, its own share is rounding.
+    pub(crate) fn most_of(&self, row: usize, mode: usize) -> f64 {
+        let Some(lambda) = self.lambda.get(mode) else { return 0.0 };
+        self.both(Complex::new(0.0, lambda.max(0.0).sqrt()), row) / lambda
+    }
+
+    /// What all but some modes of one frequency bring to a row at that frequency, added up, with the rest; in the unit of a share.
+    pub(crate) fn beside(&self, row: usize, modes: &Range<usize>) -> f64 {
+        let Some(&lambda) = self.lambda.get(modes.start) else { return 0.0 };
+        let s = Complex::new(0.0, lambda.max(0.0).sqrt());
+        let factors: Vec<f64> = self.laws.iter().map(|law| law.factor(s).norm()).collect();
+        let rest: f64 = factors.iter().enumerate().map(|(c, f)| f * self.rest[(row, c)].abs()).sum();
+        let share = |j: usize| {
+            let force: f64 = factors.iter().enumerate().map(|(c, f)| f * self.push[(j, c)].abs()).sum();
+            self.seen[(row, j)].abs() * force / (self.lambda[j] - lambda).abs()
+        };
+        rest + (0..self.lambda.len()).filter(|j| !modes.contains(j)).map(share).sum::<f64>()
+    }
+
+    /// One over the quality of a mode [1]; not a number for one that there is not.
+    pub(crate) fn loss(&self, mode: usize) -> f64 {
         let lambda = self.lambda.get(mode).copied().unwrap_or(f64::NAN);
-        (lambda, self.damping.get((mode, mode)).map_or(f64::NAN, |damping| damping.abs() / lambda.max(0.0).sqrt()))
+        self.damping.get((mode, mode)).map_or(f64::NAN, |damping| damping.abs() / lambda.max(0.0).sqrt())
     }
 
     /// Nothing damps any of its modes.

@@ -45,6 +45,8 @@ const MOST_MODES: usize = 64;
 const ALIKE: f64 = 0.01;
 /// Modes below this share of the highest λ are rigid motions.
 const RIGID: f64 = 1e-9;
+/// Share of a mode that rows may see of another by rounding, where both have much the same frequency: 5e-10 were seen.
+const SHAPES: f64 = 2e-9;
 /// Sizes below this share of the largest of a signal over the band are errors of that.
 const SMALL: f64 = 1e-9;
 
@@ -158,10 +160,13 @@ impl Sample {
             }
             sum = Some(Sum::new(&exact, &found)?);
             let inside = &found.lambda[..self.inside.min(found.lambda.len())];
-            self.groups.get_or_init(|| groups(inside));
+            let highest = found.lambda.last().copied().unwrap_or(0.0);
+            self.groups.get_or_init(|| groups(inside, highest));
         }
+        // what is rounding at the tolerance asks for no mesh
+        let rounding = modal::UNSEEN.max(SHAPES / model.options.tol);
         if let Some(sum) = &sum {
-            (0..exact.rows.len()).for_each(|row| outputs.extend(self.shares(sum, row)));
+            (0..exact.rows.len()).for_each(|row| outputs.extend(self.shares(sum, row, rounding)));
         }
         let mut values: Vec<Vec<(Complex<f64>, f64)>> = Vec::new();
         for frequency in &self.frequencies {
@@ -173,7 +178,7 @@ impl Sample {
             let pair = at(s).zip(at(s * (1.0 + STEP)));
             values.push(match pair {
                 Some((here, there)) => {
-                    let unseen = |row: usize| sum.as_ref().map_or(0.0, |sum| modal::UNSEEN * sum.most(s, row));
+                    let unseen = |row: usize| sum.as_ref().map_or(0.0, |sum| rounding * sum.most(s, row));
                     let one = |(row, (a, b)): (usize, (&Complex<f64>, &Complex<f64>))| {
                         (*a, (a.norm() + (b - a).norm() / STEP).max(unseen(row)))
                     };
@@ -194,27 +199,23 @@ impl Sample {
     }
 
     /// What the modes within the band bring to a row, those that are alike together.
-    fn shares(&self, sum: &Sum, row: usize) -> Vec<Output> {
+    fn shares(&self, sum: &Sum, row: usize, rounding: f64) -> Vec<Output> {
         let groups = self.groups.get().map_or(&[][..], Vec::as_slice);
         let shares: Vec<Complex<f64>> =
             groups.iter().map(|group| group.clone().map(|j| sum.share(row, j)).sum()).collect();
-        let most = shares.iter().map(|share| share.norm()).filter(|size| size.is_finite()).fold(0.0, f64::max);
-        let lambda: Vec<f64> = groups.iter().map(|group| sum.resonance(group.start).0).collect();
         let output = |(k, share): (usize, &Complex<f64>)| {
             // what the others bring there, above which its peak stands or not
-            let others = (0..shares.len()).filter(|other| *other != k);
-            let level: f64 = others.map(|j| shares[j].norm() * (lambda[j] / (lambda[j] - lambda[k])).abs()).sum();
-            let seen = level * sum.resonance(groups[k].start).1;
-            let scale = share.norm().max(seen).max(modal::UNSEEN * most).max(f64::MIN_POSITIVE);
+            let level = sum.beside(row, &groups[k]);
+            let seen = level * sum.loss(groups[k].start).max(rounding);
+            let scale = share.norm().max(seen).max(rounding * sum.most_of(row, groups[k].start)).max(f64::MIN_POSITIVE);
             [Output { value: share.re, scale }, Output { value: share.im, scale }]
         };
         shares.iter().enumerate().flat_map(output).collect()
     }
 }
 
-/// Groups of modes that are alike; rigid motions are in none.
-fn groups(lambda: &[f64]) -> Vec<Range<usize>> {
-    let highest = lambda.last().copied().unwrap_or(0.0);
+/// Groups of modes that are alike; rigid motions, as they are beside the highest that is known, are in none.
+fn groups(lambda: &[f64], highest: f64) -> Vec<Range<usize>> {
     let first = lambda.iter().position(|l| *l > RIGID * highest).unwrap_or(lambda.len());
     let alike = |a: &f64, b: &f64| *b <= (1.0 + ALIKE).powi(2) * a;
     let mut start = first;

@@ -2,10 +2,11 @@
 //! what becomes of it in between.
 //!
 //! A beam that a step of load throws to twice its rest is stiffer there than anywhere it rests, and one that heat carries through buckling is
-//! softer. So such a run is made on its mesh and on one of half the segments, at ten times the tolerance of the steps, and the difference of
-//! the two is measured as charts measure errors ([`relative_error_above`]). By Richardson's rule, with the order 2 of what stretches, a third of
-//! it is the error of the finer one. Where that is beyond the tolerance segments are doubled; each time the order is measured (what bends
-//! converges faster), until the tolerance holds, and the mesh is the coarsest on the way that is predicted to hold it.
+//! softer. So such a run is made on its mesh and on one of half the segments (where they are no even numbers, on one of twice as many), at ten
+//! times the tolerance of the steps, and the difference of the two is measured as charts measure errors ([`relative_error_above`]). By
+//! Richardson's rule, with the order 2 of what stretches, a third of it is the error of the finer one. Where that is beyond the tolerance segments
+//! are doubled and the order is measured, until the tolerance holds. A coarser mesh on the way that should hold it as well is run and
+//! compared; if it does, it is taken. What is told of a mesh is always of one that was run.
 
 use super::super::AnalysisError;
 use super::super::chart::error::relative_error_above;
@@ -27,21 +28,22 @@ const STRAIGHT: f64 = 0.03;
 const LOOSER: f64 = 10.0;
 /// Loosest tolerance of them.
 const LOOSEST: f64 = 0.1;
-/// Output times that are compared, at most.
-const POINTS: usize = 1001;
+/// Output times that are compared, at least and at most, whatever is printed.
+const POINTS: (usize, usize) = (201, 1001);
 /// Unknowns times steps of one run, at most.
 const MOST_WORK: f64 = 3e6;
 /// Output times that a run must have reached to say something.
 const FEWEST: usize = 16;
 /// Meshes that are tried, at most.
-const MOST_PASSES: usize = 5;
+const MOST_PASSES: usize = 6;
 /// Segments of all beams together, at most.
 const MOST_SEGMENTS: usize = 4000;
-/// Share of the tolerance that the estimate may use.
+/// Share of the tolerance that the estimate may use, and of that what a mesh that was not run is laid out for.
 const SAFETY: f64 = 0.6;
-/// The order of convergence as long as it is not measured, and the highest that is believed.
-const ORDER: f64 = 2.0;
-const FASTEST: f64 = 4.0;
+const AIM: f64 = 0.7;
+/// The order of convergence as long as it is not measured, and the highest that is believed: what stretches has 2, but among coarse meshes, and
+/// where the run is near buckling, it is less, or seems to be more.
+const ORDERS: (f64, f64) = (1.0, 2.0);
 
 /// The mesh for a run, from that for its ends and modes.
 pub(super) fn order(
@@ -51,49 +53,65 @@ pub(super) fn order(
 ) -> Result<ModelOrder, AnalysisError> {
     let beams = !moving.structure.beams.is_empty() && order.segments.len() == moving.order.segments.len();
     let same = options.release.is_none_or(|start| start.order.segments.len() == order.segments.len());
-    if !beams || !same || options.signals.is_empty() || options.points < FEWEST || !bends(moving, options, &order)? {
+    if !beams || !same || options.signals.is_empty() || !bends(moving, options, &order)? {
         return Ok(order);
     }
     let given = chosen(moving) || moving.options.band.is_some();
     let goal = SAFETY * moving.options.tol;
-    let halves: Vec<usize> = order.segments.iter().map(|n| n.div_ceil(2)).collect();
-    // of one segment a beam there is no half
-    let first = if halves == order.segments { twice(moving, &order.segments) } else { Some(order.segments.clone()) };
-    let coarse = swing(moving, options, &halves);
-    let (Some(mut segments), Some(mut coarse)) = (first, coarse) else { return Ok(order) };
-    let (mut before, mut convergence, mut last) = (None, ORDER, order.clone());
+    let on = |segments: &[usize], error: Option<f64>| ModelOrder {
+        segments: segments.to_vec(),
+        estimated_error: order.estimated_error.zip(error).map(|(own, error)| own.max(error)),
+        ..order.clone()
+    };
+    // half of an odd number is none: then twice as many are compared
+    let is_even = order.segments.iter().all(|n| n % 2 == 0);
+    let half = || order.segments.iter().map(|n| n / 2).collect();
+    let pair = if is_even {
+        Some((half(), order.segments.clone()))
+    } else {
+        twice(moving, &order.segments).map(|more| (order.segments.clone(), more))
+    };
+    let first = pair.and_then(|(from, to)| Some((swing(moving, options, &from)?, from, to)));
+    // what fails says so when it is run; nothing tells of what is not compared
+    let Some((mut coarse, mut from, mut segments)) = first else { return Ok(on(&order.segments, None)) };
+    let (mut before, mut convergence) = (None, ORDERS.0);
+    let mut last = on(&order.segments, None);
     for _ in 0..MOST_PASSES {
         let both =
             swing(moving, options, &segments).and_then(|fine| Some((apart(moving, options, &coarse, &fine)?, fine)));
-        // what fails says so when it is run
         let Some((difference, fine)) = both else { return Ok(last) };
         if let Some(before) = before {
-            convergence = f64::log2(before / difference).clamp(1.0, FASTEST);
+            convergence = f64::log2(before / difference).clamp(ORDERS.0, ORDERS.1);
         }
         let error = difference / (convergence.exp2() - 1.0);
-        // on the way from half the segments to these it falls with the order
-        let on = |segments: Vec<usize>, error: f64| ModelOrder {
-            segments,
-            estimated_error: order.estimated_error.map(|own| own.max(error)),
-            ..order.clone()
-        };
-        let share = |from: &[usize]| segments.iter().sum::<usize>() as f64 / from.iter().sum::<usize>() as f64;
-        let at_first = error * share(&order.segments).powf(convergence);
-        if at_first <= goal || given && (before.is_some() || at_first <= 2.0 * goal) {
-            return Ok(on(order.segments.clone(), at_first));
+        let of_coarse = difference + error;
+        if from == order.segments && (given || of_coarse <= goal) {
+            return Ok(on(&from, Some(of_coarse)));
+        }
+        if segments == order.segments && error <= goal {
+            return Ok(on(&segments, Some(error)));
         }
         let next = twice(moving, &segments).filter(|next| next.iter().sum::<usize>() <= MOST_SEGMENTS);
         if error <= goal || next.is_none() {
-            let fewer = (error / goal).powf(1.0 / convergence).clamp(0.5, 1.0);
-            let least =
-                segments.iter().zip(&order.segments).map(|(n, own)| ((*n as f64 * fewer).ceil() as usize).max(*own));
-            return Ok(on(least.collect(), error * fewer.powf(-convergence)));
+            let least = between(&order.segments, &segments, (error / (AIM * goal)).powf(1.0 / convergence));
+            let of_least = (least != segments).then(|| swing(moving, options, &least)).flatten();
+            let of_least = of_least.and_then(|run| apart(moving, options, &run, &fine)).map(|apart| apart + error);
+            return Ok(match of_least.filter(|error| *error <= goal) {
+                Some(error) => on(&least, Some(error)),
+                None => on(&segments, Some(error)),
+            });
         }
-        last = on(segments.clone(), error);
-        (before, coarse) = (Some(difference), fine);
-        segments = next.unwrap_or(segments);
+        last = on(&segments, Some(error));
+        (before, coarse, from) = (Some(difference), fine, segments);
+        segments = next.unwrap_or_default();
     }
     Ok(last)
+}
+
+/// A share of the segments, and no fewer than at least.
+fn between(least: &[usize], segments: &[usize], share: f64) -> Vec<usize> {
+    let share = share.clamp(0.5, 1.0);
+    segments.iter().zip(least).map(|(n, least)| ((*n as f64 * share).ceil() as usize).max(*least)).collect()
 }
 
 /// Twice the segments; none where they are too many.
@@ -123,8 +141,8 @@ fn swing(moving: &Compiled, options: &TransientOptions<'_>, segments: &[usize]) 
     let model = meshed(moving, segments).ok()?;
     let start = options.release.map(|start| meshed(start, segments)).transpose().ok()?;
     let loose = TransientOptions {
-        tol: (LOOSER * options.tol).min(LOOSEST).max(options.tol),
-        points: options.points.min(POINTS),
+        tol: (LOOSER * moving.options.tol).min(LOOSEST).max(moving.options.tol),
+        points: points(options),
         release: start.as_deref(),
         method: Integrator::default(),
         step: None,
@@ -149,6 +167,10 @@ fn swing(moving: &Compiled, options: &TransientOptions<'_>, segments: &[usize]) 
     columns.first().is_some_and(|column| column.len() >= FEWEST).then_some(columns)
 }
 
+fn points(options: &TransientOptions<'_>) -> usize {
+    options.points.clamp(POINTS.0, POINTS.1)
+}
+
 /// How far two runs are apart, of the amplitude.
 fn apart(moving: &Compiled, options: &TransientOptions<'_>, coarse: &[Vec<f64>], fine: &[Vec<f64>]) -> Option<f64> {
     let both = coarse.first()?.len().min(fine.first()?.len());
@@ -162,6 +184,6 @@ fn apart(moving: &Compiled, options: &TransientOptions<'_>, coarse: &[Vec<f64>],
     };
     let (coarse, fine) = (named(coarse)?, named(fine)?);
     let error = relative_error_above(&fine, &coarse, &|unit| step_error::least(unit, options, moving));
-    let share = (both - 1) as f64 / (options.points.min(POINTS) - 1) as f64;
+    let share = (both - 1) as f64 / (points(options) - 1) as f64;
     Some(error / share.min(1.0))
 }

@@ -8,7 +8,12 @@
 //! the method the trapezoidal rule. Newmark's average acceleration is α_m = α_f = 0, γ = ½, β = ¼. Without damping
 //! either may gain energy in a nonlinear structure when steps are long.
 //!
-//! The acceleration is carried from step to step; it begins at M⁻¹ of the forces, and at zero where there is no inertia.
+//! The acceleration is carried from step to step. It begins at that of
+//! ```text
+//! M·a₀ + C·(v₀ + γ·h·a₀) + r(q₀ + β·h²·a₀) = 0
+//! ```
+//! which is that of the forces for motions slower than the first step, and none for those much faster: M⁻¹ of the forces would throw light
+//! bodies that are let go to rates which only the damping of the method takes back. It is zero where there is no inertia.
 //! There is no error estimate of its own; see [`super::doubling`].
 //!
 //! Reference: J. Chung, G. M. Hulbert, J. Appl. Mech. 60 (1993) 371–375; N. M. Newmark, J. Eng. Mech. 85 (1959) 67–94.
@@ -69,21 +74,33 @@ impl<S: LinearSolver> GeneralizedAlpha<S> {
     }
 }
 
+impl<S: LinearSolver> GeneralizedAlpha<S> {
+    /// The acceleration that a motion begins with, as its first step sees it.
+    fn begin(
+        &mut self,
+        system: &System,
+        ramp: &Ramp<'_>,
+        motion: &Motion,
+        (bh2, gbh): (f64, f64),
+    ) -> Result<(), StepFailure> {
+        let model = &system.model;
+        self.constant.fill(Pose::zeros());
+        forces::add_damping(model, &motion.v, &mut self.constant);
+        self.x.fill(Pose::zeros());
+        let samples = [Sample { weight: 1.0, share: 1.0, time: 0.0 }];
+        let equation = Equation { m: bh2, c: gbh, base: &motion.q, constant: &self.constant, samples: &samples };
+        self.implicit.newton(system, ramp, &equation, &mut self.x)?;
+        for (k, (a, x)) in self.acceleration[0].v.iter_mut().zip(&self.x).enumerate() {
+            let mass = model.mass(k);
+            *a = Pose::from_fn(|i, _| if mass[i] > 0.0 { x[i] * bh2 } else { 0.0 });
+        }
+        Ok(())
+    }
+}
+
 impl<S: LinearSolver> Method for GeneralizedAlpha<S> {
     fn error_order(&self) -> f64 {
         3.0
-    }
-
-    fn start(&mut self, system: &System, ramp: &Ramp<'_>, motion: &Motion) -> Result<(), StepFailure> {
-        let a = &mut self.acceleration[0].v;
-        self.implicit.force(system, ramp, 0.0, &motion.q, a);
-        forces::add_damping(&system.model, &motion.v, a);
-        for (k, a) in a.iter_mut().enumerate() {
-            let mass = system.model.mass(k);
-            *a = Pose::from_fn(|i, _| if mass[i] > 0.0 { -a[i] / mass[i] } else { 0.0 });
-        }
-        system.model.project(a);
-        Ok(())
     }
 
     /// `error` receives zero: the method has no estimate of its own.
@@ -98,9 +115,12 @@ impl<S: LinearSolver> Method for GeneralizedAlpha<S> {
     ) -> Result<(), StepFailure> {
         error.clear();
         let model = &system.model;
-        let a = &mut self.acceleration[0].v;
         let Alpha { m, f, beta, gamma } = self.alpha;
         let (bh2, gbh) = (1.0 / (beta * h * h), gamma / (beta * h));
+        if s == 0.0 {
+            self.begin(system, ramp, motion, (bh2, gbh))?;
+        }
+        let a = &mut self.acceleration[0].v;
         let (am, af, am1) = (m / (1.0 - f), f / (1.0 - f), (1.0 - m) / (1.0 - f));
         // a₁ = x/(βh²) + known_a,  v₁ = γ/(βh)·x + known_v
         let known_a = |v: &Pose, a: &Pose| v * (-h * bh2) - a * (0.5 / beta - 1.0);

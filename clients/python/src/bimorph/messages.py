@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from . import sweep as sweeps
-from .errors import Diagnostic
+from .errors import Diagnostic, InvalidRequest
 from .options import WIRE
 from .v1 import analysis_pb2, model_pb2
 
@@ -42,8 +42,24 @@ def diagnostic(d: Any) -> Diagnostic:
     return Diagnostic(d.code, severity, d.file, d.line, d.column, d.message, d.help)
 
 
+def at_least(what: str, value: int, least: int) -> int:
+    """A number that is given; the protocol takes 0 for one that is not."""
+    if value < least:
+        raise InvalidRequest(f"{what}: expected at least {least}, got {value}")
+    return value
+
+
+def listed(what: str, names: Sequence[str]) -> Sequence[str]:
+    """Names, of which a text is none but a list of letters."""
+    if isinstance(names, str):
+        raise InvalidRequest(f'{what}: expected a list of names, got the text "{names}"; write ["{names}"]')
+    return names
+
+
 def named(voltages: Voltages | None) -> list[Any]:
     """Port voltages."""
+    if voltages is not None and not isinstance(voltages, Mapping):
+        raise InvalidRequest(f'voltages: expected names of ports with their volts, as {{"drive": 3.0}}, got {voltages!r}')
     return [analysis_pb2.Named(name=name, value=value) for name, value in (voltages or {}).items()]
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from .channel import Channel
 from .errors import Diagnostic, InvalidRequest, NotFound, Unavailable
-from .messages import Voltages, by_name, diagnostic, estimate_of, named, setting_value
+from .messages import Voltages, at_least, by_name, diagnostic, estimate_of, listed, named, setting_value
 from .results import FrequencyResponse, ModesResult, NodeMotion, PullInResult, Root, StaticResult, TransientResult
 from .session import Session, opened_just_now
 from .stopping import apart
@@ -100,7 +100,7 @@ class Model:
 
     def modes(self, count: int = 6, voltages: Voltages | None = None) -> ModesResult:
         """The ``count`` lowest modes about the equilibrium at these port voltages [V]."""
-        request = analysis_pb2.ModesRequest(model=self.id, count=count, voltages=named(voltages))
+        request = analysis_pb2.ModesRequest(model=self.id, count=at_least("count", count, 1), voltages=named(voltages))
         answer = self._call("Modes", request)
         shapes = [
             {name: NodeMotion(x, y, rz) for name, x, y, rz in zip(answer.nodes, s.x, s.y, s.rz)}
@@ -145,10 +145,10 @@ class Model:
         request = analysis_pb2.FrequencyResponseRequest(
             model=self.id,
             drive=drive,
-            signals=signals,
+            signals=listed("signals", signals),
             from_hz=start,
             to_hz=stop,
-            points=points,
+            points=at_least("points", points, 1),
             spacing=kinds[spacing],
             even=even,
             by_modes=by_modes,
@@ -177,7 +177,7 @@ class Model:
             warnings=tuple(answer.warnings),
         )
 
-    def pull_in(self, max_v: float, port: str = "") -> PullInResult:
+    def pull_in(self, max_v: float = 200.0, port: str = "") -> PullInResult:
         """Pull-in and release voltage [V] of ``port`` (default: the first), looking up to ``max_v`` [V]."""
         request = analysis_pb2.PullInRequest(model=self.id, port=port, max_v=max_v)
         answer = self._call("PullIn", request)
@@ -209,6 +209,10 @@ class Model:
         run then begins in the static equilibrium at 0, and its steps end at every corner. How far mesh and steps may be off is seen from
         a run on a finer mesh with a tenth of ``tol``, which costs several times as much: ``estimate=False`` leaves it out.
         """
+        at_least("points", points, 2)
+        listed("signals", signals)
+        if release is not None and not isinstance(release, Model):
+            raise InvalidRequest(f"release: expected a model, as compile() gives it of the netlist with its load, got {release!r}")
         if inputs is not None:
             if release is not None or tol:
                 raise ValueError("a run along inputs begins in their equilibrium, with the model's own tolerance: no release, no tol")

@@ -40,7 +40,7 @@ class Modes:
 class PullIn:
     """Pull-in and release voltage at each point: columns ``pull_in`` and ``release`` [V]."""
 
-    max_v: float
+    max_v: float = 200.0
     """Highest voltage tried [V]."""
     port: str = ""
     """Port or netlist source; empty: the first."""

@@ -30,7 +30,10 @@ def checked(inputs: Mapping[str, Waveform]) -> dict[str, tuple[NDArray[np.float6
     Raises :class:`ValueError` for one that is none.
     """
     found = {}
-    for port, (t, values) in inputs.items():
+    for port, wave in inputs.items():
+        if not isinstance(wave, (tuple, list)) or len(wave) != 2:
+            raise ValueError(f"input {port!r}: expected (times, values), got {wave!r}; hold a constant one by voltages={{...}}")
+        t, values = wave
         times, levels = np.asarray(t, dtype=float), np.asarray(values, dtype=float)
         if times.ndim != 1 or times.shape != levels.shape or times.size == 0:
             raise ValueError(f"input {port!r}: expected as many times as values, got {times.shape} and {levels.shape}")
