@@ -20,6 +20,7 @@ mod point;
 #[cfg(feature = "server")]
 mod points;
 mod samples;
+pub(crate) mod sealed;
 mod spec;
 mod table;
 mod together;

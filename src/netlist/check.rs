@@ -77,6 +77,7 @@ pub(crate) fn check(drawing: &Drawing, sink: &mut Sink) {
         connected[b.0] = true;
         parts.join(a.0, b.0);
     }
+    structure.placed.iter().flat_map(|placed| &placed.nodes).for_each(|node| connected[node.0] = true);
     loose_nodes(drawing, &connected, sink);
     unheld_parts(drawing, &connected, &mut parts, sink);
     floating_potentials(drawing, sink);

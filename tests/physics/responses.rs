@@ -22,7 +22,8 @@ const FLOATS: &str = "process p = [Youngsmodulus=160e9 density=2330 h=2u viscosi
 /// each other: 6,165 to 588,699 unknowns, and warnings.
 #[test]
 fn rounding_asks_for_no_mesh() {
-    let cases: [(String, bool, &str, &[&str], f64, f64); 6] = [
+    type Case<'a> = (String, bool, &'a str, &'a [&'a str], f64, f64);
+    let cases: [Case<'_>; 6] = [
         (plate(0.0), false, "s.fx", &["s.x", "s.y", "s.rz"], 1e3, 2e6),
         (plate(0.0), false, "s.fy", &["s.y"], 1e3, 5e5),
         (plate(0.3), false, "s.fx", &["s.rz"], 1e3, 5e5),

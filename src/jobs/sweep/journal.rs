@@ -3,7 +3,7 @@
 //! was not finished, and its point is computed again.
 //! Each line has the sum of its bytes, so that one that is damaged is none.
 
-use super::point::{Found, Outcome, Value};
+use super::sealed::{opened, sealed};
 use super::spec::SweepSpec;
 use crate::content::Fnv;
 use crate::netlist::{Bundle, Setting};
@@ -268,65 +268,6 @@ pub fn lines(points: &[Kept]) -> io::Result<Vec<u8>> {
         lines.extend(sealed(serde_json::to_vec(point)?));
     }
     Ok(lines)
-}
-
-/// What stands before the sum of a line, and its length with what stands behind it.
-const SUM: &[u8] = b",\"sum\":\"";
-const SUMMED: usize = SUM.len() + 32 + 3;
-
-/// An object of JSON with the sum of its bytes, as a line.
-pub(crate) fn sealed(mut object: Vec<u8>) -> Vec<u8> {
-    let sum = sum(&object);
-    object.pop();
-    object.extend([SUM, format!("{sum:032x}\"}}\n").as_bytes()].concat());
-    object
-}
-
-fn sum(object: &[u8]) -> u128 {
-    let mut sum = Fnv::default();
-    sum.bytes(object);
-    sum.value()
-}
-
-/// The object of such a line; none for one that is damaged.
-pub(crate) fn opened(line: &[u8]) -> Option<Vec<u8>> {
-    let (object, end) = line.split_at_checked(line.len().checked_sub(SUMMED)?)?;
-    let written = std::str::from_utf8(end.strip_prefix(SUM)?.strip_suffix(b"\"}\n")?).ok()?;
-    let object = [object, b"}"].concat();
-    (u128::from_str_radix(written, 16).ok()? == sum(&object)).then_some(object)
-}
-
-impl Outcome {
-    /// What a journal keeps of it.
-    pub(super) fn kept(&self) -> Kept {
-        let (values, estimated_error, warning, error) = match &self.values {
-            Ok(found) => {
-                let each = found.values.iter().map(|v| (v.name.clone(), v.unit.clone().into_owned(), v.value));
-                (each.collect(), found.estimated_error, found.warning.clone(), None)
-            }
-            Err(error) => (Vec::new(), None, String::new(), Some(error.to_string())),
-        };
-        Kept { point: self.number, values, estimated_error, warning, error }
-    }
-}
-
-impl Kept {
-    /// The point as it was.
-    pub(super) fn outcome(self, spec: &SweepSpec) -> Outcome {
-        let parameters = spec.settings(self.point).into_iter().map(|(_, value)| value).collect();
-        self.with(parameters)
-    }
-
-    /// The same with the values of its parameters.
-    pub(super) fn with(self, parameters: Vec<Setting>) -> Outcome {
-        let Self { point: number, values, estimated_error, warning, error } = self;
-        let value = |(name, unit, value): (String, String, _)| Value { name, unit: unit.into(), value };
-        let values = match error {
-            Some(error) => Err(error.into()),
-            None => Ok(Found { values: values.into_iter().map(value).collect(), estimated_error, warning }),
-        };
-        Outcome { number, parameters, values }
-    }
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 use super::axis::{VOLTS, at, chosen};
 use super::error::SweepError;
 use super::family::Family;
+use super::journal::Kept;
 use super::means::Means;
 use super::spec::{SweepAnalysis, SweepSpec};
 use crate::analysis::mesh::given::{Answer, Judged, judged, searched};
@@ -93,6 +94,39 @@ impl Outcome {
         };
         // and once more in the table
         2 * (size_of::<Self>() + parameters + values)
+    }
+}
+
+impl Outcome {
+    /// What a journal keeps of it.
+    pub(super) fn kept(&self) -> Kept {
+        let (values, estimated_error, warning, error) = match &self.values {
+            Ok(found) => {
+                let each = found.values.iter().map(|v| (v.name.clone(), v.unit.clone().into_owned(), v.value));
+                (each.collect(), found.estimated_error, found.warning.clone(), None)
+            }
+            Err(error) => (Vec::new(), None, String::new(), Some(error.to_string())),
+        };
+        Kept { point: self.number, values, estimated_error, warning, error }
+    }
+}
+
+impl Kept {
+    /// The point as it was.
+    pub(super) fn outcome(self, spec: &SweepSpec) -> Outcome {
+        let parameters = spec.settings(self.point).into_iter().map(|(_, value)| value).collect();
+        self.with(parameters)
+    }
+
+    /// The same with the values of its parameters.
+    pub(super) fn with(self, parameters: Vec<Setting>) -> Outcome {
+        let Self { point: number, values, estimated_error, warning, error } = self;
+        let value = |(name, unit, value): (String, String, _)| Value { name, unit: unit.into(), value };
+        let values = match error {
+            Some(error) => Err(error.into()),
+            None => Ok(Found { values: values.into_iter().map(value).collect(), estimated_error, warning }),
+        };
+        Outcome { number, parameters, values }
     }
 }
 

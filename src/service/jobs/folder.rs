@@ -7,6 +7,7 @@ use super::super::store::Store;
 use super::super::survey::is_id;
 use super::asked::Asked;
 use crate::jobs::sweep::journal::{self, Journal, JournalError, Kept};
+use crate::jobs::sweep::sealed::{opened, sealed};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::fs;
@@ -166,7 +167,7 @@ impl JobFile {
         let head = read_head(&bytes).ok_or_else(strange)?;
         // one that is damaged is as if it had never been: the job goes on
         let end = there("end")?.and_then(|bytes| {
-            let end: Option<End> = journal::opened(&bytes).and_then(|object| serde_json::from_slice(&object).ok());
+            let end: Option<End> = opened(&bytes).and_then(|object| serde_json::from_slice(&object).ok());
             if end.is_none() {
                 tracing::warn!(job = self.id, "its end is damaged, so it goes on");
             }
@@ -243,8 +244,7 @@ impl JobFile {
     /// What the system said.
     pub(super) fn end(&self, end: &End) -> io::Result<()> {
         let end = End { bytes: self.journal.as_ref().map_or_else(|| self.row_bytes(), Journal::bytes), ..end.clone() };
-        let (bytes, path, unfinished) =
-            (journal::sealed(serde_json::to_vec(&end)?), self.path("end"), self.path("new"));
+        let (bytes, path, unfinished) = (sealed(serde_json::to_vec(&end)?), self.path("end"), self.path("new"));
         let before = usize::try_from(self.size("end")).unwrap_or(usize::MAX);
         self.store.room().count(0, bytes.len());
         self.bytes.fetch_add(bytes.len(), Ordering::Relaxed);
