@@ -10,6 +10,7 @@ mod crew;
 mod design;
 mod distribution;
 mod error;
+mod failed;
 mod family;
 pub mod journal;
 mod means;

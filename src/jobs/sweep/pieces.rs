@@ -3,9 +3,10 @@
 use super::axis;
 use super::crew::Crew;
 use super::error::SweepError;
+use super::failed::Failed;
 use super::family::Family;
 use super::means::Means;
-use super::point::{self, Failed, Outcome};
+use super::point::{self, Outcome};
 use super::spec::{SweepAnalysis, SweepSpec};
 use super::together::{self, Together};
 use super::transient::{self, Transients};

@@ -2,6 +2,7 @@
 
 use super::axis::{VOLTS, at, chosen};
 use super::error::SweepError;
+use super::failed::Failed;
 use super::family::Family;
 use super::journal::Kept;
 use super::means::Means;
@@ -10,12 +11,11 @@ use crate::analysis::mesh::given::{Answer, Judged, judged, searched};
 use crate::analysis::mesh::{self, Request};
 use crate::analysis::signal::Signal;
 use crate::analysis::{AnalysisError, statics};
-use crate::budget::{self, Stopped};
+use crate::budget;
 use crate::compile::{CompileError, CompileOptions, draw};
 use crate::netlist::{Setting, Severity, Source};
 use std::borrow::Cow;
 use std::collections::HashSet;
-use std::fmt;
 
 /// What columns of a static sweep are called.
 const OUTPUTS: &str = "NODE.x, NODE.y, NODE.rz, BEAM.T, PORT.i or PORT.q";
@@ -36,39 +36,6 @@ pub(super) struct Outcome {
     pub(super) number: usize,
     pub(super) parameters: Vec<Setting>,
     pub(super) values: Result<Found, Failed>,
-}
-
-/// Why a point has no result.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) enum Failed {
-    /// It has none, whoever computes it.
-    Point(String),
-    /// What its owner may use is used up: it may have one another time.
-    Owner(Stopped),
-}
-
-impl From<String> for Failed {
-    fn from(text: String) -> Self {
-        Self::Point(text)
-    }
-}
-
-impl From<Stopped> for Failed {
-    fn from(why: Stopped) -> Self {
-        match why {
-            Stopped::OwnerBytes { .. } | Stopped::OwnerCpu { .. } => Self::Owner(why),
-            why => Self::Point(why.to_string()),
-        }
-    }
-}
-
-impl fmt::Display for Failed {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Point(text) => f.write_str(text),
-            Self::Owner(why) => why.fmt(f),
-        }
-    }
 }
 
 /// The results of a point.

@@ -8,9 +8,10 @@
 //! beyond the tolerance.
 
 use super::axis::{SweepParameter, at};
+use super::failed::Failed;
 use super::family::{alike, middle};
 use super::means::Means;
-use super::point::{Failed, Found, Outcome, Value, brief};
+use super::point::{Found, Outcome, Value, brief};
 use super::samples::Samples;
 use super::spec::{SweepAnalysis, SweepSpec};
 use crate::analysis::AnalysisError;
