@@ -174,9 +174,9 @@ fn one_motion() {
         (1345, 1, 8076, 8076, 16152, 8076),
         (1345, 1, 8076, 8076, 8076, 8076),
         (709, 16, 2900, 3625, 3625, 2900),
-        (1274, 5, 7674, 7674, 11512, 7674),
-        (1345, 1, 8076, 8076, 12115, 8076),
-        (1345, 1, 8076, 8076, 8077, 8076),
+        (1274, 5, 7678, 7678, 11515, 7678),
+        (1345, 1, 8080, 8080, 12118, 8080),
+        (1345, 1, 8080, 8080, 8080, 8080),
         (773, 71, 1688, 4220, 5908, 1688),
         (8183, 64, 0, 0, 49483, 0),
         (1138, 0, 11380, 12518, 11380, 11380),
@@ -185,13 +185,14 @@ fn one_motion() {
 }
 
 /// Steps of 2 µs are too long for methods that damp nothing: on the undamped bank Newmark's rule and generalized-α with ρ = 1
-/// gain more than half, the midpoint rule more than a tenth of the energy, then no step can be taken any more, all within a
-/// millisecond; the error names time, step and body. Generalized-α with ρ = 0.8 goes through at 1 µs, and loses energy.
+/// gain energy, the midpoint rule more than a tenth of it, then no step can be taken any more, all within a
+/// millisecond; the error names time, step and body. (The first two gained more than half when they began with M⁻¹ of the forces, which a
+/// step of 2 µs makes a noise that nothing damps.) Generalized-α with ρ = 0.8 goes through at 1 µs, and loses energy.
 #[test]
 fn long_steps() {
     let bank = released_bank();
     let undamped =
-        [(Integrator::Newmark, 0.5), (Integrator::GeneralizedAlpha { rho: 1.0 }, 0.5), (Integrator::Midpoint, 0.1)];
+        [(Integrator::Newmark, 0.01), (Integrator::GeneralizedAlpha { rho: 1.0 }, 0.01), (Integrator::Midpoint, 0.1)];
     for (method, least) in undamped {
         match drift(&bank, method, 2e-6, 1e-3) {
             Err(SolveError::StepFailed { t, dt, body, .. }) => {
