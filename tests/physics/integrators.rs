@@ -185,14 +185,14 @@ fn one_motion() {
 }
 
 /// Steps of 2 µs are too long for methods that damp nothing: on the undamped bank Newmark's rule and generalized-α with ρ = 1
-/// gain energy, the midpoint rule more than a tenth of it, then no step can be taken any more, all within a
-/// millisecond; the error names time, step and body. (The first two gained more than half when they began with M⁻¹ of the forces, which a
-/// step of 2 µs makes a noise that nothing damps.) Generalized-α with ρ = 0.8 goes through at 1 µs, and loses energy.
+/// gain more than a hundredth and more than half, the midpoint rule more than a tenth of the energy, then no step can be taken any more, all
+/// within a millisecond; the error names time, step and body. (Newmark's rule gained 79 % as well when it began with M⁻¹ of the forces, which
+/// a step of 2 µs makes a noise that nothing damps.) Generalized-α with ρ = 0.8 goes through at 1 µs, and loses energy.
 #[test]
 fn long_steps() {
     let bank = released_bank();
     let undamped =
-        [(Integrator::Newmark, 0.01), (Integrator::GeneralizedAlpha { rho: 1.0 }, 0.01), (Integrator::Midpoint, 0.1)];
+        [(Integrator::Newmark, 0.01), (Integrator::GeneralizedAlpha { rho: 1.0 }, 0.5), (Integrator::Midpoint, 0.1)];
     for (method, least) in undamped {
         match drift(&bank, method, 2e-6, 1e-3) {
             Err(SolveError::StepFailed { t, dt, body, .. }) => {
