@@ -1,6 +1,7 @@
 //! The potential whose gradient the residual is, and with it the energy that an undamped motion keeps.
 //!
-//! At constant voltages and temperatures Π = U(q) − Σ ½·C(q)·V² + contact − load · displacement, and kinetic energy plus Π
+//! At constant voltages and temperatures Π = U(q) − Σ ½·C(q)·V² + contact − load · displacement, with the forces and
+//! the motion of the frame that sources give among the loads, and kinetic energy plus Π
 //! does not change: what the sources deliver is in −½·C·V².
 
 use super::domain::Domain;
@@ -26,7 +27,7 @@ impl System {
         for load in &self.loads {
             sum += load.energy(at, drive.load);
         }
-        sum
+        sum + self.input_energy(at, drive)
     }
 
     /// Kinetic energy plus potential [J] of a motion (q, v) at a drive.

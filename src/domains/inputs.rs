@@ -4,12 +4,13 @@
 use super::domain::{At, Domain};
 use super::drive::Drive;
 pub use super::input::Input;
+use super::load::Load;
 pub use super::moving_frame::Frame;
 use super::moving_frame::InFrame;
-use super::point_force::PointForce;
 use super::system::System;
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
+use nalgebra::Vector2;
 
 impl System {
     /// Motion of the frame in a drive; none where no input moves it.
@@ -42,8 +43,8 @@ impl System {
 
     /// `r +=` the share of inputs in the residual.
     pub(super) fn add_input_forces(&self, at: At<'_>, drive: &Drive, r: &mut [Pose]) {
-        for (force, size) in self.point_forces(&drive.inputs) {
-            force.add_force(at, size, r);
+        for (load, size) in self.given_loads(&drive.inputs) {
+            load.add_force(at, size, r);
         }
         r.iter_mut().zip(&drive.push).for_each(|(r, push)| *r -= push);
         if let Some(frame) = self.frame(drive) {
@@ -53,8 +54,8 @@ impl System {
 
     /// `r +=` the change of that share with a change of the drive.
     pub(super) fn add_input_change(&self, at: At<'_>, drive: &Drive, change: &Drive, r: &mut [Pose]) {
-        for ((force, change), (_, size)) in self.point_forces(&change.inputs).zip(self.point_forces(&drive.inputs)) {
-            force.add_force_change(at, size, change, r);
+        for ((load, change), (_, size)) in self.given_loads(&change.inputs).zip(self.given_loads(&drive.inputs)) {
+            load.add_force_change(at, size, change, r);
         }
         if let (Some(frame), Some(change)) = (self.frame(drive), self.frame(change)) {
             self.in_frame().add_force_change(at, frame, change, r);
@@ -63,18 +64,30 @@ impl System {
 
     /// `tangent +=` the share of inputs in ∂r/∂q but for the skew one of Euler's force.
     pub(super) fn add_input_tangent(&self, at: At<'_>, drive: &Drive, tangent: &mut BlockMatrix<f64, 3>) {
-        for (force, size) in self.point_forces(&drive.inputs) {
-            force.add_tangent(at, size, &self.model.pattern, tangent);
+        for (load, size) in self.given_loads(&drive.inputs) {
+            load.add_tangent(at, size, &self.model.pattern, tangent);
         }
         if let Some(frame) = self.frame(drive) {
             self.in_frame().add_tangent(at, frame, &self.model.pattern, tangent);
         }
     }
 
-    /// The forces and moments among the inputs, with their values.
-    fn point_forces<'a>(&'a self, values: &'a [f64]) -> impl Iterator<Item = (PointForce, f64)> + 'a {
-        self.electrics.inputs.iter().zip(values).filter_map(|(input, value)| match *input {
-            Input::Force { point, direction } => Some((PointForce { point, direction }, *value)),
+    /// Their share in the potential [J] but for Euler's force, which has none.
+    pub(super) fn input_energy(&self, at: At<'_>, drive: &Drive) -> f64 {
+        let given: f64 = self.given_loads(&drive.inputs).map(|(load, size)| load.energy(at, size)).sum();
+        let pushed: f64 = at.q.iter().zip(&drive.push).map(|(q, push)| q.dot(push)).sum();
+        given - pushed + self.frame(drive).map_or(0.0, |frame| self.in_frame().energy(at, frame))
+    }
+
+    /// The forces and moments among the inputs: loads of one unit, with their sizes [N, N·m].
+    pub(super) fn given_loads<'a>(&'a self, values: &'a [f64]) -> impl Iterator<Item = (Load, f64)> + 'a {
+        let unit = |point, direction| match direction {
+            0 => Load { point, force: Vector2::x(), moment: 0.0 },
+            1 => Load { point, force: Vector2::y(), moment: 0.0 },
+            _ => Load { point, force: Vector2::zeros(), moment: 1.0 },
+        };
+        self.electrics.inputs.iter().zip(values).filter_map(move |(input, value)| match *input {
+            Input::Force { point, direction } => Some((unit(point, direction), *value)),
             _ => None,
         })
     }

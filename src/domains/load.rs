@@ -1,4 +1,4 @@
-//! Dead loads: forces that keep their direction, and moments.
+//! Dead loads: forces that keep their direction, and moments; those of a netlist, and those that a source gives.
 
 use super::approach::Point;
 use super::domain::{At, Domain};
@@ -6,7 +6,7 @@ use crate::multibody::planar::{self, Pose};
 use crate::multibody::{BlockMatrix, BodyId, Pattern};
 use nalgebra::Vector2;
 
-/// A dead load on a point. What drives it is the share of it that acts [1].
+/// A dead load on a point. What drives it is the share of it that acts [1]; of one unit, its size [N, N·m].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Load {
     /// Where it acts.

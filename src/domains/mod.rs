@@ -17,7 +17,7 @@
 //! | [`dashpot`] | a damper to the ground |
 //! | [`drawn`], [`element`] | from a drawing to them; elements of their own |
 //! | [`electrodes`], [`facing_beams`], [`stop_pair`] | combs and plates; beams that face each other; stops |
-//! | [`load`], [`point_force`], [`moving_frame`] | dead loads; forces that sources give; the motion of the frame |
+//! | [`load`], [`moving_frame`] | dead loads, and forces that sources give; the motion of the frame |
 //! | [`facing`] | two facing beams: pressure along a gap that varies over their length |
 //! | `facing_ends` | where facing beams measure |
 //! | [`network`] | potentials of a resistive network driven by ports and sources |
@@ -54,7 +54,6 @@ pub mod load;
 pub mod member;
 pub mod moving_frame;
 pub mod network;
-pub mod point_force;
 mod reading;
 pub mod stop;
 pub mod stop_pair;

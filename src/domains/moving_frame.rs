@@ -56,6 +56,14 @@ impl Domain for InFrame<'_> {
         self.add(at.q, &change, 2.0 * frame.rate * change.rate, r);
     }
 
+    fn energy(&self, at: At<'_>, frame: Frame) -> f64 {
+        let of = |(q, body): (&Pose, &Body)| {
+            let outward = 0.5 * (q.xy().norm_squared() + 2.0 * body.center.dot(&q.xy()));
+            body.mass * (frame.acceleration.dot(&q.xy()) - frame.rate * frame.rate * outward)
+        };
+        at.q.iter().zip(self.0).map(of).sum()
+    }
+
     /// But for the skew share of Euler's force.
     fn add_tangent(&self, _: At<'_>, frame: Frame, _: &Pattern, tangent: &mut BlockMatrix<f64, 3>) {
         if frame.rate == 0.0 {

@@ -149,6 +149,9 @@ impl System {
         for load in &self.loads {
             load.levers(at, drive.load, &mut lever);
         }
+        for (load, size) in self.given_loads(&drive.inputs) {
+            load.levers(at, size, &mut lever);
+        }
         for (gap, &volts) in self.members.iter().zip(&drive.volts) {
             gap.levers(at, volts, &mut lever);
         }

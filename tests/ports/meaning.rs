@@ -1,6 +1,7 @@
 //! Forces, accelerations and heat mean what they say.
 
 use crate::{FORMULATIONS, ask, compiled, opened};
+use bimorph::analysis::statics::static_equilibrium;
 use bimorph::compile::Formulation;
 use bimorph::device::Mode;
 
@@ -39,6 +40,27 @@ fn forces_and_accelerations_move_a_mass() {
             let exact = sag * (1.0 - (-zeta * omega * t).exp() * swing);
             assert!((at.currents[0] - exact).abs() < 1e-4 * sag.abs(), "{t:e}: {:e} {exact:e}", at.currents[0]);
         }
+    }
+}
+
+/// An arch that a port pushes through snaps to where the same dead load takes it. Before, its equilibrium was lost: what a port gives was no part of
+/// the potential in which a fall descends.
+#[test]
+fn an_arch_snaps_under_a_port_as_under_a_load() {
+    let text = |load: &str| {
+        format!(
+            "process p = [Youngsmodulus=165e9 density=2300 h=20u]\nanchor p [a] []\nb1 beam2d p [a m] [l=200u w=2u oz=0.05]\n\
+             b2 beam2d p [m b] [l=200u w=2u oz=-0.05]\nanchor p [b] []\n{load}"
+        )
+    };
+    for force in [0.5e-3, 2e-3] {
+        let drawn = compiled(&text(&format!("f2d * [m] [F={force:e} oz=-pi/2]\n")), Formulation::Compliant);
+        let found = static_equilibrium(&drawn, &Vec::new()).unwrap();
+        let load = found.nodes.iter().find(|(name, _)| name == "m").unwrap().1.y;
+        let mut device = opened(&compiled(&text(""), Formulation::Compliant), &["m.y"], &[]);
+        let port = ask(&mut device, Mode::Static, None, 0.0, &[-force]).currents[0];
+        println!("{force:e} N: {load:e} {port:e} m");
+        assert!(found.jumped && load < -15e-6 && (port / load - 1.0).abs() < 1e-9, "{force:e}: {load:e} {port:e}");
     }
 }
 

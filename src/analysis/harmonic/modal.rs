@@ -211,14 +211,11 @@ impl Sum {
 
     /// Magnitudes of what modes and the rest bring to a row, added up: what its value is small against where they cancel.
     pub(super) fn reach(&self, s: Complex<f64>, row: usize) -> f64 {
-        let factors: Vec<f64> = self.laws.iter().map(|law| law.factor(s).norm()).collect();
-        let rest: f64 = factors.iter().enumerate().map(|(c, f)| f * self.rest[(row, c)].abs()).sum();
         let mode = |j: usize| {
-            let force: f64 = factors.iter().enumerate().map(|(c, f)| f * self.push[(j, c)].abs()).sum();
             let stiff = s * s + s * self.damping[(j, j)] + self.lambda[j];
-            self.seen[(row, j)].abs() * force / stiff.norm()
+            self.seen[(row, j)].abs() * self.pushed(s, j) / stiff.norm()
         };
-        let level = rest + (0..self.lambda.len()).map(mode).sum::<f64>();
+        let level = self.left(s, row) + (0..self.lambda.len()).map(mode).sum::<f64>();
         if self.rates[row] { s.norm() * level + self.conducted[row].abs() } else { level }
     }
 
@@ -231,15 +228,23 @@ impl Sum {
         self.both(s, row) * nearest * if self.rates[row] { s.norm() } else { 1.0 }
     }
 
+    /// Magnitudes of the parts of the push on a mode, added up.
+    fn pushed(&self, s: Complex<f64>, mode: usize) -> f64 {
+        let part = |(c, law): (usize, &Law)| law.factor(s).norm() * self.push[(mode, c)].abs();
+        self.laws.iter().enumerate().map(part).sum()
+    }
+
+    /// The same of what a row sees of the rest.
+    fn left(&self, s: Complex<f64>, row: usize) -> f64 {
+        let part = |(c, law): (usize, &Law)| law.factor(s).norm() * self.rest[(row, c)].abs();
+        self.laws.iter().enumerate().map(part).sum()
+    }
+
     /// What it sees of the mode that it sees best, times the push of the mode that is pushed most.
     fn both(&self, s: Complex<f64>, row: usize) -> f64 {
         let modes = 0..self.lambda.len();
         let seen = modes.clone().map(|j| self.seen[(row, j)].abs()).fold(0.0, f64::max);
-        let force = |j: usize| -> f64 {
-            let part = |(c, law): (usize, &Law)| law.factor(s).norm() * self.push[(j, c)].abs();
-            self.laws.iter().enumerate().map(part).sum()
-        };
-        seen * modes.map(force).fold(0.0, f64::max)
+        seen * modes.map(|j| self.pushed(s, j)).fold(0.0, f64::max)
     }
 
     /// What a mode brings to a row at rest, for the push at its own frequency: its peak is so high times its quality. Not a number for one that
@@ -262,13 +267,9 @@ impl Sum {
     pub(crate) fn beside(&self, row: usize, modes: &Range<usize>) -> f64 {
         let Some(&lambda) = self.lambda.get(modes.start) else { return 0.0 };
         let s = Complex::new(0.0, lambda.max(0.0).sqrt());
-        let factors: Vec<f64> = self.laws.iter().map(|law| law.factor(s).norm()).collect();
-        let rest: f64 = factors.iter().enumerate().map(|(c, f)| f * self.rest[(row, c)].abs()).sum();
-        let share = |j: usize| {
-            let force: f64 = factors.iter().enumerate().map(|(c, f)| f * self.push[(j, c)].abs()).sum();
-            self.seen[(row, j)].abs() * force / (self.lambda[j] - lambda).abs()
-        };
-        rest + (0..self.lambda.len()).filter(|j| !modes.contains(j)).map(share).sum::<f64>()
+        let share = |j: usize| self.seen[(row, j)].abs() * self.pushed(s, j) / (self.lambda[j] - lambda).abs();
+        let others = (0..self.lambda.len()).filter(|j| !modes.contains(j));
+        self.left(s, row) + others.map(share).sum::<f64>()
     }
 
     /// One over the quality of a mode [1]; not a number for one that there is not.

@@ -4,8 +4,8 @@
 //! A beam that a step of load throws to twice its rest is stiffer there than anywhere it rests, and one that heat carries through buckling is
 //! softer. So such a run is made on its mesh and on one of half the segments (where they are no even numbers, on one of twice as many), at ten
 //! times the tolerance of the steps, and the difference of the two is measured as charts measure errors ([`relative_error_above`]). By
-//! Richardson's rule, with the order 2 of what stretches, a third of it is the error of the finer one. Where that is beyond the tolerance segments
-//! are doubled and the order is measured, until the tolerance holds. A coarser mesh on the way that should hold it as well is run and
+//! Richardson's rule it is the error of the finer one where the order of convergence is 1, as it is taken to be until it is measured, and three
+//! times that where it is 2. Where it is beyond the tolerance segments are doubled, until the tolerance holds. A coarser mesh on the way that should hold it as well is run and
 //! compared; if it does, it is taken. What is told of a mesh is always of one that was run.
 
 use super::super::AnalysisError;
