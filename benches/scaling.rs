@@ -11,7 +11,6 @@
 #[path = "../tests/topologies/mod.rs"]
 mod topologies;
 
-use bimorph::domains::drive::Electrics;
 use bimorph::domains::{Drive, Ramp, System};
 use bimorph::multibody::planar::Pose;
 use bimorph::multibody::rcr::{Linkage, Reduction};
@@ -20,6 +19,7 @@ use bimorph::solve::joint_stage::{ImplicitMotion, Stage};
 use bimorph::solve::method::{Method, Motion};
 use bimorph::solve::rodas4::Rodas4;
 use std::hint::black_box;
+use std::sync::Arc;
 use std::time::Instant;
 
 const SIZES: [usize; 9] = [100, 316, 1_000, 3_160, 10_000, 31_600, 100_000, 316_000, 1_000_000];
@@ -40,7 +40,7 @@ fn measure(name: &str, coordinates: usize) -> (usize, [f64; 8]) {
     let reduction = reduction(&topology);
     let implicit = implicit(&topology);
     let model = topology.model();
-    let electrics = Electrics::default();
+    let electrics = Arc::default();
     let system = System { model, members: Vec::new(), loads: Vec::new(), electrics, length_scale: 2e-6 };
     let (n, model) = (system.bodies(), &system.model);
     let pattern = &model.pattern;

@@ -1,5 +1,5 @@
 //! One Trial over the stream: the cost of the wire alone (the device echoes), and a transient Trial of a lumped plate in
-//! process and over the wire.
+//! process and over the wire; and steps of the plate as Python takes them ([`Lines`]): a trial, and its accept, which nobody waits for.
 //!
 //! Client and server each run on one thread, as a plug-in and `bimorph serve` do. For figures that can be compared, keep
 //! both on one core, where no thread waits for another core to wake: `taskset -c 0 cargo bench --bench stream`.
@@ -10,9 +10,11 @@ use bimorph::device::local::LocalDevice;
 use bimorph::device::{Device, Mode, OpenRequest, Trial, TrialReply};
 use bimorph::netlist::Bundle;
 use bimorph::service::address::Address;
-use bimorph::service::client::RemoteDevice;
+use bimorph::service::client::{Client, Lines, RemoteDevice};
+use bimorph::service::proto::{self, device_reply, device_request};
 use bimorph::service::server::{MakeDevice, ServeOptions, run_with};
 use criterion::{Criterion, criterion_group, criterion_main};
+use prost::Message;
 use std::hint::black_box;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -20,6 +22,8 @@ use std::time::{Duration, Instant};
 #[path = "../tests/service/echo.rs"]
 mod echo;
 
+/// How long an answer may take.
+const PATIENCE: Duration = Duration::from_secs(10);
 const CALLS: usize = 20_000;
 /// A plate on a spring over an electrode. The echo device does not look at it.
 const NETLIST: &str = "anchor * [f] [l=1u w=1u h=1u]
@@ -49,8 +53,7 @@ fn serve(listen: &str, make: MakeDevice) -> Address {
 
 fn connect(address: &Address) -> RemoteDevice {
     let bundle = Bundle::from_text("plate.net", NETLIST);
-    RemoteDevice::connect(&address.uri(), &bundle, &CompileOptions::default(), Duration::from_secs(10))
-        .expect("the server compiles")
+    RemoteDevice::connect(&address.uri(), &bundle, &CompileOptions::default(), PATIENCE).expect("the server compiles")
 }
 
 fn ask(device: &mut dyn Device, request: &Trial<'_>, reply: &mut TrialReply) {
@@ -92,6 +95,40 @@ fn steps(criterion: &mut Criterion, name: &str, device: &mut dyn Device) {
     percentiles(name, step);
 }
 
+/// Steps by a line, each from the state of the one before.
+fn lines(criterion: &mut Criterion, name: &str, address: &Address) {
+    let mut client = Client::connect(&address.uri(), PATIENCE).expect("connects");
+    let model = client.compile(&Bundle::from_text("plate.net", NETLIST), &CompileOptions::default()).expect("compiles");
+    let lines = Lines::new().expect("a thread");
+    let mut line = lines.open(&address.uri(), None, PATIENCE, &|| true).expect("a stream");
+    let mut ask = |kind| {
+        let request = proto::DeviceRequest { kind: Some(kind) }.encode_to_vec();
+        let reply = line.ask(&request, PATIENCE, &|| true).expect("an answer")?;
+        proto::DeviceReply::decode(&*reply).expect("a reply").kind
+    };
+    let open = proto::OpenRequest { model, signals: vec!["m.x".into()], ..Default::default() };
+    ask(device_request::Kind::Open(open));
+    let (mut parent, mut t) = (0, 0.0);
+    let mut step = |k: usize| {
+        let mode = if parent == 0 { proto::Mode::Static } else { proto::Mode::Transient };
+        let dt = if parent == 0 { 0.0 } else { 1e-7 };
+        t += dt;
+        let voltages = vec![1.0 + 1e-3 * (k % 7) as f64];
+        let trial = proto::TrialRequest { mode: mode.into(), parent, t, dt, voltages };
+        let Some(device_reply::Kind::Trial(reply)) = ask(device_request::Kind::Trial(trial)) else { panic!("a trial") };
+        parent = reply.token;
+        ask(device_request::Kind::Accept(proto::Accept { token: reply.token, answer: false }));
+    };
+    let mut k = 0;
+    criterion.bench_function(name, |b| {
+        b.iter(|| {
+            k += 1;
+            step(k);
+        });
+    });
+    percentiles(name, step);
+}
+
 fn stream(criterion: &mut Criterion) {
     let dir = tempfile::tempdir().expect("a directory");
     let unix = |name: &str| format!("unix://{}", dir.path().join(name).display());
@@ -111,6 +148,7 @@ fn stream(criterion: &mut Criterion) {
     steps(criterion, "plate in process", &mut LocalDevice::new(Arc::new(compiled)));
     let address = serve(&unix("plate"), |compiled| Box::new(LocalDevice::new(compiled)));
     steps(criterion, "plate over unix socket", &mut connect(&address));
+    lines(criterion, "steps of the plate over unix socket", &address);
 }
 
 criterion_group!(benches, stream);

@@ -9,11 +9,11 @@
 #[path = "../tests/topologies/mod.rs"]
 mod topologies;
 
-use bimorph::domains::drive::Electrics;
 use bimorph::domains::{Drive, System};
 use bimorph::multibody::planar::Pose;
 use bimorph::multibody::{BlockMatrix, forces};
 use std::hint::black_box;
+use std::sync::Arc;
 use std::time::Instant;
 use topologies::Topology;
 
@@ -32,7 +32,7 @@ fn main() {
 /// Measures `topology`; figures are divided by `units`.
 fn report(name: &str, count: usize, units: usize, topology: &Topology) {
     let model = topology.model();
-    let electrics = Electrics::default();
+    let electrics = Arc::default();
     let system = System { model, members: Vec::new(), loads: Vec::new(), electrics, length_scale: 2e-6 };
     let (n, pattern) = (system.bodies(), &system.model.pattern);
     let q: Vec<Pose> = (0..n).map(|k| Pose::new(1e-8 * (k % 3) as f64, 1e-8, 1e-3 * (k % 5) as f64)).collect();

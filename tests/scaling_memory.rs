@@ -4,14 +4,13 @@
 mod topologies;
 
 use bimorph::domains::System;
-use bimorph::domains::drive::Electrics;
 use bimorph::multibody::rcr::{Linkage, Reduction, Task};
 use bimorph::solve::dormand_prince::Pair;
 use bimorph::solve::joint_dirk::{JointMethod, Rule};
 use bimorph::solve::joint_stage::ImplicitMotion;
 use bimorph::solve::method::Motion;
 use bimorph::solve::rodas4::Rodas4;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 #[global_allocator]
 static HEAP: dhat::Alloc = dhat::Alloc;
@@ -30,7 +29,7 @@ fn bytes(name: &str, coordinates: usize) -> (usize, usize, usize) {
     let _profiler = dhat::Profiler::builder().testing().build();
     let model = drawing.model();
     let system =
-        System { model, members: Vec::new(), loads: Vec::new(), electrics: Electrics::default(), length_scale: 2e-6 };
+        System { model, members: Vec::new(), loads: Vec::new(), electrics: Arc::default(), length_scale: 2e-6 };
     let n = system.bodies();
     let kept = (Rodas4::new(&system, &[]), Motion::zeros(n), Motion::zeros(n));
     let stats = dhat::HeapStats::get();

@@ -88,7 +88,8 @@ impl Ports {
             found.answers.push(answer);
         }
         if !inputs.is_empty() {
-            found.system = Some(Arc::new(System { electrics: electrics.with_inputs(inputs), ..system.clone() }));
+            found.system =
+                Some(Arc::new(System { electrics: Arc::new(electrics.with_inputs(inputs)), ..system.clone() }));
         }
         Ok(found)
     }
@@ -103,7 +104,7 @@ impl Ports {
         match &self.system {
             None => Arc::clone(joints),
             Some(system) => {
-                let closures = System { electrics: system.electrics.clone(), ..joints.closures.clone() };
+                let closures = System { electrics: Arc::clone(&system.electrics), ..joints.closures.clone() };
                 Arc::new(Joints { tree: joints.tree.clone(), closures })
             }
         }

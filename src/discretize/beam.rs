@@ -24,9 +24,12 @@ pub struct Joints {
     pub couplings: Vec<Coupling>,
     /// The bodies of the beam at hand.
     bodies: Vec<Point>,
-    /// How that beam is cut.
-    cut: Cut,
+    /// Beams that were cut before: those of a drawing are mostly alike.
+    known: Vec<Sprung>,
 }
+
+/// Beams that are remembered.
+const MOST_KNOWN: usize = 16;
 
 /// Lays a beam: adds its inner bodies, masses and joints. Returns the equally spaced points along it, the drawn ends
 /// included.
@@ -45,15 +48,14 @@ pub fn lay(
     let (start, end) = (rigid.position(beam.a.0) + shift[0], rigid.position(beam.b.0) + shift[1]);
     let mut bar = bar(beam, options.shear, options.rotary_inertia);
     bar.length -= ends[0].offset + ends[1].offset;
-    // a rigid beam is the rods of a single segment, which its one body holds together
-    let scheme = if segments == 0 { Scheme::B } else { options.scheme };
+    let give = shear_flexibility(beam);
+    let drawn_as = Drawn { bar, give, segments, wall: rigid.grounded(beam.b.0), ends: *ends };
+    let Joints { joints, couplings, bodies, known } = out;
+    let Sprung { cut, stiffness, .. } = sprung(known, drawn_as, options);
     let segments = segments.max(1);
-    let mut cut = std::mem::take(&mut out.cut);
-    scheme.cut(&bar, segments, rigid.grounded(beam.b.0), &mut cut);
     let last = cut.parts.len() - 1;
     let name = if last > 1 { Arc::from(beam.name.as_str()) } else { Arc::default() };
     let place = |at: f64| start + (end - start) * (at / bar.length);
-    let mut bodies = std::mem::take(&mut out.bodies);
     bodies.clear();
     bodies.extend((0..=last).map(|k| match k {
         0 => drawn[0].beyond(shift[0]),
@@ -61,7 +63,7 @@ pub fn lay(
         k => rigid.add_segment(BodyName::segment(&name, k), place(cut.parts[k].at)),
     }));
     let drag_per_mass = drag_per_mass(beam, options.undamped);
-    for (part, &point) in cut.parts.iter().zip(&bodies) {
+    for (part, &point) in cut.parts.iter().zip(&*bodies) {
         if part.mass > 0.0 {
             let lump = Lump { amount: part.mass, first: along * part.first, second: part.second };
             rigid.add_mass(point, &lump, drag_per_mass);
@@ -73,20 +75,18 @@ pub fn lay(
     let m = &beam.material;
     let strain = beam.temperature.map_or(0.0, |t| m.thermal_expansion * (t - m.ambient_temperature))
         - m.stress / m.youngs_modulus;
-    let calibrated = options.junctions == Junctions::Calibrated;
     // what is drawn expands, junctions included
     let whole = beam.length / bar.length;
-    let mut springs = Springs::default();
-    for (k, (pin, between)) in cut.pins.iter().zip(bodies.windows(2)).enumerate() {
+    for ((pin, &stiffness), between) in cut.pins.iter().zip(stiffness).zip(bodies.windows(2)) {
         let (a, b) = (between[0], between[1]);
         if a.body == b.body {
             continue; // both ends on one rigid body: nothing can strain
         }
-        out.joints.push(Joint {
+        joints.push(Joint {
             a: a.body,
             b: b.body,
             frame: rigid.frame_at(a, b, place(pin.at), along),
-            stiffness: if calibrated { springs.with(beam, &bar, &cut, k, ends) } else { pin.stiffness },
+            stiffness,
             second: pin.second,
             expansion: heater.map(|group| (group, whole * pin.length)),
             rest: whole * pin.length * strain,
@@ -95,7 +95,7 @@ pub fn lay(
     }
     let pair = |k: usize| (bodies[k].body, bodies[k + 1].body);
     for &(i, j, stiffness) in &cut.couplings {
-        out.couplings.push(Coupling { first: pair(i), second: pair(j), stiffness });
+        couplings.push(Coupling { first: pair(i), second: pair(j), stiffness });
     }
     let mut points: Vec<Point> = (cut.nodes.iter().enumerate())
         .map(|(k, &part)| {
@@ -104,8 +104,49 @@ pub fn lay(
         })
         .collect();
     (points[0], points[segments]) = (drawn[0], drawn[1]);
-    (out.bodies, out.cut) = (bodies, cut);
     points
+}
+
+/// What the joints of a beam depend on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Drawn {
+    /// Between the junctions.
+    bar: Bar,
+    /// Shear flexibility of the section [1/N].
+    give: f64,
+    segments: usize,
+    /// Its far end is part of the ground.
+    wall: bool,
+    ends: [End; 2],
+}
+
+/// A beam that was cut, with the stiffness of its joints, junctions included.
+#[derive(Debug, Clone)]
+struct Sprung {
+    drawn: Drawn,
+    cut: Cut,
+    stiffness: Vec<Matrix3<f64>>,
+}
+
+/// The beam cut, or found among those that were.
+fn sprung<'a>(known: &'a mut Vec<Sprung>, drawn: Drawn, options: &CompileOptions) -> &'a Sprung {
+    if let Some(k) = known.iter().position(|other| other.drawn == drawn) {
+        return &known[k];
+    }
+    if known.len() == MOST_KNOWN {
+        known.clear();
+    }
+    // a rigid beam is the rods of a single segment, which its one body holds together
+    let scheme = if drawn.segments == 0 { Scheme::B } else { options.scheme };
+    let cut = scheme.cut(&drawn.bar, drawn.segments.max(1), drawn.wall);
+    let stiffness = if options.junctions == Junctions::Calibrated {
+        let mut springs = Springs::default();
+        (0..cut.pins.len()).map(|k| springs.with(&drawn, &cut, k)).collect()
+    } else {
+        cut.pins.iter().map(|pin| pin.stiffness).collect()
+    };
+    known.push(Sprung { drawn, cut, stiffness });
+    &known[known.len() - 1]
 }
 
 /// What the joints of one beam have in common: they are mostly alike.
@@ -119,16 +160,16 @@ struct Springs {
 
 impl Springs {
     /// [`Springs::with_ends`] of joint `k`.
-    fn with(&mut self, beam: &Beam, bar: &Bar, cut: &Cut, k: usize, ends: &[End; 2]) -> Matrix3<f64> {
+    fn with(&mut self, drawn: &Drawn, cut: &Cut, k: usize) -> Matrix3<f64> {
         let pin = &cut.pins[k];
         if k == 0 || k == cut.pins.len() - 1 {
-            return self.with_ends(beam, bar, cut, k, ends);
+            return self.with_ends(drawn, cut, k);
         }
         let alike = |last: &Pin| (last.stiffness, last.length, last.locked) == (pin.stiffness, pin.length, pin.locked);
         match &self.inner {
             Some((last, stiffness)) if alike(last) => *stiffness,
             _ => {
-                let stiffness = self.with_ends(beam, bar, cut, k, ends);
+                let stiffness = self.with_ends(drawn, cut, k);
                 self.inner = Some((*pin, stiffness));
                 stiffness
             }
@@ -138,7 +179,8 @@ impl Springs {
     /// Stiffness of joint `k` of a cut beam with the shear compliance of its segment and the springs of the ends next to it.
     ///
     /// A joint with rigid directions takes the bending part of the springs alone.
-    fn with_ends(&mut self, beam: &Beam, bar: &Bar, cut: &Cut, k: usize, ends: &[End; 2]) -> Matrix3<f64> {
+    fn with_ends(&mut self, drawn: &Drawn, cut: &Cut, k: usize) -> Matrix3<f64> {
+        let Drawn { bar, give, ends, .. } = drawn;
         let pin = &cut.pins[k];
         let mut springs = Matrix3::zeros();
         if k == 0 {
@@ -154,7 +196,7 @@ impl Springs {
         }
         let Some(mut own) = self.compliance(&pin.stiffness) else { return pin.stiffness };
         if bar.shear == 0.0 && !pin.locked[1] {
-            own[(1, 1)] += pin.length * shear_flexibility(beam);
+            own[(1, 1)] += pin.length * give;
         }
         (own + springs).cholesky().map_or(pin.stiffness, |whole| whole.inverse())
     }

@@ -16,11 +16,13 @@
 //! Not in the table: Poisson's ratios other than 0.3, branches of different stiffness or thickness (each takes its own),
 //! ratios of widths beyond 8 and stems that lean by more than 45° (the last row holds).
 
+use super::bar::bar;
 use super::excess::{self, Excess, Meetings};
 use super::junction_springs::{End, corner, interpolate};
 use super::junction_table as table;
 use super::overlap::{IN_LINE, Strip, turn};
 use super::rigid::Assembly;
+use super::scheme::Bar;
 use crate::budget;
 use crate::multibody::BodyId;
 use crate::options::Junctions;
@@ -29,6 +31,9 @@ use std::f64::consts::PI;
 
 /// Share of a beam that its two offsets may take together.
 const MOST: f64 = 0.9;
+/// Kinds of beams whose settled ends are remembered.
+const MOST_KNOWN: usize = 16;
+
 /// One beam as its junction sees it.
 #[derive(Debug, Clone, Copy)]
 struct Branch {
@@ -112,14 +117,22 @@ pub fn find(structure: &Structure, rigid: &Assembly, kind: Junctions, undamped: 
             ends.beams[b.beam][b.end].free = true;
         }
     }
-    for (k, (beam, [start, end])) in structure.beams.iter().zip(&mut ends.beams).enumerate() {
-        let share = (start.offset + end.offset) / (MOST * beam.length);
-        let taken = (start.offset + end.offset) / share.max(1.0);
-        let room = 0.5 * (MOST * beam.length - taken).max(0.0);
+    // beams of a drawing are mostly alike
+    let mut known: Vec<(Bar, [End; 2], [End; 2])> = Vec::new();
+    for (k, (beam, both)) in structure.beams.iter().zip(&mut ends.beams).enumerate() {
+        let share = (both[0].offset + both[1].offset) / (MOST * beam.length);
         if share > 1.0 {
             ends.cut.push(k);
         }
-        for end in [start, end] {
+        let bar = bar(beam, true, true);
+        if let Some((.., settled)) = known.iter().find(|(other, raw, _)| (other, raw) == (&bar, &*both)) {
+            *both = *settled;
+            continue;
+        }
+        let raw = *both;
+        let taken = (raw[0].offset + raw[1].offset) / share.max(1.0);
+        let room = 0.5 * (MOST * beam.length - taken).max(0.0);
+        for end in &mut *both {
             if share > 1.0 {
                 end.offset /= share;
             }
@@ -127,6 +140,9 @@ pub fn find(structure: &Structure, rigid: &Assembly, kind: Junctions, undamped: 
                 Junctions::Calibrated => end.settle(beam, room),
                 _ => end.spring.fill(0.0),
             }
+        }
+        if known.len() < MOST_KNOWN {
+            known.push((bar, raw, *both));
         }
     }
     ends.excess = excess::find(structure, &ends.meetings, undamped);

@@ -155,8 +155,8 @@ pub fn discretize_like(
     };
     let loads: Vec<Load> = structure.loads.iter().map(load).collect();
     let electrics = match other {
-        Some(other) => other.system.electrics.clone(),
-        None => ports::lay(structure, &heaters, &gaps, &rigid)?,
+        Some(other) => Arc::clone(&other.system.electrics),
+        None => Arc::new(ports::lay(structure, &heaters, &gaps, &rigid)?),
     };
     let narrowest = structure.beams.iter().map(|b| b.width).fold(f64::INFINITY, f64::min);
     let gap_scale = structure.plate_gaps.iter().map(|g| g.gap).chain(structure.combs.iter().map(|c| c.gap));

@@ -96,22 +96,29 @@ fn integrated(strips: &[Strip]) -> Lump {
     let alike = strips.iter().all(|s| s.weight == 1.0);
     let mut excess = Lump::default();
     let (mut cuts, mut covered) = (Vec::new(), Vec::new());
+    let (mut drawn_sides, mut filled_sides) = (Vec::new(), Vec::new());
     for band in levels.windows(2) {
         let step = (band[1] - band[0]) / LINES as f64;
         if step <= 1e-9 * widest {
             continue;
         }
         crate::budget::check();
+        // no corner lies within a band: its lines cross the same sides
+        let middle = 0.5 * (band[0] + band[1]);
+        for (quads, sides) in [(&drawn, &mut drawn_sides), (&filled, &mut filled_sides)] {
+            sides.clear();
+            sides.extend(strips.iter().zip(quads).filter_map(|(s, quad)| Some((quad.sides(middle)?, s.weight))));
+        }
         for line in 0..LINES {
             let y = band[0] + (line as f64 + 0.5) * step;
-            for (strip, quad) in strips.iter().zip(&drawn) {
-                if let Some((low, high)) = quad.cut(y) {
-                    add(&mut excess, y, low, high, step * strip.weight);
+            for (sides, weight) in &drawn_sides {
+                if let Some((low, high)) = sides.cut(y) {
+                    add(&mut excess, y, low, high, step * weight);
                 }
             }
             cuts.clear();
-            heaviest_first(if alike { &[] } else { strips }, &drawn, y, &mut cuts);
-            heaviest_first(strips, &filled, y, &mut cuts);
+            heaviest_first(if alike { &[] } else { &drawn_sides }, y, &mut cuts);
+            heaviest_first(&filled_sides, y, &mut cuts);
             unite(&cuts, &mut covered);
             for &(low, high, weight) in &covered {
                 add(&mut excess, y, low, high, -step * weight);
@@ -123,11 +130,11 @@ fn integrated(strips: &[Strip]) -> Lump {
     excess
 }
 
-/// Adds where a line at the height `y` runs in some strips, with their weights, the heaviest first.
-fn heaviest_first(strips: &[Strip], quads: &[Quad], y: f64, cuts: &mut Vec<(f64, f64, f64)>) {
+/// Adds where a line at the height `y` runs between some sides, with their weights, the heaviest first.
+fn heaviest_first(sides: &[(Sides, f64)], y: f64, cuts: &mut Vec<(f64, f64, f64)>) {
     let before = cuts.len();
-    let cut = |(strip, quad): (&Strip, &Quad)| quad.cut(y).map(|(low, high)| (low, high, strip.weight));
-    cuts.extend(strips.iter().zip(quads).filter_map(cut));
+    let cut = |(sides, weight): &(Sides, f64)| sides.cut(y).map(|(low, high)| (low, high, *weight));
+    cuts.extend(sides.iter().filter_map(cut));
     cuts[before..].sort_by(|a, b| b.2.total_cmp(&a.2).then(a.0.total_cmp(&b.0)));
 }
 
@@ -183,16 +190,35 @@ impl Quad {
         Self([at(-past, -half), at(far, -half), at(far, half), at(-past, half)])
     }
 
-    /// Where the line at height `y` runs inside.
+    /// The two sides that the line at height `y` crosses.
+    fn sides(&self, y: f64) -> Option<Sides> {
+        let mut crossed = (0..4).map(|k| (self.0[k], self.0[(k + 1) % 4])).filter(|(a, b)| (a.y - y) * (b.y - y) < 0.0);
+        let side = |(a, b): (Vector2<f64>, Vector2<f64>)| Side { from: a, along: b - a };
+        Some(Sides(side(crossed.next()?), side(crossed.next()?)))
+    }
+}
+
+/// A side of a quadrilateral: where it begins, and how it goes on.
+struct Side {
+    from: Vector2<f64>,
+    along: Vector2<f64>,
+}
+
+impl Side {
+    /// Where it is at height `y`.
+    fn at(&self, y: f64) -> f64 {
+        self.from.x + self.along.x * (y - self.from.y) / self.along.y
+    }
+}
+
+/// Two sides of one quadrilateral.
+struct Sides(Side, Side);
+
+impl Sides {
+    /// Where the line at height `y` runs between them.
     fn cut(&self, y: f64) -> Option<(f64, f64)> {
-        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-        for k in 0..4 {
-            let (a, b) = (self.0[k], self.0[(k + 1) % 4]);
-            if (a.y - y) * (b.y - y) < 0.0 {
-                let x = a.x + (b.x - a.x) * (y - a.y) / (b.y - a.y);
-                (low, high) = (low.min(x), high.max(x));
-            }
-        }
+        let (a, b) = (self.0.at(y), self.1.at(y));
+        let (low, high) = (a.min(b), a.max(b));
         (low < high).then_some((low, high))
     }
 }

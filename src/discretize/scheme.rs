@@ -102,10 +102,9 @@ impl Scheme {
     }
 
     /// Cuts a beam into `n` segments. `wall`: the far end is clamped to ground, where A0 has one joint more.
-    /// The storage of what was cut before is used again.
-    pub fn cut(self, bar: &Bar, n: usize, wall: bool, cut: &mut Cut) {
+    pub fn cut(self, bar: &Bar, n: usize, wall: bool) -> Cut {
         let h = bar.length / n as f64;
-        *cut = match self {
+        match self {
             Self::A0 => {
                 let count = n + usize::from(wall);
                 let places: Vec<f64> = (0..count).map(|k| k as f64 * h).collect();
@@ -136,14 +135,12 @@ impl Scheme {
             }
             // where nothing has been decided, what bodies take
             Self::B | Self::E4 | Self::Auto | Self::Es => {
-                cut.pins.clear();
-                cut.pins.extend((0..n).map(|k| self.elastic(bar, n, k)));
-                self.parts_into(bar, n, &mut cut.parts);
-                cut.couplings.clear();
-                cut.nodes.clear();
-                return cut.nodes.extend(0..=n);
+                let pins = (0..n).map(|k| self.elastic(bar, n, k)).collect();
+                let mut parts = Vec::new();
+                self.parts_into(bar, n, &mut parts);
+                Cut { parts, pins, couplings: Vec::new(), nodes: (0..=n).collect() }
             }
-        };
+        }
     }
 
     /// [`Cut::parts`] of B, E4 or Es alone.
@@ -318,12 +315,11 @@ mod tests {
     /// for Es, whose rotary inertia is tuned.
     #[test]
     fn moments_are_exact() {
-        let mut cut = Cut::default();
         for scheme in Scheme::ALL {
             for n in (1..12).map(|n| scheme.segments(n)) {
                 for wall in [false, true] {
                     let (mut mass, mut first, mut second) = (0.0, 0.0, 0.0);
-                    scheme.cut(&BAR, n, wall, &mut cut);
+                    let cut = scheme.cut(&BAR, n, wall);
                     for p in &cut.parts {
                         mass += p.mass;
                         first += p.mass * p.at + p.first;

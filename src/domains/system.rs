@@ -10,6 +10,7 @@ use super::member::Member;
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, BodyId, Model, forces};
 use nalgebra::Vector2;
+use std::sync::Arc;
 
 /// What `solve` works on. Immutable; shared by sessions.
 #[derive(Debug, Clone)]
@@ -21,7 +22,7 @@ pub struct System {
     /// Dead loads.
     pub loads: Vec<Load>,
     /// Ports, sources, heaters.
-    pub electrics: Electrics,
+    pub electrics: Arc<Electrics>,
     /// What displacements are measured against [m]: the narrowest beam or the smallest gap, whichever is smaller; 1 µm where
     /// there is neither.
     pub length_scale: f64,

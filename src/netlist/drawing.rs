@@ -186,6 +186,11 @@ impl Drawing {
         self.structure.beams.push(beam);
     }
 
+    /// How many facts have been noted.
+    pub(crate) fn noted(&self) -> usize {
+        self.facts.iter().map(|noted| noted.count).sum()
+    }
+
     pub(crate) fn note(&mut self, fact: Fact, span: Span) {
         self.note_number(fact, span, 0.0);
     }

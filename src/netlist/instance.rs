@@ -125,7 +125,7 @@ impl<'p> Elaborator<'p> {
                 result
             }
             None => {
-                let values = layer.map_or_else(|| Ok(Arc::new(Vec::new())), |layer| self.layer(layer))?;
+                let values = layer.map_or_else(|| Ok(Arc::default()), |layer| self.layer(layer))?;
                 let instance = Instance {
                     name: self.full(&local),
                     anonymous: element.name.is_none(),
@@ -195,7 +195,7 @@ impl<'p> Elaborator<'p> {
             }
             next = layer.parent.map(|parent| &program.layers[parent]);
         }
-        let values = Arc::new(values);
+        let values: LayerValues<'p> = Arc::new(values.into());
         if program.layers[index].constant {
             self.layers[index] = Some(Arc::clone(&values));
         }
@@ -227,7 +227,7 @@ impl<'p> Elaborator<'p> {
             return Err(self.sink.error("E052", element.model.span, message, help));
         }
         elements::stray_actuals(model, given, subnet.formals.iter().map(|f| &*f.name.name), self.sink);
-        let layer_values = layer.map_or_else(|| Ok(Arc::new(Vec::new())), |layer| self.layer(layer))?;
+        let layer_values = layer.map_or_else(|| Ok(Arc::default()), |layer| self.layer(layer))?;
         let mut prefix = self.full(call.local);
         prefix.push('.');
         let frame = Frame {

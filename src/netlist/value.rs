@@ -1,6 +1,8 @@
 //! Values of netlist expressions.
 
-use std::sync::Arc;
+use crate::structure::Material;
+use std::ops::Deref;
+use std::sync::{Arc, OnceLock};
 
 /// A value of the language.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -61,4 +63,26 @@ pub(crate) fn short(x: f64) -> String {
 }
 
 /// A layer's entries, evaluated: its own before its parent's.
-pub(crate) type LayerValues<'p> = std::sync::Arc<Vec<(&'p str, Value)>>;
+#[derive(Debug, Default)]
+pub(crate) struct Entries<'p> {
+    all: Vec<(&'p str, Value)>,
+    /// The material that they make, once it has been read.
+    pub(crate) material: OnceLock<Material>,
+}
+
+impl<'p> From<Vec<(&'p str, Value)>> for Entries<'p> {
+    fn from(all: Vec<(&'p str, Value)>) -> Self {
+        Self { all, material: OnceLock::new() }
+    }
+}
+
+impl<'p> Deref for Entries<'p> {
+    type Target = [(&'p str, Value)];
+
+    fn deref(&self) -> &Self::Target {
+        &self.all
+    }
+}
+
+/// Those of a layer that elements share.
+pub(crate) type LayerValues<'p> = Arc<Entries<'p>>;

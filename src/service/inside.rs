@@ -182,21 +182,27 @@ pub(super) fn not_asynchronous() -> Result<(), Status> {
 }
 
 /// Waits for an answer for as long as it is wanted; what computes it stops when it is not.
-pub(super) fn wait<T>(
+fn wait<T>(
     runtime: &Handle,
     answer: impl Future<Output = Result<T, Status>>,
     waits: &dyn Fn() -> bool,
 ) -> Result<T, Status> {
-    runtime.block_on(async {
-        let mut answer = std::pin::pin!(answer);
-        loop {
-            match tokio::time::timeout(LOOK, &mut answer).await {
-                Ok(answered) => return answered,
-                Err(_) if waits() => {}
-                Err(_) => return Err(Status::cancelled("stopped here")),
-            }
+    runtime.block_on(wanted(answer, waits))
+}
+
+/// An answer, for as long as it is wanted.
+pub(super) async fn wanted<T>(
+    answer: impl Future<Output = Result<T, Status>>,
+    waits: &dyn Fn() -> bool,
+) -> Result<T, Status> {
+    let mut answer = std::pin::pin!(answer);
+    loop {
+        match tokio::time::timeout(LOOK, &mut answer).await {
+            Ok(answered) => return answered,
+            Err(_) if waits() => {}
+            Err(_) => return Err(Status::cancelled("stopped here")),
         }
-    })
+    }
 }
 
 impl Answers {

@@ -5,6 +5,7 @@ use bimorph::domains::{Load, Point, Ramp, System};
 use bimorph::multibody::planar::JointFrame;
 use bimorph::multibody::{Body, BodyId, Joint, Model};
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
+use std::sync::Arc;
 
 /// Young's modulus [Pa], density [kg/m³] and thickness [m] of polysilicon.
 pub(crate) const MODULUS: f64 = 165e9;
@@ -106,7 +107,7 @@ impl Frame {
         };
         let loads = loads.iter().map(|&(id, f)| Load { point: at(id), force: f.into(), moment: 0.0 }).collect();
         let electrics = Electrics { names: Vec::new(), ..Electrics::default() };
-        (System { model, members: Vec::new(), loads, electrics, length_scale: 1e-6 }, place)
+        (System { model, members: Vec::new(), loads, electrics: Arc::new(electrics), length_scale: 1e-6 }, place)
     }
 }
 

@@ -18,9 +18,39 @@ const STRONGEST: f64 = 0.1;
 /// Permittivity of vacuum, as SUGAR's process files round it [F/m].
 pub(super) const VACUUM: f64 = 8.854e-12;
 
+/// What a material is made of.
+const READ: [&str; 9] = [
+    "Youngsmodulus",
+    "Poisson",
+    "density",
+    "viscosity",
+    "fluid",
+    "stress",
+    "straingradient",
+    "thermalexpansion",
+    "ambienttemperature",
+];
+
 impl Site<'_, '_> {
-    /// The material of a flexible member.
+    /// The material of a flexible member. That of a layer is read once.
     pub(super) fn material(&mut self) -> Result<Material, Reported> {
+        let instance = self.instance;
+        if instance.arguments.given.iter().any(|argument| READ.contains(&argument.name)) {
+            return self.read_material();
+        }
+        if let Some(known) = instance.arguments.layer.material.get() {
+            return Ok(known.clone());
+        }
+        let noted = self.drawing.noted();
+        let material = self.read_material()?;
+        // what is to be said of a layer is said of every element
+        if self.drawing.noted() == noted {
+            let _ = instance.arguments.layer.material.set(material.clone());
+        }
+        Ok(material)
+    }
+
+    fn read_material(&mut self) -> Result<Material, Reported> {
         let youngs_modulus = self.positive("Youngsmodulus")?;
         let [viscosity, fluid] = self.film()?;
         let span = self.instance.span;

@@ -278,7 +278,7 @@ fn build(state: &mut State, model: &str, call: &Call, span: Span) -> Result<(), 
     }
     // SUGAR 3's rigid link between nodes that lie where others place them
     let model = if OWN.contains(&model) { "link2d" } else { model };
-    let layer = call.material.iter().map(|(entry, value)| (entry.as_str(), value.clone())).collect();
+    let layer: Vec<_> = call.material.iter().map(|(entry, value)| (entry.as_str(), value.clone())).collect();
     let value = |name: &str, value: &Value| match value {
         Value::Number(angle) if elements::turns(name) => Value::Number(angle * degree),
         value => value.clone(),
@@ -292,7 +292,7 @@ fn build(state: &mut State, model: &str, call: &Call, span: Span) -> Result<(), 
         nodes: call.nodes.clone(),
         nodes_span: span,
         rotation,
-        arguments: Arguments { given, layer: Arc::new(layer), layer_name: None },
+        arguments: Arguments { given, layer: Arc::new(layer.into()), layer_name: None },
     };
     elements::build(&instance, &mut state.drawing, &mut state.sink, sugar2::read)
 }

@@ -1,20 +1,20 @@
 //! Questions to one device on a server, as bytes: what [`Questions`](crate::service::inside::Questions) are in process. For programs
 //! in other languages, whose own gRPC is slower.
 //!
-//! Connections are driven by a thread of their own, so that a network that fails is noticed whether or not anybody asks.
+//! Connections are driven by who asks, and by a thread of their own while nobody does ([`super::driven`]).
 
+use super::driven::Loop;
 use super::link::{is_broken, reason};
 use crate::service::address::Address;
-use crate::service::inside::{decoded, not_asynchronous, wait};
+use crate::service::inside::{decoded, not_asynchronous};
 use crate::service::proto;
 use prost::Message;
 use proto::bimorph_client::BimorphClient;
 use proto::device_request::Kind;
 use std::collections::BTreeMap;
 use std::io;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
-use tokio::runtime::{Builder, Handle, Runtime};
 use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::metadata::{Ascii, MetadataValue};
@@ -29,14 +29,13 @@ const PONG: Duration = Duration::from_millis(2500);
 
 /// Connections to servers without TLS, one to each.
 pub struct Lines {
-    /// None once it is over.
-    runtime: Option<Runtime>,
+    runtime: Arc<Loop>,
     open: Mutex<BTreeMap<String, Channel>>,
 }
 
 /// A Trial stream.
 pub struct Line {
-    runtime: Handle,
+    runtime: Arc<Loop>,
     requests: mpsc::Sender<proto::DeviceRequest>,
     replies: Streaming<proto::DeviceReply>,
     /// Replies to come.
@@ -49,9 +48,7 @@ impl Lines {
     /// # Errors
     /// A system that gives no thread.
     pub fn new() -> io::Result<Self> {
-        let runtime =
-            Builder::new_multi_thread().worker_threads(1).thread_name("bimorph-lines").enable_all().build()?;
-        Ok(Self { runtime: Some(runtime), open: Mutex::default() })
+        Ok(Self { runtime: Loop::new()?, open: Mutex::default() })
     }
 
     /// A stream to the server at `uri` (`unix:///path`, `host:port`), showing `authorization`; the connection is shared with others.
@@ -67,7 +64,6 @@ impl Lines {
         waits: &dyn Fn() -> bool,
     ) -> Result<Line, Status> {
         not_asynchronous()?;
-        let runtime = self.runtime.as_ref().ok_or_else(|| Status::unavailable("it is over"))?.handle().clone();
         let value = authorization.map(str::parse::<MetadataValue<Ascii>>).transpose();
         let value = value.map_err(|_| Status::invalid_argument("a token has characters that no token has"))?;
         let asked = Instant::now();
@@ -78,8 +74,8 @@ impl Lines {
             if let Some(value) = &value {
                 request.metadata_mut().insert("authorization", value.clone());
             }
-            let mut rpc = BimorphClient::new(self.channel(uri, &runtime)?).max_decoding_message_size(usize::MAX);
-            Ok((wait(&runtime, rpc.trial(request), &still)?, requests))
+            let mut rpc = BimorphClient::new(self.channel(uri)?).max_decoding_message_size(usize::MAX);
+            Ok((self.runtime.wait(rpc.trial(request), &still)?, requests))
         };
         // a connection that broke while nobody asked shows at the next question; this one may be asked again
         let begun = begin().or_else(|status| {
@@ -90,17 +86,17 @@ impl Lines {
             begin()
         });
         let (replies, requests) = begun.map_err(|status: Status| said(&status, asked, patience))?;
-        Ok(Line { runtime, requests, replies: replies.into_inner(), owed: 0 })
+        Ok(Line { runtime: Arc::clone(&self.runtime), requests, replies: replies.into_inner(), owed: 0 })
     }
 
-    fn channel(&self, uri: &str, runtime: &Handle) -> Result<Channel, Status> {
+    fn channel(&self, uri: &str) -> Result<Channel, Status> {
         let mut open = self.open.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(channel) = open.get(uri) {
             return Ok(channel.clone());
         }
         let address: Address = uri.parse().map_err(|error| Status::invalid_argument(format!("{error}")))?;
         let endpoint = Endpoint::from_shared(address.uri()).map_err(|e| Status::invalid_argument(e.to_string()))?;
-        let _within = runtime.enter();
+        let _within = self.runtime.enter();
         let channel = endpoint
             .tcp_nodelay(true)
             .connect_timeout(PONG)
@@ -114,9 +110,7 @@ impl Lines {
 
 impl Drop for Lines {
     fn drop(&mut self) {
-        if let Some(runtime) = self.runtime.take() {
-            runtime.shutdown_background();
-        }
+        self.runtime.end();
     }
 }
 
@@ -140,17 +134,17 @@ impl Line {
         let Self { runtime, requests, replies, owed } = self;
         let sent = async { requests.reserve().await.map_err(|_| Status::unknown("")) };
         // a place first: what is dropped on the way to it was not sent
-        match wait(runtime, sent, &still) {
+        match runtime.wait(sent, &still) {
             Ok(place) => place.send(request),
             // the stream has ended, and says why
             Err(status) if status.code() == tonic::Code::Unknown => {
-                let why = wait(runtime, async { replies.message().await }, &still).err();
+                let why = runtime.wait(async { replies.message().await }, &still).err();
                 return Err(said(&why.unwrap_or_else(ended), asked, patience));
             }
             Err(status) => return Err(said(&status, asked, patience)),
         }
         if is_silent {
-            return Ok(None);
+            return runtime.flush().map(|()| None);
         }
         *owed += 1;
         let reply = async {
@@ -162,7 +156,7 @@ impl Line {
                 }
             }
         };
-        let reply = wait(runtime, reply, &still).map_err(|status| said(&status, asked, patience))?;
+        let reply = runtime.wait(reply, &still).map_err(|status| said(&status, asked, patience))?;
         Ok(Some(reply.encode_to_vec()))
     }
 }

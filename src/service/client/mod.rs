@@ -5,6 +5,8 @@
 
 mod analyses;
 mod device;
+#[cfg(feature = "server")]
+mod driven;
 mod jobs;
 #[cfg(feature = "server")]
 mod line;

@@ -9,8 +9,8 @@
 //! error falls with the p-th power of the step (Hairer & Wanner 1996, §IV.8).
 
 use super::method::{Method, Motion, StepFailure, Work};
+use super::pace::{self, Pace};
 use super::rodas4::Rodas4;
-use super::step_size;
 use crate::domains::{Ramp, System};
 use crate::multibody::planar::Pose;
 use crate::multibody::{BodyId, Model};
@@ -20,8 +20,6 @@ use nalgebra::Matrix6;
 
 /// Share of the length scale below which a displacement's relative error does not count.
 pub(super) const FLOOR: f64 = 1e-4;
-/// Rejections in a row before giving up.
-pub(super) const MAX_REJECTED: usize = 40;
 
 /// What sets the length of steps.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -116,35 +114,32 @@ impl<M: Method> Adaptive<M> {
         max_steps: usize,
         observe: Observer<'_>,
     ) -> Result<Advance, SolveError> {
-        let exponent = -1.0 / self.method.error_order();
-        let (mut s, mut rejected, mut steps) = (0.0, 0, 0);
-        while s < ramp.dt {
+        let mut pace = Pace::new((0.0, ramp.dt), *h, self.method.error_order());
+        let mut steps = 0;
+        while !pace.is_over() {
             if steps == max_steps {
-                return Ok(Advance::OutOfSteps(s));
+                return Ok(Advance::OutOfSteps(pace.t));
             }
             crate::budget::check();
-            let left = ramp.dt - s;
-            let step = step_size::fitted(*h, left);
+            let (s, step) = (pace.t, pace.step());
             self.keep(motion);
             let stepped = self.method.step(system, ramp, s, step, motion, &mut self.error);
             let error = if stepped.is_ok() { self.relative_error(system, motion, step, tol) } else { f64::INFINITY };
             if error <= 1.0 {
-                let last = s + step >= ramp.dt * (1.0 - 1e-14);
-                s = if last { ramp.dt } else { s + step };
-                (rejected, steps) = (0, steps + 1);
+                pace.accept(step, error);
+                (steps, *h) = (steps + 1, pace.h);
                 self.steps += 1;
-                *h = step_size::accepted(*h, step, error, exponent);
-                if !observe(s - step, step, &self.before, motion) {
+                if !observe(pace.t - step, step, &self.before, motion) {
                     return Ok(Advance::Stopped);
                 }
             } else {
                 self.put_back(motion);
                 self.rejected += 1;
-                rejected += 1;
-                *h = step_size::rejected(step, error, exponent, 0.1);
-                if rejected > MAX_REJECTED || s + *h <= s {
+                let goes_on = pace.reject(step, error, 0.1);
+                *h = pace.h;
+                if !goes_on {
                     stepped.map_err(|e| failed(system, s, step, e))?;
-                    return Err(self.too_small(system, s, step, rejected));
+                    return Err(self.too_small(system, s, step, pace.rejected));
                 }
             }
         }
@@ -160,14 +155,12 @@ impl<M: Method> Adaptive<M> {
         max_steps: usize,
         observe: Observer<'_>,
     ) -> Result<Advance, SolveError> {
-        let count = step_size::count(ramp.dt, step);
-        let at = |k: usize| if k == count { ramp.dt } else { ramp.dt * (k as f64 / count as f64) };
-        for k in 0..count {
+        for (k, (s, end)) in pace::equal((0.0, ramp.dt), step).enumerate() {
             if k == max_steps {
-                return Ok(Advance::OutOfSteps(at(k)));
+                return Ok(Advance::OutOfSteps(s));
             }
             crate::budget::check();
-            let (s, h) = (at(k), at(k + 1) - at(k));
+            let h = end - s;
             self.keep(motion);
             self.method.step(system, ramp, s, h, motion, &mut self.error).map_err(|e| failed(system, s, h, e))?;
             if let Some((body, direction)) = not_finite(motion) {

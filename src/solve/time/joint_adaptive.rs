@@ -10,7 +10,7 @@ use super::adaptive::Control;
 use super::dormand_prince::Pair;
 use super::joint_dirk::JointMethod;
 use super::joint_stage::{ImplicitMotion, Loads, StageError};
-use super::step_size;
+use super::pace::{self, Pace};
 use thiserror::Error;
 
 /// Share of the size of a coordinate below which its relative error does not count.
@@ -21,8 +21,6 @@ const STAGE_SHARE: f64 = 1e-2;
 const EQUAL: f64 = 1e-10;
 /// What the loops move an end by delays the motion by a step, over and over but not more and more: it counts by this share.
 const MOVED_SHARE: f64 = 1e-2;
-/// Rejections in a row before giving up.
-const MAX_REJECTED: usize = 40;
 
 /// Why an integration stopped short.
 #[derive(Debug, Clone, PartialEq, Error)]
@@ -96,45 +94,37 @@ impl JointAdaptive {
     fn controlled<L: Loads>(
         &mut self,
         motion: &mut ImplicitMotion<'_, L>,
-        (start, end): (f64, f64),
+        span: (f64, f64),
         now: &mut Pair,
         tol: f64,
         observe: Observe<'_>,
     ) -> Result<Option<f64>, JointStepError> {
-        let exponent = -1.0 / self.method.order();
-        let (mut t, mut rejected) = (start, 0);
-        let mut h = self.first_step(motion, (start, end), now, tol)?;
-        while t < end {
+        let mut pace = Pace::new(span, self.first_step(motion, span, now, tol)?, self.method.order());
+        while !pace.is_over() {
             crate::budget::check();
-            let left = end - t;
-            let step = step_size::fitted(h, left);
+            let (t, step) = (pace.t, pace.step());
             self.carried.copy(&self.method.carried.q, &self.method.carried.v);
             let before = motion.norm(&now.q);
             let stepped = self.attempt(motion, (t, step), STAGE_SHARE * tol * (before + FLOOR), now);
             let mut error =
                 if stepped.is_ok() { self.relative_error(motion, before, step, tol) } else { f64::INFINITY };
-            let last = t + step >= end * (1.0 - 1e-14);
-            let to = if last { end } else { t + step };
             if error <= 1.0 {
-                error = error.max(MOVED_SHARE * self.project(motion, to) / (tol * (before + FLOOR)));
+                error = error.max(MOVED_SHARE * self.project(motion, pace.after(step)) / (tol * (before + FLOOR)));
             }
             if error <= 1.0 {
-                rejected = 0;
-                h = step_size::accepted(h, step, error, exponent);
-                let from = std::mem::replace(&mut t, to);
+                pace.accept(step, error);
                 self.accept(motion, now);
-                if !observe(from, t - from, now) {
-                    return Ok(Some(t));
+                if !observe(t, pace.t - t, now) {
+                    return Ok(Some(pace.t));
                 }
             } else {
                 let Pair { q, v } = &self.carried;
                 self.method.carried.copy(q, v);
                 motion.work.rejected += 1;
-                rejected += 1;
-                h = step_size::rejected(step, error, exponent, 0.25);
-                if rejected > MAX_REJECTED || h <= 4.0 * f64::EPSILON * end {
+                if !pace.reject(step, error, 0.25) {
                     stepped.map_err(|source| JointStepError::Stage { t, h: step, source })?;
-                    return Err(JointStepError::TooSmall { t, h: step, rejected, body: motion.worst(&self.error.q) });
+                    let (rejected, body) = (pace.rejected, motion.worst(&self.error.q));
+                    return Err(JointStepError::TooSmall { t, h: step, rejected, body });
                 }
             }
         }
@@ -144,24 +134,22 @@ impl JointAdaptive {
     fn equal<L: Loads>(
         &mut self,
         motion: &mut ImplicitMotion<'_, L>,
-        (start, end): (f64, f64),
+        span: (f64, f64),
         now: &mut Pair,
         step: f64,
         observe: Observe<'_>,
     ) -> Result<Option<f64>, JointStepError> {
-        let count = step_size::count(end - start, step);
-        let at = |k: usize| if k == count { end } else { start + (end - start) * (k as f64 / count as f64) };
-        for k in 0..count {
+        for (t, end) in pace::equal(span, step) {
             crate::budget::check();
-            let (t, h) = (at(k), at(k + 1) - at(k));
+            let h = end - t;
             let tolerance = EQUAL * (motion.norm(&now.q) + FLOOR);
             self.method
                 .step(motion, (t, h), tolerance, now, &mut self.end, &mut self.error)
                 .map_err(|source| JointStepError::Stage { t, h, source })?;
-            self.project(motion, at(k + 1));
+            self.project(motion, end);
             self.accept(motion, now);
             if !observe(t, h, now) {
-                return Ok(Some(at(k + 1)));
+                return Ok(Some(end));
             }
         }
         Ok(None)

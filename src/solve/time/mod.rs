@@ -6,7 +6,6 @@
 //! |---|---|
 //! | [`method`] | what every integrator is: one step, its estimated error, its work |
 //! | [`adaptive`] | drives any of them: error control, or equal steps |
-//! | `step_size` | how long the next step is |
 //! | [`doubling`] | error control by step doubling for methods without an estimate |
 //! | [`interpolation`] | the motion inside a step |
 //! | [`event`] | when a quantity crosses zero during a step |
@@ -19,7 +18,7 @@
 //! | [`generalized_alpha`] | generalized-α with a chosen damping of fast motions, and Newmark's rule |
 //! | [`rk45`] | Dormand–Prince on bodies: explicit |
 //!
-//! For both: [`tableau`] has the coefficients of implicit methods.
+//! For both: [`tableau`] has the coefficients of implicit methods, and `pace` says how long the next step is.
 //!
 //! In joint coordinates, or on any flat slices:
 //!
@@ -55,9 +54,9 @@ pub mod joint_rodas4;
 pub mod joint_stage;
 pub mod method;
 pub mod midpoint;
+mod pace;
 pub mod radau5;
 pub mod rk45;
 pub mod rodas4;
 pub mod side_by_side;
-mod step_size;
 pub mod tableau;

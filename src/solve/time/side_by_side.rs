@@ -6,15 +6,15 @@
 //! cannot be factored until the end, steps that vanish, an observer that says stop) is left to a run alone, which finds the same
 //! and says why.
 
-use super::adaptive::{FLOOR, MAX_REJECTED, contact_error, dragged};
+use super::adaptive::{FLOOR, contact_error, dragged};
 use super::method::Motion;
+use super::pace::Pace;
 use super::rodas4::lanes::{Lane, LaneRodas4};
-use super::step_size;
 use crate::domains::{Ramp, System};
 use crate::multibody::lanes::LANES;
 
-/// Exponent of the step-size rule: the estimated error falls with the fourth power of the step.
-const EXPONENT: f64 = -1.0 / 4.0;
+/// The estimated error falls with this power of the step.
+const ORDER: f64 = 4.0;
 
 /// A run of one variant.
 pub struct Variant<'a> {
@@ -58,23 +58,19 @@ struct Running<'a> {
     watcher: &'a mut dyn Watcher,
     mass: f64,
     contacts: bool,
-    s: f64,
-    h: f64,
-    rejected: usize,
+    pace: Pace,
     steps: u64,
 }
 
 impl<'a> Running<'a> {
-    fn start(number: usize, system: &System, (h, tol): (f64, f64), watcher: &'a mut dyn Watcher) -> Self {
+    fn start(number: usize, system: &System, (pace, tol): (Pace, f64), watcher: &'a mut dyn Watcher) -> Self {
         Self {
             number,
             tol,
             watcher,
             mass: system.model.bodies.iter().map(|b| b.mass).sum(),
             contacts: (0..system.members.len()).any(|g| system.touching(g).is_some()),
-            s: 0.0,
-            h,
-            rejected: 0,
+            pace,
             steps: 0,
         }
     }
@@ -119,9 +115,9 @@ pub fn advance<'a>(
                     continue;
                 }
                 method.put(k, variant.system, &variant.ramp, &variant.motion);
+                let pace = Pace::new((0.0, variant.ramp.dt), variant.h, ORDER);
                 lanes[k] = Some(Lane { system: variant.system, ramp: variant.ramp });
-                let pace = (variant.h, variant.tol);
-                running[k] = Some(Running::start(number, variant.system, pace, variant.watcher));
+                running[k] = Some(Running::start(number, variant.system, (pace, variant.tol), variant.watcher));
             }
         }
         if running.iter().all(Option::is_none) {
@@ -129,8 +125,8 @@ pub fn advance<'a>(
         }
         crate::budget::check();
         for k in 0..LANES {
-            if let (Some(run), Some(lane)) = (&running[k], &lanes[k]) {
-                (s[k], step[k]) = (run.s, step_size::fitted(run.h, lane.ramp.dt - run.s));
+            if let Some(run) = &running[k] {
+                (s[k], step[k]) = (run.pace.t, run.pace.step());
             }
         }
         let vanished = method.step(&lanes, &s, &step);
@@ -140,7 +136,7 @@ pub fn advance<'a>(
                 method.go_back(k);
                 continue;
             };
-            let (system, dt, h) = (lane.system, lane.ramp.dt, step[k]);
+            let (system, h) = (lane.system, step[k]);
             let wanted = run.watcher.wants(s[k], h);
             if wanted || run.contacts {
                 method.before.take(k, &mut before);
@@ -159,23 +155,19 @@ pub fn advance<'a>(
             };
             let mut ended = None;
             if error <= 1.0 {
-                let last = run.s + h >= dt * (1.0 - 1e-14);
-                run.s = if last { dt } else { run.s + h };
-                (run.rejected, run.steps) = (0, run.steps + 1);
+                run.pace.accept(h, error);
+                run.steps += 1;
                 work.accepted += 1;
-                run.h = step_size::accepted(run.h, h, error, EXPONENT);
-                if wanted && !run.watcher.see(run.s - h, h, &before, &after) {
+                if wanted && !run.watcher.see(run.pace.t - h, h, &before, &after) {
                     ended = Some(Ended::Alone);
-                } else if run.s >= dt {
+                } else if run.pace.is_over() {
                     method.motion.take(k, &mut after);
                     ended = Some(Ended::Done(after.clone(), run.steps));
                 }
             } else {
                 method.go_back(k);
                 work.rejected += 1;
-                run.rejected += 1;
-                run.h = step_size::rejected(h, error, EXPONENT, 0.1);
-                if run.rejected > MAX_REJECTED || run.s + run.h <= run.s {
+                if !run.pace.reject(h, error, 0.1) {
                     ended = Some(Ended::Alone);
                 }
             }
