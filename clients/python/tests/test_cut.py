@@ -71,6 +71,22 @@ def test_a_sweep_goes_on(way: Cut, kind: str) -> None:
     sweep.delete()
 
 
+@pytest.mark.parametrize("kind", ["silence", "reset"])
+def test_a_sweep_ends(way: Cut, kind: str) -> None:
+    """Whoever ends a sweep over a connection that is broken ends it; deleting what is gone raises, unless only the answer was lost."""
+    client = bimorph.Client(way.address, 600.0)
+    text = PLATE.replace("gap=2u", "gap=gap").replace("param V=0", "param gap=2u")
+    gaps = [1.5e-6 + 1e-12 * k for k in range(100_000)]
+    sweep = client.submit(bimorph.Netlist.text(text), {"gap": gaps}, bimorph.PullIn(30.0, "drive"))
+    getattr(way, kind)()
+    sweep.cancel()
+    assert list(sweep.watch())[-1].state == "cancelled"
+    getattr(way, kind)()
+    sweep.delete()
+    with pytest.raises(bimorph.NotFound):
+        sweep.delete()
+
+
 def test_a_run_that_is_cut_off_is_no_run(way: Cut) -> None:
     """A transient whose connection goes silent raises; it does not wait for ever, nor return what it has."""
     model = bimorph.Client(way.address, 600.0).compile(bimorph.Netlist.text(PLATE))

@@ -153,22 +153,30 @@ impl Client {
         }
     }
 
-    /// Stops a job; its rows stay.
+    /// Stops a job; its rows stay. Where the connection fails, it is made anew and the job asked to stop once more.
     ///
     /// # Errors
     /// [`ClientError`].
     pub fn cancel_job(&mut self, name: &str) -> Result<(), ClientError> {
         let request = proto::CancelJobRequest { name: name.to_owned() };
-        self.call(self.link.rpc.clone().cancel_job(request)).map(drop)
+        self.persist(|client, _| client.call(client.link.rpc.clone().cancel_job(request.clone()))).map(drop)
     }
 
-    /// Stops a job, if it goes on, and lets the server forget it.
+    /// Stops a job, if it goes on, and lets the server forget it. Where the connection fails, it is made anew and the server asked once
+    /// more; a job that it then does not have counts as forgotten, as it may be the answer alone that was lost.
     ///
     /// # Errors
     /// [`ClientError`].
     pub fn delete_job(&mut self, name: &str) -> Result<(), ClientError> {
         let request = proto::DeleteJobRequest { name: name.to_owned() };
-        self.call(self.link.rpc.clone().delete_job(request)).map(drop)
+        let mut tries = 0;
+        self.persist(|client, _| {
+            tries += 1;
+            match client.call(client.link.rpc.clone().delete_job(request.clone())) {
+                Err(error) if error.code == "NotFound" && tries > 1 => Ok(()),
+                answer => answer.map(drop),
+            }
+        })
     }
 
     /// Waits for the rows of a job; its table, in grid order, and how it ended: where it ended early, the table has the rows that there are.

@@ -10,7 +10,7 @@ from types import TracebackType
 from typing import Any, NamedTuple
 
 from .channel import Channel
-from .errors import BimorphError, NoResult, Unavailable
+from .errors import BimorphError, NoResult, NotFound, Unavailable
 from .stopping import apart
 from .sweep import Row, Table
 from .v1 import jobs_pb2
@@ -143,12 +143,26 @@ class Sweep:
         return self.wait()
 
     def cancel(self) -> None:
-        """Ends it, if it still runs. The rows that it has stay."""
-        self._channel.call("CancelJob", jobs_pb2.CancelJobRequest(name=self.id))
+        """Ends it, if it still runs. The rows that it has stay. A network that fails meanwhile is asked again."""
+        request = jobs_pb2.CancelJobRequest(name=self.id)
+        self._channel.persist(lambda heard: self._channel.call("CancelJob", request))
 
     def delete(self) -> None:
-        """Ends it, if it still runs, and lets the server forget it."""
-        self._channel.call("DeleteJob", jobs_pb2.DeleteJobRequest(name=self.id))
+        """Ends it, if it still runs, and lets the server forget it. A network that fails meanwhile is asked again."""
+        request = jobs_pb2.DeleteJobRequest(name=self.id)
+        tries = 0
+
+        def ask(heard: Callable[[], None]) -> None:
+            nonlocal tries
+            tries += 1
+            try:
+                self._channel.call("DeleteJob", request)
+            except NotFound:
+                # only the answer to an earlier try was lost
+                if tries == 1:
+                    raise
+
+        self._channel.persist(ask)
 
     def __enter__(self) -> Sweep:
         return self
