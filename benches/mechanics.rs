@@ -5,6 +5,7 @@ use bimorph::compile::{CompileOptions, Compiled, compile};
 use bimorph::device::local::LocalDevice;
 use bimorph::device::{Device, Mode, OpenRequest, Trial, TrialReply};
 use bimorph::domains::Ramp;
+use bimorph::equations::Bodies;
 use bimorph::multibody::planar::Pose;
 use bimorph::multibody::{BlockMatrix, forces};
 use bimorph::netlist::Bundle;
@@ -56,11 +57,12 @@ fn mechanics(c: &mut Criterion) {
     let sources = vec![0.0; system.electrics.sources()];
     let rise = vec![0.0; system.electrics.heating.heaters.len()];
     let ramp = Ramp::new(&system.electrics, &sources, &sources, &rise, 1e-6);
+    let mut bodies = Bodies::new(system, &ramp);
     group.bench_function("Rodas4 step", |b| {
         b.iter(|| {
             motion.q.copy_from_slice(&start.q);
             motion.v.copy_from_slice(&start.v);
-            rodas.step(system, &ramp, 0.0, 1e-7, black_box(&mut motion), &mut error)
+            rodas.step(&mut bodies, 0.0, 1e-7, black_box(&mut motion), &mut error)
         });
     });
 

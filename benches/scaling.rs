@@ -12,10 +12,11 @@
 mod topologies;
 
 use bimorph::domains::{Drive, Ramp, System};
+use bimorph::equations::constrained::Constrained;
+use bimorph::equations::{Bodies, Control, Equations, Stage, Staged};
 use bimorph::multibody::planar::Pose;
 use bimorph::multibody::rcr::{Linkage, Reduction};
 use bimorph::multibody::{BlockMatrix, BodyId, Model, forces};
-use bimorph::solve::joint_stage::{ImplicitMotion, Stage};
 use bimorph::solve::method::{Method, Motion};
 use bimorph::solve::rodas4::Rodas4;
 use std::hint::black_box;
@@ -72,10 +73,11 @@ fn measure(name: &str, coordinates: usize) -> (usize, [f64; 8]) {
     let (start, mut motion) = (Motion { q, v: r.clone() }, Motion::zeros(n));
     let mut error = Motion::zeros(n);
     let ramp = Ramp::new(&system.electrics, &[], &[], &[], 1e-6);
+    let mut bodies = Bodies::new(&system, &ramp);
     let step = median(1, |_| {
         motion.q.copy_from_slice(&start.q);
         motion.v.fill(Pose::zeros());
-        rodas.step(&system, &ramp, 0.0, 4e-8, &mut motion, &mut error).unwrap_or_else(|e| panic!("{e:?}"));
+        rodas.step(&mut bodies, 0.0, 4e-8, &mut motion, &mut error).unwrap_or_else(|e| panic!("{e:?}"));
     });
     assert!(motion.q.iter().all(|q| q.z.abs() < 0.1), "{name}, {n} bodies: no motion of a mechanism");
     (n, [residual, tangent, both, factor, solve, step, reduction, implicit])
@@ -112,12 +114,14 @@ fn reduction(topology: &topologies::Topology) -> f64 {
 fn implicit(topology: &topologies::Topology) -> f64 {
     let linkage = Linkage::new(&topology.pinned());
     let n = linkage.coordinates;
-    let mut motion = ImplicitMotion::new(&linkage, topologies::Springs(&linkage), &vec![1.0; n]);
+    let mut equations = Constrained::new(&linkage, topologies::Springs(&linkage), &vec![1.0; n], 1.0);
+    // any correction is small enough: one iteration
+    equations.begin(Control::Tolerance(f64::INFINITY));
     let q: Vec<f64> = (0..n).map(|k| 1e-2 * (k as f64 * 0.7).sin()).collect();
     let mut a = vec![0.0; n];
-    let stage = Stage { t: 0.0, q: &q, v: &q, beta: 1e-16, gamma: 1e-8 };
-    // any correction is small enough: one iteration
-    median(1, |_| motion.stage(black_box(&stage), f64::INFINITY, &mut a).unwrap_or_else(|e| panic!("{e}")))
+    let mut at = Motion::zeros(n);
+    let stage = Stage { t: 0.0, q: &q, v: &q, near: &q, beta: 1e-16, gamma: 1e-8 };
+    median(1, |_| equations.stage(black_box(&stage), &mut a, &mut at).unwrap_or_else(|e| panic!("{e:?}")))
 }
 
 /// Median nanoseconds of `work`, which does `repeat` units of work at a call.

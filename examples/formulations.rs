@@ -14,7 +14,7 @@ use bimorph::analysis::integrator::Integrator;
 use bimorph::analysis::transient::{TransientOptions, transient};
 use bimorph::compile::{CompileOptions, Formulation, Scheme, compile};
 use bimorph::domains::{Ramp, System};
-use bimorph::equations::Joints;
+use bimorph::equations::{Bodies, Joints};
 use bimorph::multibody::planar::Pose;
 use bimorph::netlist::{Bundle, Setting};
 use bimorph::solve::equilibrium::{Equilibrium, EquilibriumOptions};
@@ -147,7 +147,7 @@ fn measure((file, set, start, volts, stop): &Scene<'_>, tol: f64) {
     print("rcr", n, joints_run);
 }
 
-fn run<M: Method>(
+fn run<M: for<'a> Method<Bodies<'a>>>(
     system: &System,
     ramp: &Ramp<'_>,
     at: &Motion,
@@ -156,11 +156,13 @@ fn run<M: Method>(
     method: impl Fn() -> M,
 ) -> (Motion, Work, f64) {
     let mut motion = at.clone();
-    let mut stepper = Adaptive::new(system, method());
+    let mut stepper = Adaptive::new(system.bodies(), method());
     let begin = Instant::now();
     let mut h = first;
     let control = Control::Tolerance(1e-2 * tol);
-    let end = stepper.advance(system, ramp, &mut motion, &mut h, control, usize::MAX, &mut |_, _, _, _| true);
+    let end =
+        stepper
+            .advance(&mut Bodies::new(system, ramp), &mut motion, &mut h, control, usize::MAX, &mut |_, _, _, _| true);
     let ms = begin.elapsed().as_secs_f64() * 1e3;
     if let Err(e) = end {
         println!("{e}");

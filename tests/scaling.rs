@@ -4,6 +4,7 @@
 mod topologies;
 
 use bimorph::domains::{Drive, Ramp, System};
+use bimorph::equations::Bodies;
 use bimorph::multibody::planar::Pose;
 use bimorph::multibody::{BlockMatrix, Model, forces};
 use bimorph::solve::method::{Method, Motion};
@@ -62,11 +63,13 @@ fn a_step_is_one_factorization_and_six_solves_at_any_size() {
         for coordinates in [100, 100_000] {
             let system = system(topologies::sized(name, coordinates).model());
             let mut rodas = Rodas4::new(&system, &[]);
-            let (mut motion, mut error) = (Motion::zeros(system.bodies()), Motion::zeros(system.bodies()));
+            let (mut motion, mut error): (Motion, Motion) =
+                (Motion::zeros(system.bodies()), Motion::zeros(system.bodies()));
             motion.v[0].y = 1e-3;
             let ramp = Ramp::new(&system.electrics, &[], &[], &[], 1e-6);
+            let mut bodies = Bodies::new(&system, &ramp);
             for _ in 0..3 {
-                rodas.step(&system, &ramp, 0.0, 1e-8, &mut motion, &mut error).unwrap();
+                rodas.step(&mut bodies, 0.0, 1e-8, &mut motion, &mut error).unwrap();
             }
             let work = rodas.work();
             assert_eq!((work.factorizations, work.solves, work.forces), (3, 18, 18), "{name}");

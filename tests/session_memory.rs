@@ -4,6 +4,7 @@ use bimorph::compile::{CompileOptions, compile};
 use bimorph::device::local::LocalDevice;
 use bimorph::device::{Device, Mode, OpenRequest, Trial, TrialReply};
 use bimorph::domains::Ramp;
+use bimorph::equations::Bodies;
 use bimorph::netlist::Bundle;
 use bimorph::solve::method::{Method, Motion};
 use bimorph::solve::rodas4::Rodas4;
@@ -49,9 +50,10 @@ fn a_bank_session_is_small_and_steps_allocate_nothing() {
     let sources = vec![1.0; system.electrics.sources()];
     let rise = vec![0.0; system.electrics.heating.heaters.len()];
     let ramp = Ramp::new(&system.electrics, &sources, &sources, &rise, 1e-6);
+    let mut bodies = Bodies::new(system, &ramp);
     let blocks = dhat::HeapStats::get().total_blocks;
     for _ in 0..10 {
-        rodas.step(system, &ramp, 0.0, 1e-8, &mut motion, &mut error).unwrap();
+        rodas.step(&mut bodies, 0.0, 1e-8, &mut motion, &mut error).unwrap();
     }
     assert_eq!(dhat::HeapStats::get().total_blocks, blocks);
     println!("a compiled bank session of {} unknowns takes {used} bytes", system.model.unknowns());

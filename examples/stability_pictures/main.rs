@@ -227,7 +227,7 @@ fn long_steps() -> Vec<Chart> {
             x: linear("time [µs]"),
             y: between(linear("energy over the first"), 0.0, 1.6),
             series: vec![
-                line("Newmark, ρ = 1: gains, then stops", 1, us(steps::newmark(force, h, count))),
+                line("midpoint rule: gains, then stops", 1, us(steps::midpoint(force, h, count))),
                 line("average vector field", 0, us(steps::avf(force, h, count))),
                 line("Rodas4", 2, us(steps::rodas4(force, h, count))),
             ],

@@ -1,19 +1,20 @@
 //! The integrators by name, and the one place where a name becomes a type.
 
 use crate::domains::{Ramp, System};
+use crate::equations::newton::Newton;
+use crate::equations::{Bodies, Equations, Staged, Unknown};
 use crate::solve::SolveError;
-use crate::solve::adaptive::{Adaptive, Advance, Control, Observer};
-use crate::solve::avf::AverageField;
 use crate::solve::baseline::Solver;
-use crate::solve::doubling::Doubling;
-use crate::solve::generalized_alpha::GeneralizedAlpha;
-use crate::solve::method::{Method, Motion, Work};
-use crate::solve::midpoint::Midpoint;
-use crate::solve::radau5::Radau5;
-use crate::solve::rk45::Rk45;
-use crate::solve::rodas4::Rodas4;
+use crate::solve::time::adaptive::{Adaptive, Advance, Control, Observer};
+use crate::solve::time::alpha::GeneralizedAlpha;
+use crate::solve::time::average_field::AverageField;
 use crate::solve::time::dirk::Dirk;
-use crate::solve::time::tableau::{SDIRK4, TR_BDF2};
+use crate::solve::time::doubling::Doubling;
+use crate::solve::time::explicit::{self, Rk45};
+use crate::solve::time::method::{Method, Motion, Work};
+use crate::solve::time::radau5::Radau5;
+use crate::solve::time::rodas4::Rodas4;
+use crate::solve::time::tableau::{MIDPOINT, SDIRK4, TR_BDF2};
 
 /// What integrates a motion in time.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -92,7 +93,7 @@ impl Integrator {
         !matches!(self, Self::Radau5 | Self::Rk45)
     }
 
-    /// Advances `motion` from the start of the ramp to its end; `h` is the first step to try [s]. Methods without an
+    /// Advances `motion` over bodies from the start of the ramp to its end; `h` is the first step to try [s]. Methods without an
     /// error estimate go by step doubling under [`Control::Tolerance`]. The work is told even where it ends in an error.
     #[allow(clippy::too_many_arguments)]
     pub fn advance(
@@ -105,49 +106,109 @@ impl Integrator {
         control: Control,
         observe: Observer<'_>,
     ) -> (Result<Advance, SolveError>, Work) {
-        let run = Run { system, ramp, motion, h, control, observe };
-        match self {
-            Self::Rodas4 => run.with(Rodas4::with_solver(solver, system, &[])),
-            Self::AverageField => run.doubled(AverageField::with_solver(solver, system)),
-            Self::Midpoint => run.doubled(Midpoint::with_solver(solver, system)),
-            Self::TrBdf2 => run.with(Dirk::with_solver(solver, system, &TR_BDF2)),
-            Self::GeneralizedAlpha { rho } => run.doubled(GeneralizedAlpha::with_solver(solver, system, rho)),
-            Self::Newmark => run.doubled(GeneralizedAlpha::newmark_with_solver(solver, system)),
-            Self::Sdirk4 => run.with(Dirk::with_solver(solver, system, &SDIRK4)),
-            Self::Radau5 => run.with(Radau5::new(system)),
-            Self::Rk45 => match Rk45::new(system) {
-                Ok(method) => run.with(method),
-                Err(error) => (Err(error), Work::default()),
+        let mut bodies = Bodies::new(system, ramp);
+        let run = Run { motion, h, control, observe };
+        match self.rule() {
+            Some(rule) => match explicit::suits(system).err().filter(|_| rule == Rule::Rk45) {
+                Some(error) => (Err(error), Work::default()),
+                None => rule.advance(&mut Newton::new(bodies, solver), run),
             },
+            None => match self {
+                Self::AverageField => run.doubled(&mut Newton::new(bodies, solver), AverageField::new(system.bodies())),
+                Self::Radau5 => run.with(&mut bodies, Radau5::new(system)),
+                _ => run.with(&mut bodies, Rodas4::with_solver(solver, system, &[])),
+            },
+        }
+    }
+
+    /// The rule that it is over the equations of any formulation; none for methods that need what bodies alone have: Rodas4 has the
+    /// Jacobian in its formula, Radau5 couples its stages, and average vector field needs constant inertia.
+    pub fn rule(self) -> Option<Rule> {
+        match self {
+            Self::Rodas4 | Self::AverageField | Self::Radau5 => None,
+            Self::Midpoint => Some(Rule::Midpoint),
+            Self::TrBdf2 => Some(Rule::TrBdf2),
+            Self::GeneralizedAlpha { rho } => Some(Rule::GeneralizedAlpha { rho }),
+            Self::Newmark => Some(Rule::Newmark),
+            Self::Rk45 => Some(Rule::Rk45),
+            Self::Sdirk4 => Some(Rule::Sdirk4),
+        }
+    }
+}
+
+/// A method that any equations can have.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Rule {
+    /// See [`Integrator::Midpoint`].
+    Midpoint,
+    /// See [`Integrator::TrBdf2`].
+    TrBdf2,
+    /// See [`Integrator::GeneralizedAlpha`].
+    GeneralizedAlpha {
+        /// Factor by which an infinitely fast motion shrinks in a step, from 0 to 1.
+        rho: f64,
+    },
+    /// See [`Integrator::Newmark`].
+    Newmark,
+    /// See [`Integrator::Rk45`].
+    Rk45,
+    /// See [`Integrator::Sdirk4`].
+    Sdirk4,
+}
+
+impl Rule {
+    /// Goes through a run.
+    pub fn advance<E: Staged>(
+        self,
+        equations: &mut E,
+        run: Run<'_, '_, E::Unknown>,
+    ) -> (Result<Advance, SolveError>, Work) {
+        let n = equations.unknowns();
+        match self {
+            Self::TrBdf2 => run.with(equations, Dirk::new(n, &TR_BDF2)),
+            Self::Sdirk4 => run.with(equations, Dirk::new(n, &SDIRK4)),
+            Self::Midpoint => run.doubled(equations, Dirk::new(n, &MIDPOINT)),
+            Self::GeneralizedAlpha { rho } => run.doubled(equations, GeneralizedAlpha::new(n, rho)),
+            Self::Newmark => run.doubled(equations, GeneralizedAlpha::newmark(n)),
+            Self::Rk45 => run.with(equations, Rk45::new(n)),
         }
     }
 }
 
 /// What is the same for every method.
-struct Run<'a, 'b> {
-    system: &'a System,
-    ramp: &'a Ramp<'a>,
-    motion: &'a mut Motion,
-    h: f64,
-    control: Control,
-    observe: Observer<'b>,
+pub struct Run<'a, 'b, X> {
+    /// Where it begins; becomes where it ends.
+    pub motion: &'a mut Motion<X>,
+    /// First step to try [s].
+    pub h: f64,
+    /// What sets the length of steps.
+    pub control: Control,
+    /// Sees each accepted step.
+    pub observe: Observer<'b, X>,
 }
 
-impl Run<'_, '_> {
-    fn with<M: Method>(mut self, method: M) -> (Result<Advance, SolveError>, Work) {
-        let mut stepper = Adaptive::new(self.system, method);
-        let h = &mut self.h;
-        let end = stepper.advance(self.system, self.ramp, self.motion, h, self.control, usize::MAX, self.observe);
+impl<X: Unknown> Run<'_, '_, X> {
+    fn with<E: Equations<Unknown = X>, M: Method<E>>(
+        mut self,
+        equations: &mut E,
+        method: M,
+    ) -> (Result<Advance, SolveError>, Work) {
+        let mut stepper = Adaptive::new(equations.unknowns(), method);
+        let end = stepper.advance(equations, self.motion, &mut self.h, self.control, usize::MAX, self.observe);
         (end, stepper.work())
     }
 
-    fn doubled<M: Method>(self, method: M) -> (Result<Advance, SolveError>, Work) {
+    fn doubled<E: Equations<Unknown = X>, M: Method<E>>(
+        self,
+        equations: &mut E,
+        method: M,
+    ) -> (Result<Advance, SolveError>, Work) {
         match self.control {
             Control::Tolerance(_) => {
-                let system = self.system;
-                self.with(Doubling::new(system, method))
+                let doubled = Doubling::new(equations.unknowns(), method);
+                self.with(equations, doubled)
             }
-            Control::Fixed(_) => self.with(method),
+            Control::Fixed(_) => self.with(equations, method),
         }
     }
 }

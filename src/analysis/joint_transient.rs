@@ -1,7 +1,7 @@
 //! Motion in time in joint coordinates: the recursion of the paper, loops closed after each step.
 //!
 //! Accelerations come from [`crate::multibody::rcr`] in O(n + m). Dormand and Prince's pair advances them explicitly, or an
-//! implicit method does, whose stages the same recursion solves ([`crate::solve::joint_stage`]). An explicit step is about
+//! implicit method does, whose stages the same recursion solves ([`crate::equations::constrained`]). An explicit step is about
 //! 1/ω long, ω the highest natural frequency of the model, whatever the tolerance: joints that only turn have a moderate
 //! one, elastic axial directions a very high one. The number of explicit steps is foretold, and refused when it is beyond
 //! [`MOST_STEPS`]: implicit steps follow the motion that is asked for.
@@ -15,15 +15,15 @@ mod report;
 mod rotary;
 
 use super::formulation::{Formulation, coordinate_scales};
-use super::integrator::Integrator;
-use super::transient::options::{STEP_SHARE, TransientOptions};
+use super::integrator::{Integrator, Rule};
+use super::transient::options::TransientOptions;
 use super::transient::record::record;
 use super::transient::result::TransientResult;
 use super::{AnalysisError, Watch};
 use crate::compile::Compiled;
+use crate::equations::Motion;
 use crate::multibody::rcr::Linkage;
 use crate::solve::fastest::{Fastest, fastest};
-use crate::solve::joint_dirk::Rule;
 use in_joints::InJoints;
 use on_tree::on_tree;
 pub use report::JointReport;
@@ -54,19 +54,16 @@ pub fn joint_transient(
     let counts = formulation.lock(&system.model).counts();
     let scale = coordinate_scales(&linkage, system.length_scale);
     let top = fastest(&linkage, &scale, system.electrics.heating.heaters.len());
-    if let (Some(top), None) = (&top, rule) {
+    if let (Some(top), Rule::Rk45, None) = (&top, rule, options.step) {
         affordable(formulation, &linkage, top, options.stop)?;
     }
     let start = options.release.map(|start| rotary::locked(start, formulation));
     let mut carrier = InJoints {
         formulation,
         system,
-        q: vec![0.0; linkage.coordinates],
-        v: vec![0.0; linkage.coordinates],
+        now: Motion::zeros(linkage.coordinates),
         rule,
         control: options.control(),
-        rtol: STEP_SHARE * options.tol,
-        rate: top.as_ref().map_or(1.0 / options.stop, |t| t.omega),
         report: JointReport {
             coordinates: linkage.coordinates,
             constraints: linkage.constraints,
@@ -99,34 +96,18 @@ fn open(gap: f64, most: f64) -> Option<String> {
     })
 }
 
-/// The implicit method asked for; none: explicit steps.
-fn rule(formulation: Formulation, options: &TransientOptions<'_>) -> Result<Option<Rule>, AnalysisError> {
-    let rule = match options.method {
-        Integrator::Rk45 => None,
-        Integrator::Midpoint => Some(Rule::Midpoint),
-        Integrator::Newmark => Some(Rule::Newmark),
-        Integrator::TrBdf2 => Some(Rule::TrBdf2),
-        Integrator::Sdirk4 => Some(Rule::Sdirk4),
-        Integrator::GeneralizedAlpha { rho } => Some(Rule::GeneralizedAlpha { rho }),
-        other => {
-            return Err(AnalysisError::BadRequest {
-                what: format!("method {}", other.name()),
-                detail: format!(
-                    "formulation {} has {}; take one of them, or compliant for {}",
-                    formulation.name(),
-                    Integrator::IN_JOINTS.join(", "),
-                    other.name()
-                ),
-            });
-        }
-    };
-    if rule.is_none() && options.step.is_some() {
-        return Err(AnalysisError::BadRequest {
-            what: "step".into(),
-            detail: "explicit steps follow the tolerance; leave it out, or take an implicit method".into(),
-        });
-    }
-    Ok(rule)
+/// The method asked for, which has to be one for any equations.
+fn rule(formulation: Formulation, options: &TransientOptions<'_>) -> Result<Rule, AnalysisError> {
+    let method = options.method;
+    method.rule().ok_or_else(|| AnalysisError::BadRequest {
+        what: format!("method {}", method.name()),
+        detail: format!(
+            "formulation {} has {}; take one of them, or compliant for {}",
+            formulation.name(),
+            Integrator::IN_JOINTS.join(", "),
+            method.name()
+        ),
+    })
 }
 
 fn affordable(formulation: Formulation, linkage: &Linkage, top: &Fastest, stop: f64) -> Result<(), AnalysisError> {

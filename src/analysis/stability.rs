@@ -9,7 +9,6 @@ use crate::domains::{Drive, System};
 use crate::multibody::forces::add_inertia;
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, Model};
-use crate::solve::frequency::eigen::mass_product;
 
 /// Share of displacement or rate in an unstable direction from which the motion is said to go along it [1].
 const MOVING: f64 = 1e-2;
@@ -54,8 +53,8 @@ impl Stability {
         }
         let Some(shape) = self.softest(system, drive, q) else { return };
         let share = |x: &[Pose]| {
-            let length = mass_product(model, x, x).sqrt();
-            if length > 0.0 { mass_product(model, &shape, x).abs() / length } else { 0.0 }
+            let length = model.mass_product(x, x).sqrt();
+            if length > 0.0 { model.mass_product(&shape, x).abs() / length } else { 0.0 }
         };
         if share(q) > MOVING || share(v) > MOVING {
             return;
@@ -112,7 +111,7 @@ impl Stability {
             model.project(&mut x);
             self.tangent.solve(&model.pattern, &mut x);
             model.project(&mut x);
-            let length = mass_product(model, &x, &x).sqrt();
+            let length = model.mass_product(&x, &x).sqrt();
             if !(length.is_finite() && length > 0.0) {
                 return None;
             }

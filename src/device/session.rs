@@ -11,6 +11,7 @@ use crate::budget;
 use crate::compile::Compiled;
 use crate::domains::drive::Electrics;
 use crate::domains::{Drive, System};
+use crate::equations::bodies::Weights;
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
 use crate::solve::equilibrium::{Equilibrium, EquilibriumOptions};
@@ -34,6 +35,8 @@ pub(super) struct Session {
     pub(super) shaken: Option<Shaken>,
     /// Carries ∂motion/∂(final voltage), one for each opened port.
     pub(super) stepper: Adaptive<Formulated>,
+    /// What weighs the errors of its steps.
+    pub(super) weights: Weights,
     pub(super) motion: Motion,
     pub(super) rise: Vec<f64>,
     pub(super) rise_slope: Vec<f64>,
@@ -98,7 +101,8 @@ impl Session {
         let session = Self {
             opened: request.clone(),
             shaken,
-            stepper: Adaptive::new(system, Formulated::new(system, joints.as_ref(), first_step, &ports.sources)),
+            stepper: Adaptive::new(n, Formulated::new(system, joints.as_ref(), first_step, &ports.sources)),
+            weights: Weights::new(&system.model),
             ports,
             signals,
             states: States::default(),

@@ -9,6 +9,7 @@ use super::{Status, Trial, TrialReply};
 use crate::analysis::contact_range::within_contact_range;
 use crate::compile::Compiled;
 use crate::domains::Ramp;
+use crate::equations::Bodies;
 use crate::multibody::planar::Pose;
 use crate::solve::path::SourcePath;
 use crate::solve::time::adaptive::{Advance, Control};
@@ -103,8 +104,7 @@ impl Session {
         let ramp = Ramp::new(electrics, &from, &self.sources, &self.rise, request.dt).pushed(push);
         let mut h = parent.map_or(self.first_step, |p| p.next_step);
         let advanced = self.stepper.advance(
-            system,
-            &ramp,
+            &mut Bodies::weighed(system, &ramp, &self.weights),
             &mut self.motion,
             &mut h,
             Control::Tolerance(STEP_SHARE * compiled.options.tol),

@@ -9,7 +9,7 @@ use super::mechanism::{Mechanism, Push, dot};
 use crate::analysis::AnalysisError;
 use crate::analysis::harmonic::modal;
 use crate::multibody::planar::Pose;
-use crate::solve::eigen::{Modes, mass_product};
+use crate::solve::eigen::Modes;
 use crate::solve::frequency::refined::Refined;
 use nalgebra::{DMatrix, SymmetricEigen};
 
@@ -133,7 +133,7 @@ impl Mechanism<'_> {
         if n == 0 {
             return out;
         }
-        let mass = DMatrix::from_fn(n, n, |i, j| mass_product(model, &upright[i], &upright[j]));
+        let mass = DMatrix::from_fn(n, n, |i, j| model.mass_product(&upright[i], &upright[j]));
         let heavy = SymmetricEigen::new((&mass + mass.transpose()) * 0.5);
         let mut order: Vec<usize> = (0..n).filter(|&k| heavy.eigenvalues[k] > 0.0).collect();
         order.sort_by(|&i, &j| heavy.eigenvalues[j].total_cmp(&heavy.eigenvalues[i]));

@@ -153,6 +153,11 @@ impl Model {
         self.bodies[body].mass_diagonal()
     }
 
+    /// xᵀMy.
+    pub fn mass_product(&self, x: &[Pose], y: &[Pose]) -> f64 {
+        x.iter().zip(y).enumerate().map(|(j, (x, y))| x.dot(&self.mass(j).component_mul(y))).sum()
+    }
+
     /// Bodies with held directions, ascending, and the projectors onto the free ones.
     pub fn held(&self) -> impl Iterator<Item = (usize, &Block)> {
         self.held.iter().filter_map(|&k| Some((k as usize, self.bodies[k as usize].free.as_deref()?)))

@@ -17,7 +17,7 @@ mod kind;
 mod plain;
 pub mod sparse;
 
-use super::linear::{LinearSolver, Recursion};
+use crate::equations::linear::{LinearSolver, Recursion};
 use crate::multibody::factor::ZeroPivot;
 use crate::multibody::planar::{DOF, Pose};
 use crate::multibody::{BlockMatrix, Pattern};

@@ -2,7 +2,6 @@
 //!
 //! | folder | what it holds |
 //! |---|---|
-//! | [`linear`] | what solves with the tangent: the block recursion |
 //! | [`equilibrium`] | static equilibrium along a path of loads: Newton, load stepping, folds and jumps |
 //! | [`continuation`] | equilibrium paths by arc length: folds, bifurcations, branches |
 //! | [`frequency`] | natural frequencies, and the response at one frequency |
@@ -13,7 +12,6 @@ pub mod baseline;
 pub mod continuation;
 pub mod equilibrium;
 pub mod frequency;
-pub mod linear;
 pub mod time;
 
 // the same modules by the names that they had before there were folders
@@ -22,8 +20,8 @@ pub use equilibrium::path;
 pub use frequency::{eigen, fastest, harmonic, subspace};
 pub use time::interpolation as dense;
 pub use time::{
-    adaptive, avf, centred, dormand_prince, doubling, event, generalized_alpha, joint_adaptive, joint_dirk,
-    joint_loads, joint_motion, joint_stage, method, midpoint, radau5, rk45, rodas4,
+    adaptive, alpha, average_field, dirk, dormand_prince, doubling, event, explicit, joint_motion, method, radau5,
+    rodas4,
 };
 
 use crate::multibody::factor::ZeroPivot;
@@ -114,27 +112,18 @@ pub enum WhyFailed {
         /// Iterations made.
         iterations: usize,
     },
+    /// A body that forces move and no mass holds back.
+    #[error("no finite acceleration; give the body mass, or lock its direction")]
+    NoInertia,
     /// Infinite or not a number.
     #[error("the motion is no longer finite")]
     NotFinite,
 }
 
-/// Names of a planar body's directions, for messages.
-pub const DIRECTIONS: [&str; 3] = ["along x", "along y", "about z"];
+pub use crate::equations::bodies::DIRECTIONS;
+pub use crate::equations::linear;
 
 impl SolveError {
-    pub(crate) fn step_failed(
-        system: &crate::domains::System,
-        t: f64,
-        dt: f64,
-        why: WhyFailed,
-        body: usize,
-        direction: usize,
-    ) -> Self {
-        let body = system.model.bodies[body].name.to_string();
-        Self::StepFailed { t, dt, why, body, direction: DIRECTIONS[direction] }
-    }
-
     pub(crate) fn singular(system: &crate::domains::System, pivot: ZeroPivot) -> Self {
         Self::Singular {
             body: system.model.bodies[pivot.body].name.to_string(),

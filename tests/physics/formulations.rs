@@ -8,10 +8,10 @@ use bimorph::analysis::joint_transient::{JointReport, joint_transient};
 use bimorph::analysis::transient::{TransientOptions, TransientResult, transient};
 use bimorph::compile::{CompileOptions, Compiled};
 use bimorph::domains::Ramp;
+use bimorph::equations::loads::JointLoads;
 use bimorph::multibody::rcr::Reduction;
 use bimorph::netlist::Setting;
 use bimorph::solve::dormand_prince::{DormandPrince, Tolerances};
-use bimorph::solve::joint_loads::JointLoads;
 use bimorph::solve::joint_motion::JointMotion;
 
 /// Bimorphs on a yoke, every beam in two: the long ones by slenderness, the short ones as drawn.

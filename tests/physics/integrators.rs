@@ -174,8 +174,8 @@ fn one_motion() {
         (1345, 1, 8076, 8076, 16152, 8076),
         (1345, 1, 8076, 8076, 8076, 8076),
         (709, 16, 2900, 3625, 3625, 2900),
-        (1274, 5, 7678, 7678, 11515, 7678),
-        (1345, 1, 8080, 8080, 12118, 8080),
+        (1274, 4, 7672, 7672, 7672, 7672),
+        (1345, 1, 8080, 8080, 8080, 8080),
         (1345, 1, 8080, 8080, 8080, 8080),
         (773, 71, 1688, 4220, 5908, 1688),
         (8183, 64, 0, 0, 49483, 0),
@@ -184,15 +184,16 @@ fn one_motion() {
     assert_eq!(pinned, known);
 }
 
-/// Steps of 2 µs are too long for methods that damp nothing: on the undamped bank Newmark's rule and generalized-α with ρ = 1
-/// gain more than a hundredth and more than half, the midpoint rule more than a tenth of the energy, then no step can be taken any more, all
-/// within a millisecond; the error names time, step and body. (Newmark's rule gained 79 % as well when it began with M⁻¹ of the forces, which
-/// a step of 2 µs makes a noise that nothing damps.) Generalized-α with ρ = 0.8 goes through at 1 µs, and loses energy.
+/// Steps of 2 µs are too long for methods that damp nothing: on the undamped bank Newmark's rule and generalized-α with ρ = 1, which are
+/// one method, gain more than a hundredth of the energy, the midpoint rule more than a tenth, then no step can be taken any more, all
+/// within a millisecond; the error names time, step and body. (Generalized-α with ρ = 1 gained 79 % when it held the mean of the forces at
+/// both ends to zero where there is no inertia, and Newmark's rule when it began with M⁻¹ of the forces: noise that nothing damps.)
+/// Generalized-α with ρ = 0.8 goes through at 1 µs, and loses energy.
 #[test]
 fn long_steps() {
     let bank = released_bank();
     let undamped =
-        [(Integrator::Newmark, 0.01), (Integrator::GeneralizedAlpha { rho: 1.0 }, 0.5), (Integrator::Midpoint, 0.1)];
+        [(Integrator::Newmark, 0.01), (Integrator::GeneralizedAlpha { rho: 1.0 }, 0.01), (Integrator::Midpoint, 0.1)];
     for (method, least) in undamped {
         match drift(&bank, method, 2e-6, 1e-3) {
             Err(SolveError::StepFailed { t, dt, body, .. }) => {

@@ -4,7 +4,7 @@ use crate::model;
 use bimorph::analysis::transient::{TransientOptions, TransientResult, transient};
 use bimorph::compile::{CompileOptions, Compiled, Formulation, Scheme, compile};
 use bimorph::domains::Ramp;
-use bimorph::equations::Joints;
+use bimorph::equations::{Bodies, Joints};
 use bimorph::multibody::relative::{Tree, Unfit};
 use bimorph::netlist::{Bundle, Setting};
 use bimorph::solve::time::joint_rodas4::JointRodas4;
@@ -169,15 +169,16 @@ fn sensitivities_of_a_step_are_exact() {
         let before = Ramp::new(electrics, &[0.5, 3.0], &from, &rise, 3e-7);
         let mut method = JointRodas4::new(Arc::clone(&joints), shortest, &[0, 1]);
         let (mut motion, mut error) = (Motion::zeros(count), Motion::zeros(count));
-        method.start(system, &before, &motion).unwrap();
+        let mut bodies = Bodies::new(system, &before);
+        method.start(&mut bodies, &motion).unwrap();
         for k in 0..15 {
-            method.step(system, &before, f64::from(k) * 2e-8, 2e-8, &mut motion, &mut error).unwrap();
+            method.step(&mut bodies, f64::from(k) * 2e-8, 2e-8, &mut motion, &mut error).unwrap();
         }
         // a moving start, from which the step that is differentiated goes on
         let rise: Vec<f64> = (0..rise.len()).map(|k| before.rise_at(k, 3e-7)).collect();
         let ramp = Ramp::new(electrics, &from, &to, &rise, 2e-8);
         method.forget_sensitivities();
-        method.step(system, &ramp, 0.0, 2e-8, &mut motion, &mut error).unwrap();
+        method.step(&mut Bodies::new(system, &ramp), 0.0, 2e-8, &mut motion, &mut error).unwrap();
         (motion, method.sensitivity.clone())
     };
     let at = [3.0, 12.0];

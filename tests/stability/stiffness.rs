@@ -1,14 +1,15 @@
 //! Stiffness ratios 1e3 … 1e8: beams whose joints are ever stiffer along them.
 
 use super::frame::{cantilever, quiet};
+use bimorph::analysis::integrator::Integrator;
 use bimorph::domains::System;
 use bimorph::multibody::planar::Pose;
-use bimorph::solve::adaptive::{Adaptive, Control};
+use bimorph::solve::adaptive::Control;
+use bimorph::solve::baseline::Solver;
 use bimorph::solve::equilibrium::{Equilibrium, EquilibriumOptions};
-use bimorph::solve::method::{Method, Motion, Work};
+use bimorph::solve::linear::Recursion;
+use bimorph::solve::method::{Motion, Work};
 use bimorph::solve::path::SourcePath;
-use bimorph::solve::rk45::Rk45;
-use bimorph::solve::rodas4::Rodas4;
 
 /// Segments of the cantilever.
 const SEGMENTS: usize = 6;
@@ -40,21 +41,20 @@ pub(crate) struct Released {
 }
 
 /// The tip after release until `end` [s]; ends early when it is beyond ten times the first displacement.
-fn released<M: Method>(ratio: f64, method: impl Fn(&System) -> M, control: Control, end: f64) -> Released {
+fn released(ratio: f64, method: Integrator, control: Control, end: f64) -> Released {
     let (loaded, tip) = stiff(ratio, 0.2e-6);
     let q = bent(&loaded);
     let (system, _) = stiff(ratio, 0.0);
     let first = q[tip].y;
     let mut out = Released { track: vec![[0.0, first]], work: Work::default() };
     let mut motion = Motion { v: vec![Pose::zeros(); q.len()], q };
-    let mut adaptive = Adaptive::new(&system, method(&system));
     let ramp = quiet(&system, end);
-    let mut h = 1e-9;
-    let _ = adaptive.advance(&system, &ramp, &mut motion, &mut h, control, usize::MAX, &mut |s, h, _, m| {
+    let solver = Solver::Recursion(Recursion);
+    let (_, work) = method.advance(&system, solver, &ramp, &mut motion, 1e-9, control, &mut |s, h, _, m| {
         out.track.push([s + h, m.q[tip].y]);
         (m.q[tip].y / first).abs() < 10.0
     });
-    out.work = adaptive.work();
+    out.work = work;
     out
 }
 
@@ -63,17 +63,17 @@ const END: f64 = 120e-6;
 
 /// Rodas4 with a tolerance.
 pub(crate) fn implicit(ratio: f64, tol: f64) -> Released {
-    released(ratio, |s| Rodas4::new(s, &[]), Control::Tolerance(tol), END)
+    released(ratio, Integrator::Rodas4, Control::Tolerance(tol), END)
 }
 
 /// Dormand and Prince's pair with a tolerance, over 2 µs.
 pub(crate) fn explicit(ratio: f64, tol: f64) -> Released {
-    released(ratio, |s| Rk45::new(s).unwrap(), Control::Tolerance(tol), 2e-6)
+    released(ratio, Integrator::Rk45, Control::Tolerance(tol), 2e-6)
 }
 
 /// True when 400 explicit steps of `h` [s] stay bounded.
 pub(crate) fn explicit_holds(ratio: f64, h: f64) -> bool {
-    let track = released(ratio, |s| Rk45::new(s).unwrap(), Control::Fixed(h), 400.0 * h).track;
+    let track = released(ratio, Integrator::Rk45, Control::Fixed(h), 400.0 * h).track;
     track.len() > 400 && track.iter().all(|y| (y[1] / track[0][1]).abs() < 2.0)
 }
 

@@ -15,11 +15,11 @@
 // Each test and bench uses a part of this.
 #![allow(dead_code, unreachable_pub)]
 
+use bimorph::equations::loads::Loads;
 use bimorph::multibody::forces::RestStrain;
 use bimorph::multibody::planar::JointFrame;
 use bimorph::multibody::rcr::{AddedInertia, Linkage, Reduction};
 use bimorph::multibody::{Body, BodyId, BodyName, Drag, Joint, Model};
-use bimorph::solve::joint_stage::Loads;
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;

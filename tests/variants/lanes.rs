@@ -3,6 +3,7 @@
 use bimorph::analysis::transient::first_step;
 use bimorph::compile::{CompileOptions, Compiled, compile};
 use bimorph::domains::Ramp;
+use bimorph::equations::Bodies;
 use bimorph::netlist::{Bundle, Setting};
 use bimorph::solve::time::adaptive::{Adaptive, Control};
 use bimorph::solve::time::method::Motion;
@@ -35,12 +36,13 @@ fn alone(compiled: &Compiled, volts: &[f64], stop: f64, tol: f64) -> Option<Ran>
     let ramp = Ramp::new(&system.electrics, &sources, &sources, &rise, stop);
     let mut motion = Motion::zeros(system.bodies());
     let (mut steps, mut h) = (Vec::new(), first_step(system, stop));
-    let mut driver = Adaptive::new(system, Rodas4::new(system, &[]));
+    let mut driver = Adaptive::new(system.bodies(), Rodas4::new(system, &[]));
     let control = Control::Tolerance(tol);
-    let ended = driver.advance(system, &ramp, &mut motion, &mut h, control, usize::MAX, &mut |s, h, _, _| {
-        steps.push((s, h));
-        true
-    });
+    let ended =
+        driver.advance(&mut Bodies::new(system, &ramp), &mut motion, &mut h, control, usize::MAX, &mut |s, h, _, _| {
+            steps.push((s, h));
+            true
+        });
     ended.ok().map(|_| (steps, motion))
 }
 

@@ -10,6 +10,7 @@ use crate::analysis::AnalysisError;
 use crate::analysis::integrator::Integrator;
 use crate::analysis::statics::{operating_point, source_vector};
 use crate::domains::Ramp;
+use crate::equations::Bodies;
 use crate::solve::baseline::{Solver, SolverKind};
 use crate::solve::method::{Method, Motion};
 use crate::solve::rodas4::Rodas4;
@@ -67,6 +68,7 @@ pub(super) fn measure(model: &Variant, request: &Request<'_>, kind: SolverKind) 
     let ramp = Ramp::new(electrics, &sources, &sources, &rise, request.stop);
     let h = SHARE * request.stop;
     let steps = (MULTIPLICATIONS / multiplications.max(1)).clamp(1, MOST_STEPS) as usize;
+    let mut bodies = Bodies::new(system, &ramp);
     let mut method = Rodas4::with_solver(solver, system, &[]);
     let mut error = Motion::zeros(system.bodies());
     let mut seconds = Vec::with_capacity(request.spec.repeat);
@@ -75,7 +77,7 @@ pub(super) fn measure(model: &Variant, request: &Request<'_>, kind: SolverKind) 
         let mut motion = start.clone();
         let begun = Instant::now();
         for k in 0..steps {
-            if method.step(system, &ramp, k as f64 * h, h, &mut motion, &mut error).is_err() {
+            if method.step(&mut bodies, k as f64 * h, h, &mut motion, &mut error).is_err() {
                 point.failed = Some("the step matrix cannot be factored".into());
                 return Ok(point);
             }

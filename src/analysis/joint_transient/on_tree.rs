@@ -10,7 +10,7 @@ use super::super::{AnalysisError, Watch};
 use super::report::JointReport;
 use crate::compile::Compiled;
 use crate::domains::{Ramp, System};
-use crate::equations::Joints;
+use crate::equations::{Bodies, Joints};
 use crate::solve::baseline::SolverKind;
 use crate::solve::time::adaptive::{Adaptive, Advance, Observer};
 use crate::solve::time::joint_rodas4::JointRodas4;
@@ -75,8 +75,10 @@ impl Carrier for OnTree<'_> {
             });
         }
         let mut h = first_step(self.system, options.stop);
-        let mut stepper = Adaptive::new(self.system, JointRodas4::new(Arc::clone(self.joints), h, &[]));
-        let end = stepper.advance(self.system, ramp, motion, &mut h, options.control(), usize::MAX, observe)?;
+        let method = JointRodas4::new(Arc::clone(self.joints), h, &[]);
+        let mut stepper = Adaptive::new(self.system.bodies(), method);
+        let mut bodies = Bodies::new(self.system, ramp);
+        let end = stepper.advance(&mut bodies, motion, &mut h, options.control(), usize::MAX, observe)?;
         Ok((end, stepper.work()))
     }
 }

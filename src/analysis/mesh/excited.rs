@@ -248,7 +248,7 @@ fn excited(
     let modes = (found.shapes.iter().zip(&found.lambda))
         .map(|(x, lambda)| {
             let omega = lambda.max(0.0).sqrt();
-            let share = crate::solve::eigen::mass_product(&system.model, x, &way);
+            let share = system.model.mass_product(x, &way);
             for (way, x) in way.iter_mut().zip(x) {
                 *way -= x * share;
             }

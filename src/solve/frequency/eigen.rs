@@ -14,7 +14,6 @@
 
 use super::inverse_iteration::{self, Block};
 use super::lanczos::{self, CLOSED, Pairs};
-pub use super::mass::mass_product;
 use super::mass::shifted;
 use super::refined::{ROUNDING, Refined};
 use super::subspace;

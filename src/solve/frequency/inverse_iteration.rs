@@ -9,7 +9,7 @@
 //!
 //! Reference: K.-J. Bathe, "Finite Element Procedures" (2014), §11.6.
 
-use super::mass::{mass_product, shifted};
+use super::mass::shifted;
 use super::refined::Refined;
 use super::subspace::{columns, ritz};
 use crate::multibody::planar::Pose;
@@ -82,7 +82,7 @@ fn improve(
     let pose = |c: nalgebra::DVectorView<'_, f64>, k: usize| Pose::new(c[3 * k], c[3 * k + 1], c[3 * k + 2]);
     let normal = |c: nalgebra::DVectorView<'_, f64>| {
         let x: Vec<Pose> = (0..model.bodies.len()).map(|k| pose(c, k)).collect();
-        let length = mass_product(model, &x, &x).sqrt();
+        let length = model.mass_product(&x, &x).sqrt();
         x.iter().map(|x| x / length).collect()
     };
     Some((flat.column_iter().map(normal).collect(), loose))
@@ -112,7 +112,7 @@ fn measure(
         let Some((_, factor)) = &known else { return (lambda, f64::NAN) };
         // what is solved for here may be rounding alone, which no correction makes smaller
         let solved = refined.solve(factor, -size, &mut rest, MEASURED);
-        (lambda, mass_product(model, &rest, &rest).sqrt() * (1.0 + solved.left))
+        (lambda, model.mass_product(&rest, &rest).sqrt() * (1.0 + solved.left))
     };
     x.iter().map(one).unzip()
 }

@@ -5,16 +5,15 @@
 //!
 //! Reference: R. J. Allemang, "The modal assurance criterion: twenty years of use and abuse", Sound and Vibration 37 (2003).
 
-use super::eigen::mass_product;
 use crate::multibody::Model;
 use crate::multibody::planar::Pose;
 use nalgebra::DMatrix;
 
 /// MAC of every shape of `a` (rows) with every shape of `b` (columns), over the bodies of one model [1].
 pub fn mac(model: &Model, a: &[Vec<Pose>], b: &[Vec<Pose>]) -> DMatrix<f64> {
-    let norm = |x: &Vec<Pose>| mass_product(model, x, x);
+    let norm = |x: &Vec<Pose>| model.mass_product(x, x);
     let (of_a, of_b): (Vec<f64>, Vec<f64>) = (a.iter().map(norm).collect(), b.iter().map(norm).collect());
-    DMatrix::from_fn(a.len(), b.len(), |i, k| mass_product(model, &a[i], &b[k]).powi(2) / (of_a[i] * of_b[k]))
+    DMatrix::from_fn(a.len(), b.len(), |i, k| model.mass_product(&a[i], &b[k]).powi(2) / (of_a[i] * of_b[k]))
 }
 
 /// For each row its column, each column once, the likest first; the same matrix, the same pairs. Rows beyond the number of

@@ -1,6 +1,5 @@
-//! The masses of a model: products with them, and the tangent shifted by them.
+//! The tangent shifted by the masses.
 
-use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, Model};
 
 /// K − σM, held directions projected.
@@ -14,9 +13,4 @@ pub(super) fn shifted(model: &Model, stiffness: &BlockMatrix<f64, 3>, sigma: f64
     }
     model.project_matrix(&mut a);
     a
-}
-
-/// xᵀMy.
-pub fn mass_product(model: &Model, x: &[Pose], y: &[Pose]) -> f64 {
-    x.iter().zip(y).enumerate().map(|(j, (x, y))| x.dot(&model.mass(j).component_mul(y))).sum()
 }

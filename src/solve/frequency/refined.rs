@@ -179,7 +179,7 @@ impl<'a> Refined<'a> {
 
 /// Size in the mass norm.
 fn size_of(model: &Model, x: &[Pose]) -> f64 {
-    super::mass::mass_product(model, x, x).sqrt()
+    model.mass_product(x, x).sqrt()
 }
 
 fn size(model: &Model, x: &[Pose]) -> f64 {

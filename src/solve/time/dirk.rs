@@ -1,136 +1,141 @@
-//! Diagonally implicit Runge–Kutta methods on bodies, by their tableau: TR-BDF2 and SDIRK4.
+//! Diagonally implicit Runge–Kutta methods over any equations: TR-BDF2, SDIRK4, implicit midpoint, by their [`Tableau`].
+//!
+//! With v the rates and k the accelerations of the stages,
 //! ```text
-//! q_i = q₀ + h·Σ_{j≤i} a_ij·v_j,   v_i = v₀ + h·Σ_{j≤i} a_ij·f_j,   M·f = −r − C·v
-//! y₁ = y_s,                        error = h·Σ e_i·(v_i, f_i), taken through (I − γh·J)⁻¹      γ = a_ii
+//! v_i = v₀ + h·Σ_{j<i} a_ij·k_j + h·a_ii·k_i      q_i = q₀ + h·Σ_{j<i} a_ij·v_j + h·a_ii·v_i
+//! error = h·Σ e_i·(v_i, k_i), taken through (I − γ·J)⁻¹      γ = h·a_ii
 //! ```
-//! Each implicit stage is Newton's iteration with M/(γh)² + C/(γh) + K; a first stage with a₁₁ = 0 evaluates the forces. The
-//! forces of the other stages follow from the stages themselves, in the form M·f, so that bodies without inertia need no
-//! inverse. Where Rodas4 needs the Jacobian in its formula, here it only speeds the iteration up, so the order does not hang on
-//! it: joint coordinates take the same tableaus with an approximate one ([`super::joint_dirk`]).
+//! so that each stage is one equation for k_i, with γ and β = γ² ([`Stage`]); one with a_ii = 0 is an evaluation. Where Rodas4
+//! needs the Jacobian in its formula, here it only speeds the iteration up, so the order does not hang on it: joint coordinates
+//! with an approximate one take the same tableaus.
+//!
+//! A direction without inertia has no acceleration: its k is what the differences of its rates are, and no equation has it, since its
+//! displacement follows from the springs and its rate from the displacements of the stages.
 
-use super::implicit::{Equation, Implicit, Sample};
-use super::method::{Method, Motion, StepFailure, Work};
+use super::method::{Method, Motion, StepFailure};
 use super::tableau::Tableau;
-use crate::domains::{Ramp, System};
-use crate::multibody::forces;
+use crate::equations::{Stage, Staged, Unknown};
 use crate::multibody::planar::Pose;
-use crate::solve::linear::{LinearSolver, Recursion};
 
 /// A method with its storage.
 #[derive(Debug, Clone)]
-pub struct Dirk<S = Recursion> {
+pub struct Dirk<X = Pose> {
     tableau: &'static Tableau,
-    implicit: Implicit<S>,
-    constant: Vec<Pose>,
-    known: Vec<Pose>,
-    x: Vec<Pose>,
-    /// Rates (q) and M·f (v) of the stages.
-    stages: Vec<Motion>,
+    /// Rates (q) and accelerations (v) of the stages.
+    stages: Vec<Motion<X>>,
+    /// What a stage has without its own acceleration.
+    base: Motion<X>,
+    /// The place of the last stage.
+    at: Motion<X>,
+    near: Vec<X>,
 }
 
-impl Dirk {
-    /// Storage for a system. The last stage of `tableau` is the end, and it has an estimate.
-    pub fn new(system: &System, tableau: &'static Tableau) -> Self {
-        Self::with_solver(Recursion, system, tableau)
-    }
-}
-
-impl<S: LinearSolver> Dirk<S> {
-    /// [`Dirk::new`] with another solver of its linear systems.
-    pub fn with_solver(solver: S, system: &System, tableau: &'static Tableau) -> Self {
-        let zeros = vec![Pose::zeros(); system.bodies()];
+impl<X: Unknown> Dirk<X> {
+    /// Storage over some number of unknowns.
+    pub fn new(unknowns: usize, tableau: &'static Tableau) -> Self {
+        let zeros = Motion::zeros(unknowns);
         Self {
             tableau,
-            implicit: Implicit::new(solver, system),
-            constant: zeros.clone(),
-            known: zeros.clone(),
-            x: zeros,
-            stages: vec![Motion::zeros(system.bodies()); tableau.a.len()],
+            stages: vec![zeros.clone(); tableau.a.len()],
+            base: zeros.clone(),
+            near: zeros.q.clone(),
+            at: zeros,
         }
     }
 
-    /// A stage without a diagonal: rate and M·f where the step begins.
-    fn evaluate(&mut self, system: &System, ramp: &Ramp<'_>, s: f64, motion: &Motion) {
-        let stage = &mut self.stages[0];
-        self.implicit.force(system, ramp, s, &motion.q, &mut stage.v);
-        forces::add_damping(&system.model, &motion.v, &mut stage.v);
-        stage.v.iter_mut().for_each(|f| *f = -*f);
-        stage.q.copy_from_slice(&motion.v);
+    /// `out = from + h·Σ weights·stages`.
+    fn sum(&self, h: f64, weights: &[f64], from: Option<&Motion<X>>, out: &mut Motion<X>) {
+        for k in 0..out.q.len() {
+            let (mut dq, mut dv) = (X::ZERO, X::ZERO);
+            for (s, w) in self.stages.iter().zip(weights) {
+                dq += s.q[k] * *w;
+                dv += s.v[k] * *w;
+            }
+            let (q, v) = from.map_or((X::ZERO, X::ZERO), |m| (m.q[k], m.v[k]));
+            (out.q[k], out.v[k]) = (q + dq * h, v + dv * h);
+        }
+    }
+
+    /// Solves stage `i`, or evaluates it.
+    fn stage<E: Staged<Unknown = X>>(
+        &mut self,
+        equations: &mut E,
+        (i, t, h): (usize, f64, f64),
+        now: &Motion<X>,
+    ) -> Result<(), StepFailure> {
+        let Tableau { a, c, .. } = self.tableau;
+        let gamma = h * a[i][i];
+        let (before, rest) = self.stages.split_at_mut(i);
+        let stage = &mut rest[0];
+        for k in 0..now.q.len() {
+            let (mut dq, mut dv) = (X::ZERO, X::ZERO);
+            for (s, a) in before.iter().zip(a[i]) {
+                dq += s.q[k] * *a;
+                dv += s.v[k] * *a;
+            }
+            let v = now.v[k] + dv * h;
+            (self.base.q[k], self.base.v[k]) = (now.q[k] + dq * h + v * gamma, v);
+            // the last stage's place, moved on at its rate
+            let (from, rate, by) = match before.last() {
+                Some(last) => (self.at.q[k], last.q[k], c[i] - c[i - 1]),
+                None => (now.q[k], now.v[k], c[i]),
+            };
+            self.near[k] = from + rate * (by * h);
+        }
+        let at = t + c[i] * h;
+        if a[i][i] == 0.0 {
+            equations.accelerations(at, &self.base.q, &self.base.v, &mut stage.v)?;
+            self.at.copy(&self.base);
+        } else {
+            // nothing of an earlier step: a step is a function of its start
+            match before.last() {
+                Some(last) => stage.v.copy_from_slice(&last.v),
+                None => stage.v.fill(X::ZERO),
+            }
+            let Motion { q, v } = &self.base;
+            let asked = Stage { t: at, q, v, near: &self.near, beta: gamma * gamma, gamma };
+            equations.stage(&asked, &mut stage.v, &mut self.at)?;
+        }
+        stage.q.copy_from_slice(&self.at.v);
+        Ok(())
     }
 }
 
-impl<S: LinearSolver> Method for Dirk<S> {
+impl<E: Staged> Method<E> for Dirk<E::Unknown> {
     fn error_order(&self) -> f64 {
         self.tableau.order
     }
 
+    /// `error` receives zero where the tableau has no estimate.
     fn step(
         &mut self,
-        system: &System,
-        ramp: &Ramp<'_>,
-        s: f64,
+        equations: &mut E,
+        t: f64,
         h: f64,
-        motion: &mut Motion,
-        error: &mut Motion,
+        motion: &mut Motion<E::Unknown>,
+        error: &mut Motion<E::Unknown>,
     ) -> Result<(), StepFailure> {
-        let model = &system.model;
-        let Tableau { a, c: nodes, .. } = self.tableau;
-        let (n, last) = (motion.q.len(), a.len() - 1);
-        let gamma = a[last][last];
-        let c = 1.0 / (gamma * h);
-        let mass = |k: usize, x: Pose| model.mass(k).component_mul(&x);
-        for (x, v) in self.x.iter_mut().zip(&motion.v) {
-            *x = v * (nodes[0] * h);
+        let Tableau { a, b, error: weights, .. } = self.tableau;
+        for i in 0..a.len() {
+            self.stage(equations, (i, t, h), motion)?;
         }
-        for (i, row) in a.iter().enumerate() {
-            if row[i] == 0.0 {
-                self.evaluate(system, ramp, s + nodes[i] * h, motion);
-                continue;
-            }
-            let (before, rest) = self.stages.split_at_mut(i);
-            let stage = &mut rest[0];
-            for k in 0..n {
-                let (mut known, mut push) = (Pose::zeros(), Pose::zeros());
-                for (stage, a) in before.iter().zip(*row) {
-                    known += stage.q[k] * (a / gamma);
-                    push += stage.v[k] * (a / gamma);
-                }
-                self.constant[k] = -mass(k, (known + motion.v[k]) * c) - push;
-                self.known[k] = -known;
-                stage.v[k] = push;
-                if let Some(last) = before.last() {
-                    // the last stage's place, moved on at its rate
-                    self.x[k] += last.q[k] * ((nodes[i] - nodes[i - 1]) * h);
-                }
-            }
-            forces::add_damping(model, &self.known, &mut self.constant);
-            let samples = [Sample { weight: 1.0, share: 1.0, time: s + nodes[i] * h }];
-            let equation = Equation { m: c * c, c, base: &motion.q, constant: &self.constant, samples: &samples };
-            self.implicit.newton(system, ramp, &equation, &mut self.x)?;
-            for k in 0..n {
-                let rate = self.x[k] * c + self.known[k];
-                stage.v[k] = mass(k, rate - motion.v[k]) * c - stage.v[k];
-                stage.q[k] = rate;
+        match b {
+            // the last stage is the end
+            None => motion.copy(&self.at),
+            Some(b) => {
+                self.base.copy(motion);
+                self.sum(h, b, Some(&self.base), motion);
+                equations.follow(h, &self.base.q, motion, &mut []);
             }
         }
-        let weights = self.tableau.error.unwrap_or_default();
-        for k in 0..n {
-            let (mut rate, mut push) = (Pose::zeros(), Pose::zeros());
-            for (stage, e) in self.stages.iter().zip(weights) {
-                rate += stage.q[k] * (e * h);
-                push += stage.v[k] * (e * h);
+        match weights {
+            None => error.clear(),
+            Some(weights) => {
+                self.sum(h, weights, None, error);
+                let last = a.len() - 1;
+                equations.smooth((t + h, h * a[last][last]), &motion.q, error)?;
             }
-            // the raw estimate: its displacements, and the force behind its rates
-            (error.v[k], error.q[k]) = (rate, push);
-            motion.v[k] = self.stages[last].q[k];
-            motion.q[k] += self.x[k];
         }
-        model.project(&mut motion.v);
-        self.implicit.smooth(system, c, error);
         Ok(())
-    }
-
-    fn work(&self) -> Work {
-        self.implicit.work
     }
 }

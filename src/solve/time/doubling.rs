@@ -6,62 +6,62 @@
 //! Reference: E. Hairer, S. P. Nørsett, G. Wanner, "Solving Ordinary Differential Equations I" (1993), §II.4, eq. 4.4.
 
 use super::method::{Method, Motion, StepFailure, Work};
-use crate::domains::{Ramp, System};
+use crate::equations::{Equations, Unknown};
+use crate::multibody::planar::Pose;
 
 /// A method of order 2 with step doubling.
 #[derive(Debug, Clone)]
-pub struct Doubling<M> {
+pub struct Doubling<M, X = Pose> {
     method: M,
-    start: Motion,
-    carried: Vec<Motion>,
+    start: Motion<X>,
+    carried: Vec<Motion<X>>,
 }
 
-impl<M: Method> Doubling<M> {
-    /// Storage for a system.
-    pub fn new(system: &System, mut method: M) -> Self {
-        let carried = method.carried().to_vec();
-        Self { method, start: Motion::zeros(system.bodies()), carried }
+impl<M, X: Unknown> Doubling<M, X> {
+    /// Storage over some number of unknowns.
+    pub fn new(unknowns: usize, method: M) -> Self {
+        Self { method, start: Motion::zeros(unknowns), carried: Vec::new() }
     }
 }
 
-impl<M: Method> Method for Doubling<M> {
+impl<E: Equations, M: Method<E>> Method<E> for Doubling<M, E::Unknown> {
     fn error_order(&self) -> f64 {
         3.0
     }
 
-    fn start(&mut self, system: &System, ramp: &Ramp<'_>, motion: &Motion) -> Result<(), StepFailure> {
-        self.method.start(system, ramp, motion)
+    fn start(&mut self, equations: &mut E, motion: &Motion<E::Unknown>) -> Result<(), StepFailure> {
+        self.carried = self.method.carried().to_vec();
+        self.method.start(equations, motion)
     }
 
     fn step(
         &mut self,
-        system: &System,
-        ramp: &Ramp<'_>,
-        s: f64,
+        equations: &mut E,
+        t: f64,
         h: f64,
-        motion: &mut Motion,
-        error: &mut Motion,
+        motion: &mut Motion<E::Unknown>,
+        error: &mut Motion<E::Unknown>,
     ) -> Result<(), StepFailure> {
         self.start.copy(motion);
         for (keep, now) in self.carried.iter_mut().zip(self.method.carried().iter()) {
             keep.copy(now);
         }
-        self.method.step(system, ramp, s, h, motion, error)?;
+        self.method.step(equations, t, h, motion, error)?;
         // the whole step's end takes the place of its start, and the halves begin from there
         std::mem::swap(&mut self.start, motion);
         for (keep, now) in self.carried.iter().zip(self.method.carried().iter_mut()) {
             now.copy(keep);
         }
         let half = 0.5 * h;
-        self.method.step(system, ramp, s, half, motion, error)?;
-        self.method.step(system, ramp, s + half, h - half, motion, error)?;
+        self.method.step(equations, t, half, motion, error)?;
+        self.method.step(equations, t + half, h - half, motion, error)?;
         error.copy(motion);
         error.add(-1.0, &self.start);
         error.scale(1.0 / 3.0);
         Ok(())
     }
 
-    fn carried(&mut self) -> &mut [Motion] {
+    fn carried(&mut self) -> &mut [Motion<E::Unknown>] {
         self.method.carried()
     }
 

@@ -3,8 +3,8 @@
 use super::joint_rodas4::JointRodas4;
 use super::method::{Method, Motion, StepFailure, Work};
 use super::rodas4::Rodas4;
-use crate::domains::{Ramp, System};
-use crate::equations::Joints;
+use crate::domains::System;
+use crate::equations::{Bodies, Joints};
 use std::sync::Arc;
 
 /// The method in one of the formulations; one comparison a step.
@@ -65,33 +65,32 @@ impl Formulated {
     }
 }
 
-impl Method for Formulated {
+impl Method<Bodies<'_>> for Formulated {
     fn error_order(&self) -> f64 {
         match self {
-            Self::Bodies(m) => m.error_order(),
-            Self::Joints(m) => m.error_order(),
+            Self::Bodies(m) => Method::<Bodies<'_>>::error_order(&**m),
+            Self::Joints(m) => Method::<Bodies<'_>>::error_order(&**m),
         }
     }
 
-    fn start(&mut self, system: &System, ramp: &Ramp<'_>, motion: &Motion) -> Result<(), StepFailure> {
+    fn start(&mut self, bodies: &mut Bodies<'_>, motion: &Motion) -> Result<(), StepFailure> {
         match self {
-            Self::Bodies(m) => m.start(system, ramp, motion),
-            Self::Joints(m) => m.start(system, ramp, motion),
+            Self::Bodies(m) => m.start(bodies, motion),
+            Self::Joints(m) => m.start(bodies, motion),
         }
     }
 
     fn step(
         &mut self,
-        system: &System,
-        ramp: &Ramp<'_>,
+        bodies: &mut Bodies<'_>,
         s: f64,
         h: f64,
         motion: &mut Motion,
         error: &mut Motion,
     ) -> Result<(), StepFailure> {
         match self {
-            Self::Bodies(m) => m.step(system, ramp, s, h, motion, error),
-            Self::Joints(m) => m.step(system, ramp, s, h, motion, error),
+            Self::Bodies(m) => m.step(bodies, s, h, motion, error),
+            Self::Joints(m) => m.step(bodies, s, h, motion, error),
         }
     }
 

@@ -22,8 +22,8 @@ mod tableau;
 
 use super::method::{Method, Motion, StepFailure, Work};
 use super::rodas4::tableau::{ALPHA, GAMMA, GAMMA_I, moves_on};
-use crate::domains::{Drive, Ramp, System};
-use crate::equations::Joints;
+use crate::domains::Drive;
+use crate::equations::{Bodies, Joints};
 use crate::multibody::forces;
 use crate::multibody::planar::Pose;
 use crate::multibody::relative::JointMatrix;
@@ -191,16 +191,16 @@ impl JointRodas4 {
     }
 }
 
-impl Method for JointRodas4 {
+impl Method<Bodies<'_>> for JointRodas4 {
     fn error_order(&self) -> f64 {
         4.0
     }
 
-    fn start(&mut self, _: &System, ramp: &Ramp<'_>, motion: &Motion) -> Result<(), StepFailure> {
+    fn start(&mut self, bodies: &mut Bodies<'_>, motion: &Motion) -> Result<(), StepFailure> {
         if std::mem::take(&mut self.resumed) {
             return Ok(());
         }
-        ramp.at(0.0, &mut self.drive);
+        bodies.ramp.at(0.0, &mut self.drive);
         self.drive.load = 1.0;
         let now = &mut self.carried[0];
         self.joints.tree.coordinates_at(&motion.q, &mut now.q);
@@ -225,14 +225,13 @@ impl Method for JointRodas4 {
 
     fn step(
         &mut self,
-        _: &System,
-        ramp: &Ramp<'_>,
+        bodies: &mut Bodies<'_>,
         s: f64,
         h: f64,
         motion: &mut Motion,
         error: &mut Motion,
     ) -> Result<(), StepFailure> {
-        let gh = GAMMA * h;
+        let (gh, ramp) = (GAMMA * h, bodies.ramp);
         for i in 0..6 {
             let (at, rate) = (s + ALPHA[i] * h, GAMMA_I[i] * h);
             if i == 0 {

@@ -1,62 +1,53 @@
-//! Motion in time: one step of each method, and what drives them.
-//!
-//! On bodies:
+//! Motion in time: one step of each method, and what drives them. A method is written once, over the [`equations`](crate::equations) of
+//! any formulation, unless it needs what one alone has.
 //!
 //! | file | what it holds |
 //! |---|---|
 //! | [`method`] | what every integrator is: one step, its estimated error, its work |
 //! | [`adaptive`] | drives any of them: error control, or equal steps |
+//! | `pace` | how long the next step is |
 //! | [`doubling`] | error control by step doubling for methods without an estimate |
 //! | [`interpolation`] | the motion inside a step |
 //! | [`event`] | when a quantity crosses zero during a step |
-//! | [`rodas4`] | the default: a Rosenbrock method with one factorization a step, and its sensitivities |
-//! | [`formulated`] | it in the formulation of a model |
-//! | [`radau5`] | Radau IIA of order 5: one real and one complex block factorization a step |
-//! | `implicit` | the equation that a step with one unknown displacement comes to |
-//! | [`centred`] | steps that are symmetric about their middle: [`midpoint`], and [`avf`], which keeps the energy |
-//! | [`dirk`] | diagonally implicit Runge–Kutta methods by their tableau: TR-BDF2, SDIRK4 |
-//! | [`generalized_alpha`] | generalized-α with a chosen damping of fast motions, and Newmark's rule |
-//! | [`rk45`] | Dormand–Prince on bodies: explicit |
 //!
-//! For both: [`tableau`] has the coefficients of implicit methods, and `pace` says how long the next step is.
-//!
-//! In joint coordinates, or on any flat slices:
+//! Over any equations:
 //!
 //! | file | what it holds |
 //! |---|---|
-//! | [`dormand_prince`] | an explicit Runge–Kutta pair for any formulation that tells its accelerations |
-//! | [`joint_rodas4`] | Rodas4 with loops closed by springs: one factorization a step, and its sensitivities |
-//! | [`joint_motion`] | motion in joint coordinates, loops closed after each step |
-//! | [`joint_loads`] | what acts on a system there |
-//! | [`joint_stage`] | the stages of implicit methods |
-//! | `anderson` | acceleration of an iteration that contracts slowly |
-//! | [`joint_dirk`] | implicit methods |
-//! | [`joint_adaptive`] | drives them: error control, or equal steps |
+//! | [`dirk`] | diagonally implicit Runge–Kutta methods by their [`tableau`]: TR-BDF2, SDIRK4, implicit midpoint |
+//! | [`alpha`] | generalized-α with a chosen damping of fast motions, and Newmark's rule |
+//! | [`explicit`] | Dormand–Prince |
+//! | [`dormand_prince`] | the pair itself; and its own driver, for mechanisms without a system, down to 1e-13 |
+//! | [`joint_motion`] | such mechanisms in joint coordinates, loops closed after each step |
+//!
+//! On bodies, with what their tangent gives:
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | [`rodas4`] | the default: a Rosenbrock method with one factorization a step, and its sensitivities |
+//! | [`joint_rodas4`] | the same in joint coordinates with loops closed by springs |
+//! | [`formulated`] | either, by the formulation of a model |
+//! | [`radau5`] | Radau IIA of order 5: one real and one complex block factorization a step |
+//! | [`average_field`] | average vector field, which keeps the energy |
+//! | [`gyration`] | Coriolis' force in a frame that turns |
+//! | [`side_by_side`] | runs of many variants in lanes |
 
 pub mod adaptive;
-mod anderson;
-pub mod avf;
-pub mod centred;
+pub mod alpha;
+pub mod average_field;
 pub mod dirk;
 pub mod dormand_prince;
 pub mod doubling;
 pub mod event;
+pub mod explicit;
 pub mod formulated;
-pub mod generalized_alpha;
 pub mod gyration;
-mod implicit;
 pub mod interpolation;
-pub mod joint_adaptive;
-pub mod joint_dirk;
-pub mod joint_loads;
 pub mod joint_motion;
 pub mod joint_rodas4;
-pub mod joint_stage;
 pub mod method;
-pub mod midpoint;
 mod pace;
 pub mod radau5;
-pub mod rk45;
 pub mod rodas4;
 pub mod side_by_side;
 pub mod tableau;

@@ -10,9 +10,10 @@
 //!
 //! Reference: E. Hairer, G. Wanner, "Solving Ordinary Differential Equations II" (1996), §IV.8; coefficients of its RADAU5.
 
-use super::implicit::largest;
 use super::method::{Method, Motion, StepFailure, Work};
 use crate::domains::{Drive, Ramp, System};
+use crate::equations::Bodies;
+use crate::equations::newton::largest;
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, forces};
 use nalgebra::{Complex, Matrix3, Vector3};
@@ -237,20 +238,20 @@ fn empty() -> [Motion; 3] {
     std::array::from_fn(|_| Motion::zeros(0))
 }
 
-impl Method for Radau5 {
+impl Method<Bodies<'_>> for Radau5 {
     fn error_order(&self) -> f64 {
         4.0
     }
 
     fn step(
         &mut self,
-        system: &System,
-        ramp: &Ramp<'_>,
+        bodies: &mut Bodies<'_>,
         s: f64,
         h: f64,
         motion: &mut Motion,
         error: &mut Motion,
     ) -> Result<(), StepFailure> {
+        let Bodies { system, ramp, .. } = *bodies;
         let model = &system.model;
         let n = motion.q.len();
         ramp.at(s, &mut self.drive);

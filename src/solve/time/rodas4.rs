@@ -25,10 +25,11 @@ pub(in crate::solve) mod tableau;
 
 pub use super::method::Motion;
 use super::method::{Method, StepFailure, Work};
-use crate::domains::{Drive, Ramp, System};
+use crate::domains::{Drive, System};
+use crate::equations::Bodies;
+use crate::equations::linear::{LinearSolver, Recursion};
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, forces};
-use crate::solve::linear::{LinearSolver, Recursion};
 use crate::solve::time::gyration::{Gyration, held_out, skew};
 use ports::{Ports, Turning};
 use stages::Stages;
@@ -74,20 +75,20 @@ impl<S: LinearSolver> Rodas4<S> {
     }
 }
 
-impl<S: LinearSolver> Method for Rodas4<S> {
+impl<S: LinearSolver> Method<Bodies<'_>> for Rodas4<S> {
     fn error_order(&self) -> f64 {
         4.0
     }
 
     fn step(
         &mut self,
-        system: &System,
-        ramp: &Ramp<'_>,
+        bodies: &mut Bodies<'_>,
         s: f64,
         h: f64,
         motion: &mut Motion,
         error: &mut Motion,
     ) -> Result<(), StepFailure> {
+        let Bodies { system, ramp, .. } = *bodies;
         let model = &system.model;
         let gh = GAMMA * h;
         ramp.at_and_rate(s, &mut self.drive, &mut self.rate);
@@ -161,6 +162,7 @@ impl<S: LinearSolver> Method for Rodas4<S> {
 mod tests {
     use super::*;
     use crate::compile::{CompileOptions, compile};
+    use crate::domains::Ramp;
     use crate::netlist::Bundle;
 
     /// A lumped plate that a ramp of 2 V to 4 V pulls at (k = 1 N/m, m = 1e-10 kg, A = 1e-8 m², g = 2 µm).
@@ -185,7 +187,7 @@ mod tests {
         let h = ramp.dt / steps as f64;
         for k in 0..steps {
             let s = k as f64 * h;
-            rodas.step(system, &ramp, s, h, &mut motion, &mut error).unwrap();
+            rodas.step(&mut Bodies::new(system, &ramp), s, h, &mut motion, &mut error).unwrap();
         }
         assert_eq!((rodas.work.factorizations, rodas.work.solves), (steps as u64, 12 * steps as u64));
         (motion.q[0].x, rodas.sensitivity[0].q[0].x)

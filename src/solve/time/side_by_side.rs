@@ -6,11 +6,11 @@
 //! cannot be factored until the end, steps that vanish, an observer that says stop) is left to a run alone, which finds the same
 //! and says why.
 
-use super::adaptive::{FLOOR, contact_error, dragged};
 use super::method::Motion;
 use super::pace::Pace;
 use super::rodas4::lanes::{Lane, LaneRodas4};
 use crate::domains::{Ramp, System};
+use crate::equations::bodies::{FLOOR, contact_error, dragged};
 use crate::multibody::lanes::LANES;
 
 /// The estimated error falls with this power of the step.
@@ -179,7 +179,7 @@ pub fn advance<'a>(
     }
 }
 
-/// The error of a step over what it may be, as [`super::adaptive`] has it.
+/// The error of a step over what it may be, as [`crate::equations::bodies`] has it.
 fn relative_error(method: &LaneRodas4, k: usize, system: &System, run: &Running<'_>, h: f64, contact: f64) -> f64 {
     if run.mass == 0.0 {
         return 0.0;

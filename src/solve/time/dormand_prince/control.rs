@@ -104,7 +104,11 @@ impl DormandPrince {
         let sign = (end - t).signum();
         self.forget();
         let failed = |t, h, source| IntegrationError::Accelerations { t, h, source };
-        self.begin(problem, t, q, v).map_err(|e| failed(t, *h, e))?;
+        if self.terms[0].q.len() != q.len() {
+            self.terms = std::array::from_fn(|_| Pair::zeros(q.len()));
+        }
+        self.begin(&mut |t, q: &_, v: &_, a: &mut _| problem.accelerations(t, q, v, a), t, q, v)
+            .map_err(|e| failed(t, *h, e))?;
         if *h == 0.0 {
             *h = self.first_step(problem, t, end - t, q, v, tolerances).map_err(|e| failed(t, 0.0, e))?;
         }
@@ -119,7 +123,8 @@ impl DormandPrince {
             steps += 1;
             let last = (t + 1.01 * *h - end) * sign > 0.0;
             let step = if last { end - t } else { *h };
-            let attempt = self.attempt(problem, t, step, q, v);
+            let attempt =
+                self.attempt(&mut |t, q: &_, v: &_, a: &mut _| problem.accelerations(t, q, v, a), (t, step), q, v);
             let (error, component) = match &attempt {
                 Ok(()) => tolerances.norm(&self.error, &now, &self.next),
                 Err(_) => (f64::INFINITY, 0),
@@ -165,7 +170,7 @@ impl DormandPrince {
         v: &mut [f64],
         now: &mut Pair,
     ) -> Result<(), P::Error> {
-        now.copy(&self.next.q, &self.next.v);
+        now.copy(&self.next);
         problem.project(to, &mut now.q, &mut now.v)?;
         let moved = *now != self.next;
         for c in 0..q.len() {
@@ -178,7 +183,7 @@ impl DormandPrince {
         self.advance();
         if moved {
             self.forget();
-            self.begin(problem, to, &now.q, &now.v)?;
+            self.begin(&mut |t, q: &_, v: &_, a: &mut _| problem.accelerations(t, q, v, a), to, &now.q, &now.v)?;
         }
         q.copy_from_slice(&now.q);
         v.copy_from_slice(&now.v);

@@ -1,13 +1,14 @@
 //! The explicit Runge–Kutta pair of Dormand and Prince, order 5 with an embedded order 4, for q̈ = a(t, q, q̇).
 //!
-//! It works on flat slices and knows nothing of bodies, so that every formulation that can tell its accelerations can use
-//! it: see [`SecondOrder`]. With y = (q, q̇) a step is
+//! A step knows nothing of bodies or joints: whoever can tell accelerations can have it. [`super::explicit`] makes it one of the methods
+//! that the common driver takes; mechanisms without a system, which want tolerances down to 1e-13, are driven by
+//! [`DormandPrince::integrate`] ([`SecondOrder`]). With y = (q, q̇) a step is
 //! ```text
 //! y_i = y + h·Σ_{j<i} a_ij·k_j      k_i = (q̇_i, a(t + c_i·h, q_i, q̇_i))        i = 1 … 7
 //! y'  = y_7                         error = h·Σ e_i·k_i
 //! ```
-//! and the seventh stage of one step is the first of the next. The step is controlled by a PI rule, each step has a
-//! continuous extension of order 4, and sums are compensated (Kahan), so that tolerances down to 1e-13 are met.
+//! and the seventh stage of one step is the first of the next. Sums are compensated (Kahan), so that tolerances down to 1e-13 are met;
+//! `integrate` controls steps by a PI rule and gives each a continuous extension of order 4.
 //!
 //! Reference: J. R. Dormand, P. J. Prince, J. Comput. Appl. Math. 6 (1980); coefficients, continuous extension and step
 //! control as in DOPRI5, E. Hairer, S. P. Nørsett, G. Wanner, "Solving Ordinary Differential Equations I" (1993), §II.4–6.
@@ -16,6 +17,7 @@ mod control;
 #[cfg(test)]
 mod tests;
 
+use crate::equations::{Motion, Unknown};
 pub use control::{IntegrationError, Tolerances};
 
 /// Equations of motion solved for the accelerations.
@@ -80,25 +82,7 @@ pub struct Effort {
 }
 
 /// Coordinates and rates, or changes of them.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Pair {
-    /// Coordinates.
-    pub q: Vec<f64>,
-    /// Rates.
-    pub v: Vec<f64>,
-}
-
-impl Pair {
-    /// All zero.
-    pub fn zeros(n: usize) -> Self {
-        Self { q: vec![0.0; n], v: vec![0.0; n] }
-    }
-
-    pub(super) fn copy(&mut self, q: &[f64], v: &[f64]) {
-        self.q.copy_from_slice(q);
-        self.v.copy_from_slice(v);
-    }
-}
+pub type Pair = Motion<f64>;
 
 /// The continuous extension of one accepted step.
 #[derive(Debug, Clone, Copy)]
@@ -124,74 +108,80 @@ impl Dense<'_> {
     }
 }
 
-/// The method with its storage, for one dimension. Nothing is allocated after [`DormandPrince::new`].
+/// The method with its storage, for some number of unknowns.
 #[derive(Debug, Clone)]
-pub struct DormandPrince {
+pub struct DormandPrince<X = f64> {
     /// Slopes of the stages; after [`DormandPrince::attempt`] the last is the first of the next step.
-    slopes: [Pair; 7],
-    at: Pair,
-    carry: Pair,
-    terms: [Pair; 5],
+    slopes: [Motion<X>; 7],
+    at: Motion<X>,
+    carry: Motion<X>,
+    /// Coefficients of the continuous extension, where it is made.
+    terms: [Motion<X>; 5],
     /// End of the step last attempted.
-    pub next: Pair,
+    pub next: Motion<X>,
     /// Its estimated error.
-    pub error: Pair,
+    pub error: Motion<X>,
     /// Work so far.
     pub effort: Effort,
 }
 
-impl DormandPrince {
-    /// Storage for `n` coordinates and as many rates.
+impl<X: Unknown> DormandPrince<X> {
+    /// Storage for `n` unknowns and as many rates.
     pub fn new(n: usize) -> Self {
         Self {
-            slopes: std::array::from_fn(|_| Pair::zeros(n)),
-            at: Pair::zeros(n),
-            carry: Pair::zeros(n),
-            terms: std::array::from_fn(|_| Pair::zeros(n)),
-            next: Pair::zeros(n),
-            error: Pair::zeros(n),
+            slopes: std::array::from_fn(|_| Motion::zeros(n)),
+            at: Motion::zeros(n),
+            carry: Motion::zeros(n),
+            terms: std::array::from_fn(|_| Motion::zeros(0)),
+            next: Motion::zeros(n),
+            error: Motion::zeros(n),
             effort: Effort::default(),
         }
     }
 
-    /// Evaluates the first stage at a new starting point.
+    /// Evaluates the first stage at a new starting point: `accelerate(t, q, v, a)` fills in `a`.
     ///
     /// # Errors
-    /// The formulation's own.
-    pub fn begin<P: SecondOrder>(&mut self, problem: &mut P, t: f64, q: &[f64], v: &[f64]) -> Result<(), P::Error> {
+    /// Those of `accelerate`.
+    pub(super) fn begin<F>(
+        &mut self,
+        accelerate: &mut impl FnMut(f64, &[X], &[X], &mut [X]) -> Result<(), F>,
+        t: f64,
+        q: &[X],
+        v: &[X],
+    ) -> Result<(), F> {
         self.slopes[0].q.copy_from_slice(v);
         self.effort.accelerations += 1;
-        problem.accelerations(t, q, v, &mut self.slopes[0].v)
+        accelerate(t, q, v, &mut self.slopes[0].v)
     }
 
     /// One step of length `h` from a point whose first stage is known ([`DormandPrince::begin`] or
     /// [`DormandPrince::advance`]): its end goes to `next`, its estimated error to `error`. `(q, v)` stays.
     ///
     /// # Errors
-    /// The formulation's own.
-    pub fn attempt<P: SecondOrder>(
+    /// Those of `accelerate`.
+    pub(super) fn attempt<F>(
         &mut self,
-        problem: &mut P,
-        t: f64,
-        h: f64,
-        q: &[f64],
-        v: &[f64],
-    ) -> Result<(), P::Error> {
+        accelerate: &mut impl FnMut(f64, &[X], &[X], &mut [X]) -> Result<(), F>,
+        (t, h): (f64, f64),
+        q: &[X],
+        v: &[X],
+    ) -> Result<(), F> {
         let n = q.len();
         for i in 1..7 {
             for c in 0..n {
-                let (mut dq, mut dv) = (0.0, 0.0);
+                let (mut dq, mut dv) = (X::ZERO, X::ZERO);
                 for (slope, a) in self.slopes[..i].iter().zip(A[i]) {
-                    dq += a * slope.q[c];
-                    dv += a * slope.v[c];
+                    dq += slope.q[c] * a;
+                    dv += slope.v[c] * a;
                 }
                 let at = &mut self.at;
                 if i < 6 {
-                    (at.q[c], at.v[c]) = (q[c] + h * dq, v[c] + h * dv);
+                    (at.q[c], at.v[c]) = (q[c] + dq * h, v[c] + dv * h);
                 } else {
                     // with the last stage goes what rounding has cut off the earlier steps; what it cuts off now waits in
                     // `at` until the step is accepted
-                    let (dq, dv) = (h * dq + self.carry.q[c], h * dv + self.carry.v[c]);
+                    let (dq, dv) = (dq * h + self.carry.q[c], dv * h + self.carry.v[c]);
                     (self.next.q[c], self.next.v[c]) = (q[c] + dq, v[c] + dv);
                     (at.q[c], at.v[c]) = (dq - (self.next.q[c] - q[c]), dv - (self.next.v[c] - v[c]));
                 }
@@ -199,16 +189,16 @@ impl DormandPrince {
             let at = if i == 6 { &self.next } else { &self.at };
             self.slopes[i].q.copy_from_slice(&at.v);
             self.effort.accelerations += 1;
-            problem.accelerations(t + C[i] * h, &at.q, &at.v, &mut self.slopes[i].v)?;
+            accelerate(t + C[i] * h, &at.q, &at.v, &mut self.slopes[i].v)?;
         }
         for c in 0..n {
-            let (mut eq, mut ev) = (0.0, 0.0);
+            let (mut eq, mut ev) = (X::ZERO, X::ZERO);
             for (slope, e) in self.slopes.iter().zip(E) {
-                eq += e * slope.q[c];
-                ev += e * slope.v[c];
+                eq += slope.q[c] * e;
+                ev += slope.v[c] * e;
             }
-            self.error.q[c] = h * eq;
-            self.error.v[c] = h * ev;
+            self.error.q[c] = eq * h;
+            self.error.v[c] = ev * h;
         }
         Ok(())
     }
@@ -221,8 +211,7 @@ impl DormandPrince {
 
     /// Forgets what rounding has cut off: the next step starts from another point.
     pub fn forget(&mut self) {
-        self.carry.q.fill(0.0);
-        self.carry.v.fill(0.0);
+        self.carry.clear();
     }
 }
 

@@ -78,8 +78,9 @@ fn order_five() {
     let (q, v) = start();
     let one = |h: f64| {
         let mut method = DormandPrince::new(2);
-        method.begin(&mut free(), 0.0, &q, &v).unwrap();
-        method.attempt(&mut free(), 0.0, h, &q, &v).unwrap();
+        let mut accelerate = |t: f64, q: &[f64], v: &[f64], a: &mut [f64]| free().accelerations(t, q, v, a);
+        method.begin(&mut accelerate, 0.0, &q, &v).unwrap();
+        method.attempt(&mut accelerate, (0.0, h), &q, &v).unwrap();
         let e = exact(h);
         ((method.next.q[0] - e[0]).hypot(method.next.q[1] - e[1]), method.error.q[0].hypot(method.error.q[1]))
     };

@@ -3,9 +3,9 @@
 use super::stages::Stages;
 use super::tableau::GAMMA;
 use crate::domains::{Drive, Ramp, System};
+use crate::equations::linear::LinearSolver;
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, Model, Pattern};
-use crate::solve::linear::LinearSolver;
 use crate::solve::method::Motion;
 use crate::solve::time::gyration::{Gyration, held_out, skew};
 

@@ -1,4 +1,4 @@
-//! What acts on a system's bodies and joints, for [`super::joint_motion::JointMotion`].
+//! What acts on the bodies and joints of a mechanism in joint coordinates; and that of a system while its sources go along a ramp.
 //!
 //! Gaps, contacts and dead loads give each body its wrench, −(∂Π/∂q − load); gas and dampers −C·q̇; springs act along the
 //! joint coordinates. Heat and residual stress shift the rest length of an elastic axial direction, and prescribe a locked
@@ -9,7 +9,23 @@ use crate::domains::{Drive, Ramp, System};
 use crate::multibody::forces;
 use crate::multibody::planar::Pose;
 use crate::multibody::rcr::{AddedInertia, Closure, Linkage, Reduction};
-use crate::solve::joint_stage::Loads;
+
+/// What acts on a mechanism in joint coordinates.
+pub trait Loads {
+    /// Sets what time alone prescribes, such as the offsets of heated joints that are locked, at `t` [s]. Before placing.
+    fn prescribe(&mut self, t: f64, reduction: &mut Reduction<f64>) {
+        let _ = (t, reduction);
+    }
+
+    /// Adds what acts at time `t` [s] to the force and torque of `reduction`, whose bodies are placed at `q` and `v`.
+    fn add(&mut self, t: f64, q: &[f64], v: &[f64], reduction: &mut Reduction<f64>);
+
+    /// Adds β·K + γ·C of what acts where [`Loads::add`] was last called; `factors` are β [s²] and γ [s]. What is left out
+    /// costs iterations, not accuracy.
+    fn stiffen(&mut self, reduction: &Reduction<f64>, factors: (f64, f64), added: &mut AddedInertia) {
+        let _ = (reduction, factors, added);
+    }
+}
 
 /// Loads of a system while its sources go along a ramp, with storage for them.
 #[derive(Debug, Clone)]
