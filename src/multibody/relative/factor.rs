@@ -35,8 +35,10 @@ pub struct JointMatrix<T: Scalar> {
     pub bodies: BlockMatrix<T, 3>,
     /// H⁻¹ of each body.
     inverse: Vec<Matrix3<T>>,
-    /// C_r of each block of the pattern, rows of the later body.
+    /// C_r·H⁻¹ of each block of the pattern, rows of the later body.
     coupling: Vec<Matrix3<T>>,
+    /// C_r of the column at hand.
+    column: Vec<Matrix3<T>>,
     /// For each block of a column, the block that takes over its motion with the column's parent; [`OWN`] where the row is
     /// the parent itself.
     heir: Vec<u32>,
@@ -55,6 +57,7 @@ impl<T: Scalar> JointMatrix<T> {
             bodies: BlockMatrix::new(pattern),
             inverse: vec![Matrix3::zeros(); count],
             coupling: vec![Matrix3::zeros(); pattern.off_blocks()],
+            column: Vec::with_capacity((0..count).map(|j| pattern.column(j).len()).max().unwrap_or(0)),
             heir: heirs(tree),
             maps: vec![Map::REST; count],
         }
@@ -101,6 +104,7 @@ impl<T: Scalar> JointMatrix<T> {
                 self.hand_over(pattern, j, p, &block, map, extra);
             }
             let mut target = pattern.targets(j).iter();
+            self.column.clear();
             for (k, &row) in column.clone().zip(pattern.rows(j)) {
                 let row = row as usize;
                 let below = self.bodies.below[k];
@@ -118,12 +122,12 @@ impl<T: Scalar> JointMatrix<T> {
                 }
                 clear_locked(link, &mut c);
                 let scaled = c * inverse;
-                for (i, &at) in (column.start..k).zip(target.by_ref()) {
-                    let other = self.coupling[i];
+                for (other, &at) in self.column.iter().zip(target.by_ref()) {
                     self.bodies.below[at as usize] -= scaled * other.transpose();
                 }
                 self.bodies.diagonal[row] -= scaled * c.transpose();
-                self.coupling[k] = c;
+                self.coupling[k] = scaled;
+                self.column.push(c);
             }
         }
         Ok(inertia)
@@ -208,19 +212,17 @@ impl<T: Scalar> JointMatrix<T> {
                 to.y += f.y;
                 to.z += f.z + T::from_real(map.lever[0]) * f.x + T::from_real(map.lever[1]) * f.y;
             }
-            let s = self.inverse[j] * right_side;
             for (k, &row) in pattern.column(j).zip(pattern.rows(j)) {
-                wrench[row as usize] -= self.coupling[k] * s;
+                wrench[row as usize] -= self.coupling[k] * right_side;
             }
-            x[j] = s;
+            x[j] = self.inverse[j] * right_side;
         }
         for (j, link) in tree.links.iter().enumerate().rev() {
             let map = &self.maps[j];
-            let mut pull = Vector3::zeros();
+            let mut s = x[j];
             for (k, &row) in pattern.column(j).zip(pattern.rows(j)) {
-                pull += self.coupling[k].tr_mul(&wrench[row as usize]);
+                s -= self.coupling[k].tr_mul(&wrench[row as usize]);
             }
-            let s = x[j] - self.inverse[j] * pull;
             x[j] = s;
             wrench[j] = match link.parent {
                 Parent::Free => s,
