@@ -35,6 +35,19 @@ fn found_beside_the_including_file() {
     assert_eq!(parameters, ["d Number(2.0)", "a Number(1.0)", "r Number(1.0)"]);
 }
 
+/// A file's name in quotes may hold blanks and letters of any script.
+#[test]
+fn names_in_quotes() {
+    let folder = folder(&[
+        ("root.net", "uses \"ü dir/mein netz é.net\" % and a comment\nuses 'b c.net'\nparam r=a"),
+        ("ü dir/mein netz é.net", "a=3"),
+        ("b c.net", "param d=2"),
+    ]);
+    let bundle = Bundle::read(&folder.path().join("root.net"), &[]).expect("readable");
+    let parameters: Vec<String> = parameters(&bundle).into_iter().map(|(n, v)| format!("{n} {v:?}")).collect();
+    assert_eq!(parameters, ["d Number(2.0)", "r Number(3.0)"]);
+}
+
 /// Of two files of one spelled name the first that the text meets counts, also when that is inside another file.
 #[test]
 fn first_met_counts() {

@@ -92,7 +92,10 @@ pub fn trace(
 ) -> Result<ContinuationResult, AnalysisError> {
     let bad = |what: &str, detail: String| AnalysisError::BadRequest { what: what.to_owned(), detail };
     if !(request.from.is_finite() && request.to.is_finite() && request.from != request.to) {
-        return Err(bad("continue", format!("from {} to {} is no way", request.from, request.to)));
+        return Err(bad(
+            "along",
+            format!("what grows has to go from one value to another, not from {} to {}", request.from, request.to),
+        ));
     }
     let signals: Vec<Signal> =
         request.signals.iter().map(|name| Signal::find(compiled, name)).collect::<Result<_, _>>()?;
@@ -111,7 +114,7 @@ pub fn trace(
     let system = &compiled.parts.system;
     let sources = [source_vector(compiled, &volts[0])?, source_vector(last, &volts[1])?];
     let mut family =
-        Blend::new(system, &sources[0], &last.parts.system, &sources[1]).map_err(|e| bad("continue", e.to_string()))?;
+        Blend::new(system, &sources[0], &last.parts.system, &sources[1]).map_err(|e| bad("along", e.to_string()))?;
     let start = if matches!(request.growing, Growing::Loads) {
         family.scale_loads([request.from, request.to]);
         let mut first = compiled.clone();

@@ -2,18 +2,20 @@
 //!
 //! Control of each step bounds what a step adds, not what becomes of it: phases add up, and parts that swing far exchange
 //! energy. So the run has a companion at ten times the tolerance (or in steps of twice the length), and the difference of the two
-//! is measured as charts measure errors ([`relative_error_above`]). Were the error proportional to the tolerance, a ninth of the difference would be the
+//! is measured signal by signal ([`largest_error`]). Were the error proportional to the tolerance, a ninth of the difference would be the
 //! error of the finer run; found are ratios of the two errors from 1 (the single bimorph let go from 7 µm) to 12, so half of it is told, and of
 //! methods of second order, whose ratios are about two, all of it.
 //!
 //! A companion has a third to a half of the steps. One that would take long is given up after 3e6 unknowns times steps, and its difference
 //! is continued in proportion to time, as phases go.
 
-use super::chart::error::relative_error_above;
+use super::chart::error::{half_range, largest_error};
 use super::integrator::Integrator;
+use super::transient::options::STEP_SHARE;
 use super::transient::{TransientOptions, TransientResult, transient};
 use super::{AnalysisError, Watch};
 use crate::compile::Compiled;
+use crate::equations::bodies::FLOOR;
 
 /// How much looser a companion is.
 const LOOSER: f64 = 10.0;
@@ -31,6 +33,10 @@ const MOST_WORK: f64 = 3e6;
 const FEWEST: usize = 16;
 /// Output times that are compared, at most about twice as many: evenly spaced ones of a run that has more.
 const ENOUGH: usize = 1000;
+/// Times what the floor of a step's error is that a motion has to swing for a companion to tell anything.
+const RESOLVED: f64 = 10.0;
+/// Share of the scene below which a swing is rounding, whatever swings beside it [1].
+const ROUNDING: f64 = 1e-12;
 /// What swings by less than this share of the scene is rounding: a symmetric part moves so across its axis [1].
 const STILL: f64 = 1e-9;
 
@@ -63,18 +69,28 @@ pub fn with_step_error<T>(
     let (mut result, more) = run(options, &mut both, watch)?;
     // one that took the same steps proves nothing
     let other = |c: &TransientResult| c.counters.steps != result.counters.steps;
-    let Some(companion) = companion.filter(|c| (whole || reached >= FEWEST) && other(c)) else {
+    // what both do not resolve they have in common
+    let resolved = options.step.is_some() || resolved(&picked, &result, options, model);
+    let Some(companion) = companion.filter(|c| (whole || reached >= FEWEST) && other(c) && resolved) else {
         result.warnings.extend((!options.signals.is_empty()).then(|| unknown(options)));
         return Ok((result, more));
     };
     let signals = picked.signals(&result.signals);
     let found = TransientResult { signals, ..companion.clone() };
-    let apart = relative_error_above(&found, &companion, &|unit| least(unit, options, model));
+    let apart = largest_error(&found, &companion, &|unit| least(unit, options, model));
     let share = ((reached - 1) * stride(options)) as f64 / (options.points - 1) as f64;
     let error = told_of(options) * apart / share.min(1.0);
     result.step_error = Some(error);
     result.warnings.extend(beyond(options, error, "by the end of the run"));
     Ok((result, more))
+}
+
+/// Whether the displacements of a run swing by more than what the floor of a step's error hides, in the run as in its companion; or by rounding.
+fn resolved(picked: &Picked, result: &TransientResult, options: &TransientOptions<'_>, model: &Compiled) -> bool {
+    let length = model.parts.system.length_scale;
+    let lengths = result.signals.iter().zip(&picked.columns).filter(|((_, unit, _), _)| unit == "m");
+    let most = lengths.map(|(_, column)| half_range(column)).fold(0.0, f64::max);
+    most < ROUNDING * length || most > RESOLVED * STEP_SHARE * options.tol * FLOOR * length
 }
 
 /// The tolerance of a companion.

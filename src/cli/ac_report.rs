@@ -102,6 +102,8 @@ fn degrees([re, im]: [f64; 2]) -> String {
     format!("{:.1}°", phase + 0.0)
 }
 
+/// By how much more the nearer of two frequencies has to show for a resonance to be seen.
+const SEEN: f64 = 1.01;
 /// Share of its width within which a resonance is seen by the frequency on the grid next to it.
 const ON_TOP: f64 = 0.1;
 
@@ -113,6 +115,20 @@ fn on_top(result: &HarmonicResult, signal: usize, hertz: f64, width: f64) -> Opt
     let near = [after.saturating_sub(1), after.min(grid.len() - 1)];
     let k = if hertz - grid[near[0]] <= grid[near[1]] - hertz { near[0] } else { near[1] };
     ((grid[k] - hertz).abs() <= ON_TOP * width).then(|| result.signals[signal].values[k])
+}
+
+/// Whether what a signal shows grows towards an undamped resonance at `hertz`: told by the two frequencies of the grid next to it on one side, the
+/// nearer of which would show several times as much. What does not see a mode, behind an anchor or at its node, shows the same at both.
+fn grows(result: &HarmonicResult, signal: usize, hertz: f64) -> bool {
+    let (grid, values) = (&result.frequencies_hz, &result.signals[signal].values);
+    let finite = |k: &usize| size(values[*k]).is_finite() && grid[*k] != hertz;
+    let after = grid.partition_point(|f| *f < hertz);
+    let sides: [Vec<usize>; 2] =
+        [(0..after).rev().filter(finite).take(2).collect(), (after..grid.len()).filter(finite).take(2).collect()];
+    sides.iter().any(|side| match side[..] {
+        [near, far] => size(values[near]) > SEEN * size(values[far]),
+        _ => true,
+    })
 }
 
 /// The table of resonances, and what damps without ringing.
@@ -132,6 +148,7 @@ fn resonances(result: &HarmonicResult, poles: &[Root]) -> String {
                 let (height, phase) = match (pole.quality(), on_top(result, 0, own, pole.width_hz())) {
                     (Some(_), Some(v)) if size(v).is_finite() => (quotient(size(v), &first.unit), degrees(v)),
                     (Some(_), None) => ("–".into(), "–".into()),
+                    (None, _) if !grows(result, 0, own) => ("not seen".into(), "–".into()),
                     _ => ("no bound".into(), "–".into()),
                 };
                 vec![quantity(pole.frequency_hz(), "Hz"), q, quantity(pole.width_hz(), "Hz"), height, phase]

@@ -73,7 +73,13 @@ fn way(text: &str) -> Result<Way, String> {
     let (name, range) = text.split_once('=').ok_or_else(wrong)?;
     let (from, to) = range.split_once(':').ok_or_else(wrong)?;
     let way = Way { name: name.trim().to_owned(), from: value::number(from)?, to: value::number(to)? };
-    if way.name.is_empty() || way.from == way.to { Err(wrong()) } else { Ok(way) }
+    match way {
+        Way { name, .. } if name.is_empty() => Err(wrong()),
+        Way { name, from, to } if from == to => {
+            Err(format!("{name} goes nowhere from {from} to {to}: FROM and TO have to differ"))
+        }
+        way => Ok(way),
+    }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

@@ -31,7 +31,9 @@ pub(crate) fn uses_of(text: &str) -> Vec<String> {
 
 /// The file named by the text of a [`Kind::Uses`] token; empty when the line names none.
 pub(crate) fn used_name(text: &str) -> &str {
-    text.strip_prefix("uses").unwrap_or("").trim()
+    let name = text.strip_prefix("uses").unwrap_or("").trim();
+    let quoted = |quote: char| name.strip_prefix(quote)?.strip_suffix(quote);
+    quoted('"').or_else(|| quoted('\'')).unwrap_or(name)
 }
 
 /// Power of ten of a suffix letter.
@@ -144,7 +146,15 @@ impl Lexer<'_> {
             "call" => Kind::Call,
             "uses" => {
                 self.skip(|b| b.is_ascii_whitespace());
-                self.skip(|b| !b.is_ascii_whitespace());
+                match self.peek(0) {
+                    // a name in quotes may hold blanks
+                    quote @ (b'"' | b'\'') => {
+                        self.at += 1;
+                        self.skip(|b| b != quote && b != b'\n');
+                        self.at += usize::from(self.peek(0) == quote);
+                    }
+                    _ => self.skip(|b| !b.is_ascii_whitespace()),
+                }
                 Kind::Uses
             }
             _ => Kind::Identifier,

@@ -228,3 +228,16 @@ fn frequency_responses_that_are_refused() {
         assert!(!bench.path("r.csv").exists());
     }
 }
+
+/// A resonance that a signal does not see has no height there, and is not said to have no bound: of two cantilevers on one anchor the tip of one
+/// answers to a force on the other nowhere, and to one on itself without bound where nothing damps it.
+#[test]
+fn resonances_behind_an_anchor_are_not_seen() {
+    let text = "process p = [Youngsmodulus=165e9 density=2300 h=2u]\nanchor p [a] []\nbig beam2d p [a b] [l=200u w=2u]\n\
+                small beam2d p [a d] [l=100u w=2u oz=pi]\n";
+    let bench = Bench::new(&[("two.net", text)]);
+    let told = bench.run("ac two.net --drive d.fy --signals d.y --from 1k --to 400k --junctions centreline").stdout;
+    let rows: Vec<&str> = told.lines().filter(|line| line.contains("undamped")).collect();
+    assert_eq!(rows.len(), 2, "{told}");
+    assert!(rows[0].contains("not seen") && rows[1].contains("no bound"), "{told}");
+}

@@ -23,6 +23,7 @@ mod relative_motion;
 mod responses;
 mod scenes;
 mod schemes;
+mod small_parts;
 mod swung;
 mod told;
 mod vm236;

@@ -2,7 +2,8 @@
 //!
 //! A run starts away from the equilibrium that it goes to by d = K⁻¹·r, r the forces out of balance at its start: those of the load that
 //! was let go, or of a step of the voltages.
-//! The part of d along mode i swings with the amplitude A_i (of the largest displacement), and the error δ_i of its frequency
+//! The part of d along mode i swings with the amplitude A_i (of the largest displacement, or of what a signal that is asked for swings, where that
+//! is more), and the error δ_i of its frequency
 //! turns its phase by ω_i·δ_i·T by the end of the run, or within the time 2/γ in which it dies out with the damping γ = xᵀCx:
 //! ```text
 //! rms error of the run over its amplitude ≈ A_i·δ_i·ω_i·min(T, 2/γ)/√3
@@ -17,6 +18,7 @@ use super::super::transient::TransientOptions;
 use super::super::{AnalysisError, PortVoltages};
 use super::equilibrium;
 use super::meshed::{chosen, meshed};
+use super::seen::Seen;
 use super::warnings::{of_rotary, of_steps};
 use crate::compile::Compiled;
 use crate::discretize::DiscretizeError;
@@ -245,24 +247,34 @@ fn excited(
     let slow = shortest_heat(&model, &from, &to);
     // the way that slow heat takes it within the run
     let size = if slow > 0.0 { size * -(-options.stop / slow).exp_m1() } else { size };
-    let modes = (found.shapes.iter().zip(&found.lambda))
+    let seen = Seen::new(&model, options, &to);
+    // what each signal sees of the way, of every mode on it, and of what is in none of them
+    let mut swings = vec![seen.of(&way, 0.0)];
+    let lags = |omega: f64| (1.0 + (omega * slow).powi(2)).sqrt();
+    let mut modes: Vec<Excited> = (found.shapes.iter().zip(&found.lambda))
         .map(|(x, lambda)| {
             let omega = lambda.max(0.0).sqrt();
             let share = system.model.mass_product(x, &way);
             for (way, x) in way.iter_mut().zip(x) {
                 *way -= x * share;
             }
-            let swung = (share.abs() * reach(&model, x) / size / (1.0 + (omega * slow).powi(2)).sqrt()).min(1.0);
+            swings.push(seen.of(x, omega).iter().map(|swing| swing * share.abs() / lags(omega)).collect());
             Excited {
                 frequency: omega / TAU,
-                amplitude: swung,
+                amplitude: (share.abs() * reach(&model, x) / size / lags(omega)).min(1.0),
                 decay: damping(&system.model, x),
                 rotary: rotary_left_out::too_high(&model, x),
             }
         })
         .collect();
     let last = found.lambda.last().map_or(0.0, |l| l.max(0.0).sqrt());
-    Ok((modes, reach(&model, &way) / size / (1.0 + (last * slow).powi(2)).sqrt()))
+    let sizes = seen.sizes(&swings, options);
+    let largest = |swing: &[f64]| swing.iter().zip(&sizes).map(|(swing, size)| swing / size).fold(0.0, f64::max);
+    for (mode, swing) in modes.iter_mut().zip(&swings[1..]) {
+        mode.amplitude = mode.amplitude.max(largest(swing)).min(1.0);
+    }
+    let rest: Vec<f64> = seen.of(&way, last).iter().map(|swing| swing / lags(last)).collect();
+    Ok((modes, (reach(&model, &way) / size / lags(last)).max(largest(&rest))))
 }
 
 /// K⁻¹·r with the forces r that are out of balance where the run starts, under the drive that it goes on with; none for a part that

@@ -23,6 +23,7 @@ mod in_band;
 mod meshed;
 mod path;
 mod pull_in;
+pub(crate) mod seen;
 mod swung;
 mod unasked;
 mod warnings;
@@ -30,6 +31,7 @@ mod yielded;
 
 use super::gap_pieces::OF_DEFLECTION;
 use super::linear_stress::left_out;
+use super::signal::Signal;
 use super::statics::{OperatingPoint, operating_point};
 use super::transient::TransientOptions;
 use super::{AnalysisError, PortVoltages};
@@ -105,6 +107,10 @@ pub fn fitted_in_time(
     moving: &Compiled,
     options: &TransientOptions<'_>,
 ) -> Result<(Compiled, Option<Compiled>), AnalysisError> {
+    // a name that is none is told before a mesh is sought; points along beams depend on the mesh
+    for name in options.signals.iter().filter(|name| !name.contains('[')) {
+        Signal::find(moving, name)?;
+    }
     let order = order_in_time(moving, options)?;
     let start = options.release.map(|start| on(start, order.clone())).transpose()?;
     let mut moving = on(moving, order)?;

@@ -3,13 +3,13 @@
 //!
 //! A beam that a step of load throws to twice its rest is stiffer there than anywhere it rests, and one that heat carries through buckling is
 //! softer. So such a run is made on its mesh and on one of half the segments (where they are no even numbers, on one of twice as many), at ten
-//! times the tolerance of the steps, and the difference of the two is measured as charts measure errors ([`relative_error_above`]). By
+//! times the tolerance of the steps, and the difference of the two is measured signal by signal ([`largest_error`]). By
 //! Richardson's rule it is the error of the finer one where the order of convergence is 1, as it is taken to be until it is measured, and three
 //! times that where it is 2. Where it is beyond the tolerance segments are doubled, until the tolerance holds. A coarser mesh on the way that should hold it as well is run and
 //! compared; if it does, it is taken. What is told of a mesh is always of one that was run.
 
 use super::super::AnalysisError;
-use super::super::chart::error::relative_error_above;
+use super::super::chart::error::largest_error;
 use super::super::integrator::Integrator;
 use super::super::signal::Signal;
 use super::super::statics::{OperatingPoint, operating_point};
@@ -183,7 +183,7 @@ fn apart(moving: &Compiled, options: &TransientOptions<'_>, coarse: &[Vec<f64>],
         Some(TransientResult { signals, ..TransientResult::default() })
     };
     let (coarse, fine) = (named(coarse)?, named(fine)?);
-    let error = relative_error_above(&fine, &coarse, &|unit| step_error::least(unit, options, moving));
+    let error = largest_error(&fine, &coarse, &|unit| step_error::least(unit, options, moving));
     let share = (both - 1) as f64 / (points(options) - 1) as f64;
     Some(error / share.min(1.0))
 }

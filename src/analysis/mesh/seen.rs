@@ -1,0 +1,63 @@
+//! What the signals of a run see of small motions about a state.
+//!
+//! A part that hardly moves beside another is all that a signal on it shows. So each signal is measured by its own swing, or by
+//! [`SHARE`] of the largest of its unit where that is more: what swings less than that beside another is a small part of a picture.
+
+use super::super::signal::{Signal, View};
+use super::super::statics::OperatingPoint;
+use super::super::step_error;
+use super::super::transient::TransientOptions;
+use crate::compile::Compiled;
+use crate::multibody::planar::Pose;
+
+/// Share of the largest swing of a unit by which a signal that swings less is measured.
+pub(crate) const SHARE: f64 = 1.0 / 30.0;
+
+/// The signals of a run about a state.
+pub(super) struct Seen<'a> {
+    model: &'a Compiled,
+    about: &'a OperatingPoint,
+    signals: Vec<Signal>,
+    still: Vec<Pose>,
+    rise: Vec<f64>,
+    volts: Vec<f64>,
+}
+
+impl<'a> Seen<'a> {
+    /// Of the signals that `options` ask for; what a coarse mesh does not have, a point far along a beam, is left out.
+    pub(super) fn new(model: &'a Compiled, options: &TransientOptions<'_>, about: &'a OperatingPoint) -> Self {
+        Self {
+            model,
+            about,
+            signals: options.signals.iter().filter_map(|name| Signal::find(model, name).ok()).collect(),
+            still: vec![Pose::zeros(); about.q.len()],
+            rise: vec![0.0; about.rise.len()],
+            volts: vec![0.0; about.volts.len()],
+        }
+    }
+
+    /// How far each signal swings with a motion of this shape at `omega` [rad/s].
+    pub(super) fn of(&self, shape: &[Pose], omega: f64) -> Vec<f64> {
+        let state = View { q: &self.about.q, v: &self.still, rise: &self.about.rise, volts: &self.about.volts };
+        let moved = |q, v| View { q, v, rise: &self.rise, volts: &self.volts };
+        let swing = |signal: &Signal| {
+            let place = signal.slope(self.model, &state, &moved(shape, &self.still));
+            let rate = signal.slope(self.model, &state, &moved(&self.still, shape));
+            place.hypot(omega * rate)
+        };
+        self.signals.iter().map(swing).collect()
+    }
+
+    /// By how much each signal is measured: `swings` has what it swings with each part of a motion.
+    pub(super) fn sizes(&self, swings: &[Vec<f64>], options: &TransientOptions<'_>) -> Vec<f64> {
+        let most: Vec<f64> =
+            (0..self.signals.len()).map(|s| swings.iter().map(|of| of[s]).fold(0.0, f64::max)).collect();
+        let size = |(signal, own): (&Signal, &f64)| {
+            let unit = signal.unit();
+            let beside = self.signals.iter().zip(&most).filter(|(other, _)| other.unit() == unit);
+            let largest = beside.map(|(_, own)| *own).fold(0.0, f64::max);
+            own.max(SHARE * largest).max(step_error::least(unit, options, self.model)).max(f64::MIN_POSITIVE)
+        };
+        self.signals.iter().zip(&most).map(size).collect()
+    }
+}
