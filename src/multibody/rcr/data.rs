@@ -1,9 +1,8 @@
 //! What changes while a mechanism moves: loads, poses, what gathers on the way in, accelerations. Laid out once.
 
 use super::fast;
-use super::kinematics::{Placement, lane};
-use super::mechanism::Mechanism;
-use super::placed::Placed;
+use super::mechanism::{Mechanism, lane};
+use super::placed::{Placed, Placement};
 use super::reduction::{Given, Task, Workspace};
 use super::scalar::Real;
 use super::schedule::Plan;

@@ -14,7 +14,7 @@
 //! Reference: R. Featherstone, "Rigid Body Dynamics Algorithms" (2008), chapter 7, for the articulated inertia; the choice
 //! of the pin as its point of reference is ours.
 
-use super::kinematics::Inertia;
+use super::mechanism::Inertia;
 use super::placed::Hanging;
 use super::reduction::{Given, Node, Workspace};
 use super::scalar::Real;

@@ -11,9 +11,9 @@
 //! multi-rigid-body dynamic systems", Multibody System Dynamics 9 (2003) 185–212.
 
 use super::data::Offsets;
-use super::kinematics::Placement;
 use super::mechanism::Mechanism;
 use super::pin::Handed;
+use super::placed::Placement;
 use super::scalar::Real;
 use super::schedule::{Kind, Turn};
 use super::stages::Added;

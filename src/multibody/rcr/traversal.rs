@@ -1,8 +1,7 @@
 //! How the bodies of a mechanism are gone through: one after the other, or, where a number has a faster way, by that.
 
 use super::data::{Offsets, Reduction};
-use super::kinematics::Placement;
-use super::placed::Placed;
+use super::placed::{Placed, Placement};
 use super::reduction::Task;
 use super::scalar::Real;
 use super::tree::Linkage;

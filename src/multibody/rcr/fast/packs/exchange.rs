@@ -2,8 +2,7 @@
 
 use super::{Packs, WIDTH, Wide};
 use crate::multibody::rcr::data::Offsets;
-use crate::multibody::rcr::kinematics::Placement;
-use crate::multibody::rcr::placed::Placed;
+use crate::multibody::rcr::placed::{Placed, Placement};
 use crate::multibody::rcr::reduction::Node;
 use std::ops::Range;
 
