@@ -4,10 +4,10 @@
 //! e = (u + [g p]Q[g p]ᵀ, g, p), and their second derivative is A·a + b(v): the rows A and the part b of the velocities are
 //! formed here. A rotation is multiplied by the lever of its body, so that rows of one closure have one unit.
 
+use super::data::{Given, Task, Workspace};
 use super::mechanism::ClosureShape;
 use super::pair::{Pair, minus, plus, turn};
 use super::placed::Placed;
-use super::reduction::{Given, Task, Workspace};
 use super::scalar::Real;
 use super::schedule::NONE;
 use std::ops::Range;

@@ -7,8 +7,8 @@
 //! Reference: E. Hairer, G. Wanner, "Solving Ordinary Differential Equations II" (1996), §VII.2 (projection methods).
 
 use super::Real;
-use super::data::Reduction;
-use super::reduction::Task;
+use super::data::Task;
+use super::reduction::Reduction;
 use super::singular::Singularity;
 use super::traversal::Traversal;
 

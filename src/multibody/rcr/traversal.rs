@@ -1,8 +1,8 @@
 //! How the bodies of a mechanism are gone through: one after the other, or, where a number has a faster way, by that.
 
-use super::data::{Offsets, Reduction};
+use super::data::{Offsets, Task};
 use super::placed::{Placed, Placement};
-use super::reduction::Task;
+use super::reduction::Reduction;
 use super::scalar::Real;
 use super::tree::Linkage;
 use std::fmt::Debug;

@@ -4,8 +4,8 @@
 //! set and chosen at run time (AVX-512, AVX2, NEON or the base set); as nothing is fused, the bits do not depend on the
 //! choice.
 
-use crate::multibody::rcr::data::Reduction;
-use crate::multibody::rcr::reduction::Task;
+use crate::multibody::rcr::data::Task;
+use crate::multibody::rcr::reduction::Reduction;
 use crate::multibody::rcr::scalar::Real;
 use crate::multibody::rcr::traversal::Traversal;
 use pulp::{Arch, Simd, WithSimd};

@@ -1,7 +1,7 @@
 //! Turns of bodies with one coordinate and a front of one or two bodies, with the rows of loops, in closed form. They do what
 //! the turn of any body does (`general.rs`, `front.rs`), in the same order, with nothing left to decide while running.
 
-use crate::multibody::rcr::reduction::{Given, Task, Workspace};
+use crate::multibody::rcr::data::{Given, Task, Workspace};
 use crate::multibody::rcr::scalar::Real;
 use crate::multibody::rcr::schedule::NONE;
 

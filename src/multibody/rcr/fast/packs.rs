@@ -18,9 +18,9 @@ mod subtrees;
 
 use super::dispatch::across;
 use super::lanes::Lanes;
-use crate::multibody::rcr::data::{Offsets, Reduction};
+use crate::multibody::rcr::data::{Offsets, Task};
 use crate::multibody::rcr::placed::{Placed, Placement};
-use crate::multibody::rcr::reduction::Task;
+use crate::multibody::rcr::reduction::Reduction;
 use crate::multibody::rcr::scalar::Real;
 use crate::multibody::rcr::traversal::Traversal;
 use crate::multibody::rcr::tree::Linkage;

@@ -2,8 +2,8 @@
 
 use super::room::Room;
 use super::{LIGHT, Singularity};
-use crate::multibody::rcr::data::Reduction;
-use crate::multibody::rcr::reduction::{Given, Task, Workspace};
+use crate::multibody::rcr::data::{Given, Task, Workspace};
+use crate::multibody::rcr::reduction::Reduction;
 use crate::multibody::rcr::schedule::NONE;
 use crate::multibody::rcr::traversal::Traversal;
 
