@@ -1,19 +1,18 @@
-//! The recursion with its storage: loads in, accelerations out.
+//! The recursion with its storage, loads in and accelerations out; and what a number says of how its bodies are gone through.
 
 use super::data::{Given, Offsets, Task, Workspace};
-use super::fast;
 use super::mechanism::Mechanism;
 use super::placed::{Placed, Placement};
 use super::scalar::Real;
 use super::schedule::Plan;
 use super::singular::Room;
-use super::traversal::Traversal;
 use super::tree::Linkage;
+use std::fmt::Debug;
 use std::sync::Arc;
 
 /// The recursion with its storage, over one mechanism or over lanes of variants. Copies share what does not move.
 #[derive(Debug, Clone)]
-pub struct Reduction<T: Real> {
+pub struct Reduction<T: Traversed> {
     pub(super) mechanism: Arc<Mechanism<T>>,
     /// Wrench on each body: forces along x and y and moment about the centre of mass [N, N·m]. Set before reducing.
     pub force: Vec<[T; 3]>,
@@ -32,7 +31,40 @@ pub struct Reduction<T: Real> {
     pub(super) traversal: Option<Box<T::Traversal>>,
 }
 
-impl<T: Real> Reduction<T> {
+/// A number that says how the bodies of a mechanism over it are gone through.
+pub trait Traversed: Real {
+    /// One body after the other, or a faster way.
+    type Traversal: Traversal<Self>;
+}
+
+/// The passes over all bodies. What comes out has the same bits whatever the way.
+pub trait Traversal<T: Traversed>: Sized + Clone + Debug + Send + Sync + 'static {
+    /// Lays the way out; none where one after the other is as good.
+    fn new(linkage: &Linkage, reduction: &Reduction<T>) -> Option<Box<Self>>;
+
+    /// Places all bodies.
+    fn place(reduction: &mut Reduction<T>, q: &[T], v: &[T]);
+
+    /// Writes the rows of all closures for `task`. Returns the largest residual.
+    fn rows(reduction: &mut Reduction<T>, task: Task) -> T;
+
+    /// Reduces for `task`.
+    fn reduce(reduction: &mut Reduction<T>, task: Task, out: &mut [T]);
+
+    /// Where a body is and how it moves, that went another way.
+    fn placed(&self, body: usize) -> Option<Placed<T>>;
+
+    /// Places all those bodies where one after the other would have.
+    fn spread(&self, placement: &mut Placement<T>);
+
+    /// Takes the offsets of locked directions over.
+    fn prescribe(&mut self, offsets: &Offsets<T>);
+
+    /// Number of bodies that go another way.
+    fn side_by_side(&self) -> usize;
+}
+
+impl<T: Traversed> Reduction<T> {
     /// Storage for one variant per lane; all must have the same tree and loops (fewer variants are repeated). Over one
     /// `f64`, subtrees that are equal in structure go side by side through vector instructions.
     pub fn new(variants: &[&Linkage]) -> Self {
@@ -76,24 +108,6 @@ impl<T: Real> Reduction<T> {
     /// Number of bodies that are reduced side by side with those of equal subtrees.
     pub fn side_by_side(&self) -> usize {
         self.traversal.as_ref().map_or(0, |t| t.side_by_side())
-    }
-
-    /// Places all bodies for coordinates `q` and rates `v`.
-    pub fn place(&mut self, q: &[T], v: &[T]) {
-        fast::place(self, q, v);
-    }
-
-    /// Solves for `task` at the placed configuration; `out` receives q̈, or the change of the rates or coordinates.
-    ///
-    /// The result is right to rounding times the square of [`Reduction::nearness`].
-    pub fn reduce(&mut self, task: Task, out: &mut [T]) {
-        fast::reduce(self, task, out);
-    }
-
-    /// Places the bodies at `q`, `v` and finds q̈ in `out`, with the forces that [`Reduction::force`] and
-    /// [`Reduction::torque`] hold: [`Reduction::place`] and [`Reduction::reduce`] at one go.
-    pub fn accelerate(&mut self, q: &[T], v: &[T], out: &mut [T]) {
-        fast::accelerate(self, q, v, out);
     }
 
     /// Displacement and rotation of a body from its drawn place [m, m, rad].

@@ -4,9 +4,8 @@
 //! direction of a closure acts on its two bodies through its rows.
 
 use super::placed::Placed;
-use super::reduction::Reduction;
+use super::reduction::{Reduction, Traversal};
 use super::stages::AddedInertia;
-use super::traversal::Traversal;
 use super::tree::{Closure, Linkage};
 use crate::multibody::BodyId;
 use crate::multibody::forces::RestStrain;
