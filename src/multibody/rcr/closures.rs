@@ -4,27 +4,13 @@
 //! e = (u + [g p]Q[g p]ᵀ, g, p), and their second derivative is A·a + b(v): the rows A and the part b of the velocities are
 //! formed here. A rotation is multiplied by the lever of its body, so that rows of one closure have one unit.
 
+use super::data::{Given, Task, Workspace};
+use super::mechanism::ClosureShape;
 use super::pair::{Pair, minus, plus, turn};
 use super::placed::Placed;
-use super::reduction::{Given, Task, Workspace};
 use super::scalar::Real;
 use super::schedule::NONE;
-use super::tree::Closure;
 use std::ops::Range;
-
-/// Geometry of a closure over lanes.
-#[derive(Debug, Clone)]
-pub(super) struct ClosureShape<T> {
-    arm_a: Pair<T>,
-    arm_b: Pair<T>,
-    axis: Pair<T>,
-    second: [T; 3],
-    lever: T,
-    held: Vec<[T; 3]>,
-    pub locked: [bool; 3],
-    /// Two material points coincide, whatever the turn between the bodies.
-    pin: bool,
-}
 
 /// One direction of a closure: its value, rate, rows over bodies a and b, and the velocity part of its second derivative.
 #[derive(Debug, Clone, Copy)]
@@ -37,49 +23,6 @@ pub(super) struct Strain<T> {
 }
 
 impl<T: Real> ClosureShape<T> {
-    pub(super) fn new(of: &[(&Closure, f64)]) -> Self {
-        let lane = |f: &dyn Fn(&Closure, f64) -> f64| {
-            let mut out = T::ZERO;
-            for k in 0..T::LANES {
-                let (closure, lever) = of[k % of.len()];
-                out.set_lane(k, f(closure, lever));
-            }
-            out
-        };
-        let joint = |f: &dyn Fn(&crate::multibody::Joint) -> f64| {
-            lane(&|c, _| match c {
-                Closure::Joint(j) => f(j),
-                Closure::Held { .. } => 0.0,
-            })
-        };
-        let (locked, count) = match of[0].0 {
-            Closure::Joint(j) => (j.locked, 0),
-            Closure::Held { rows, .. } => ([false; 3], rows.len()),
-        };
-        let held = (0..count)
-            .map(|r| {
-                [0, 1, 2].map(|i| {
-                    lane(&|c, lever| match c {
-                        // a row that only turns gets the unit of the others
-                        Closure::Held { rows, .. } if rows[r].xy().norm() < 0.5 => rows[r][i] * lever,
-                        Closure::Held { rows, .. } => rows[r][i],
-                        Closure::Joint(_) => 0.0,
-                    })
-                })
-            })
-            .collect();
-        Self {
-            arm_a: [joint(&|j| j.frame.arm_a.x), joint(&|j| j.frame.arm_a.y)],
-            arm_b: [joint(&|j| j.frame.arm_b.x), joint(&|j| j.frame.arm_b.y)],
-            axis: [joint(&|j| j.frame.axis.x), joint(&|j| j.frame.axis.y)],
-            second: [joint(&|j| j.second[(0, 0)]), joint(&|j| j.second[(0, 1)]), joint(&|j| j.second[(1, 1)])],
-            lever: lane(&|_, lever| lever),
-            held,
-            locked,
-            pin: of.iter().all(|(closure, _)| closure.is_pin()),
-        }
-    }
-
     /// The constraints of the closure at two placed bodies, its axial offset being `rest`; those beyond their number are not
     /// filled.
     #[inline(always)]

@@ -1,49 +1,111 @@
-//! What changes while a mechanism moves: loads, poses, what gathers on the way in, accelerations. Laid out once.
+//! What changes while a mechanism is reduced: what a reduction reads beside the mechanism, and what it works in. Laid out once.
 
-use super::fast;
-use super::kinematics::{Placement, lane};
-use super::mechanism::Mechanism;
-use super::placed::Placed;
-use super::reduction::{Given, Task, Workspace};
+use super::mechanism::{Mechanism, lane};
+use super::placed::Placement;
 use super::scalar::Real;
-use super::schedule::Plan;
-use super::singular::Room;
-use super::traversal::Traversal;
+use super::schedule::Turn;
 use super::tree::{Closure, Linkage};
-use std::sync::Arc;
 
-/// The recursion with its storage, over one mechanism or over lanes of variants. Copies share what does not move.
-#[derive(Debug, Clone)]
-pub struct Reduction<T: Real> {
-    pub(super) mechanism: Arc<Mechanism<T>>,
-    /// Wrench on each body: forces along x and y and moment about the centre of mass [N, N·m]. Set before reducing.
-    pub force: Vec<[T; 3]>,
-    /// Force on each coordinate [N or N·m]. Set before reducing.
-    pub torque: Vec<T>,
-    /// Acceleration of each body.
-    pub accelerations: Vec<[T; 3]>,
-    /// Worst of lever/pivot over the dependent coordinates of the last reduction: 1 in a well-conditioned loop, infinite in
-    /// a singular configuration. The squares of it multiply rounding errors.
-    pub nearness: T,
-    pub(super) offsets: Offsets<T>,
-    pub(super) placement: Placement<T>,
-    pub(super) work: Workspace<T>,
-    pub(super) room: Room,
-    /// How the bodies are gone through, where not one after the other.
-    pub(super) traversal: Option<Box<T::Traversal>>,
+/// What the right-hand side of a reduction is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Task {
+    /// Accelerations under the forces, with velocity parts.
+    Accelerations,
+    /// The smallest change of the rates, in the mass norm, that makes them fulfil the loops.
+    Rates,
+    /// The same for the positions (one Gauss–Newton step).
+    Positions,
 }
 
 /// Axial offsets of locked directions [m].
 #[derive(Debug, Clone)]
 pub struct Offsets<T> {
     /// One for each body on a joint that is no pin.
-    pub(super) joints: Vec<T>,
-    pub(super) closures: Vec<T>,
+    pub joints: Vec<T>,
+    /// One a loop closure.
+    pub closures: Vec<T>,
+}
+
+/// What a reduction reads; nothing of it changes on the way.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Given<'a, T> {
+    pub task: Task,
+    pub mechanism: &'a Mechanism<T>,
+    pub offsets: &'a Offsets<T>,
+    pub placement: &'a Placement<T>,
+    /// Wrench on each body.
+    pub force: &'a [[T; 3]],
+    /// Force on each coordinate.
+    pub torque: &'a [T],
+}
+
+/// What gathers at a body on the way in.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Node<T> {
+    /// Inertia that outer bodies hand on: xx, xy, yy, xθ, yθ, θθ.
+    pub inertia: [T; 6],
+    /// Wrench that they hand on.
+    pub momentum: [T; 3],
+}
+
+/// What one pin's body hands to the next inward, about the pin between them.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Handed<T> {
+    /// Inertia left at the pin: xx, xy, yy [kg].
+    pub inertia: [T; 3],
+    /// Force through the pin [N].
+    pub force: [T; 2],
+    /// Moment of the pin's drive on the next body [N·m].
+    pub moment: T,
+    /// From the next body's centre of mass to the pin [m].
+    pub lever: [T; 2],
+}
+
+/// What an implicit step adds to the turn of one body, see [`super::AddedInertia`].
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Added<T> {
+    /// Over the coordinates of its joint, the lower triangle by rows.
+    pub joint: [T; 6],
+    /// On the body: xx, xy, yy, xθ, yθ, θθ.
+    pub body: [T; 6],
+}
+
+/// What a reduction works in.
+#[derive(Debug, Clone)]
+pub(super) struct Workspace<T> {
+    pub nodes: Vec<Node<T>>,
+    /// Couplings of pairs of bodies, by [`super::schedule::Schedule::blocks`].
+    pub coupling: Vec<[T; 9]>,
+    /// Constraint rows, by [`Turn::row_start`].
+    pub rows: Vec<T>,
+    /// Acceleration of a coordinate per acceleration of the bodies of its front; a pin's per acceleration of its point.
+    pub coefficients: Vec<T>,
+    /// Acceleration of a coordinate when its front rests; a pin's body's.
+    pub base: Vec<T>,
+    /// Which orthogonal combinations of a body's coordinates were taken out; none where no body has several.
+    pub combined: Vec<[[T; 3]; 3]>,
+    /// What a pin has handed to the next of its run.
+    pub handed: Handed<T>,
+    /// See [`super::Reduction::nearness`].
+    pub nearness: T,
+    /// What an implicit step adds to each body; empty otherwise.
+    pub added: Vec<Added<T>>,
+    /// The same to each coupling, in the order of the pattern.
+    pub added_coupling: Vec<[T; 9]>,
+    pub front: Scratch<T>,
+}
+
+/// Room for one front at a time: its M, its g and its rows.
+#[derive(Debug, Clone)]
+pub(super) struct Scratch<T> {
+    pub m: Vec<T>,
+    pub g: Vec<T>,
+    pub r: Vec<T>,
 }
 
 impl<T: Real> Offsets<T> {
     /// As built, for one variant per lane.
-    fn new(variants: &[&Linkage]) -> Self {
+    pub(super) fn new(variants: &[&Linkage]) -> Self {
         let linkage = variants[0];
         let of = |b: usize| variants.iter().map(|v| &v.links[b]).collect::<Vec<_>>();
         let joints = (0..linkage.links.len()).filter(|&b| !linkage.links[b].pin);
@@ -63,89 +125,79 @@ impl<T: Real> Offsets<T> {
     }
 }
 
-impl<T: Real> Reduction<T> {
-    /// Storage for one variant per lane; all must have the same tree and loops (fewer variants are repeated). Over one
-    /// `f64`, subtrees that are equal in structure go side by side through vector instructions.
-    pub fn new(variants: &[&Linkage]) -> Self {
-        let mut reduction = Self::without_packs(variants);
-        reduction.traversal = T::Traversal::new(variants[0], &reduction);
-        reduction
-    }
+impl<T: Real> Node<T> {
+    const CLEAN: Self = Self { inertia: [T::ZERO; 6], momentum: [T::ZERO; 3] };
+}
 
-    /// [`Reduction::new`] with every body on its own: slower where subtrees are equal, and the same bits.
-    pub fn without_packs(variants: &[&Linkage]) -> Self {
-        Self::planned(variants, Plan { coupled: false, fast: true })
-    }
+impl<T: Real> Handed<T> {
+    pub(super) const NOTHING: Self =
+        Self { inertia: [T::ZERO; 3], force: [T::ZERO; 2], moment: T::ZERO, lever: [T::ZERO; 2] };
+}
 
-    /// [`Reduction::new`] without anything that is there for speed alone: the same bits.
-    pub fn plain(variants: &[&Linkage]) -> Self {
-        Self::planned(variants, Plan { coupled: false, fast: false })
-    }
-
-    pub(super) fn planned(variants: &[&Linkage], plan: Plan) -> Self {
-        let coordinates = variants[0].coordinates;
-        let mechanism = Mechanism::new(variants, plan);
+impl<T: Real> Workspace<T> {
+    pub(super) fn new(mechanism: &Mechanism<T>, coordinates: usize) -> Self {
+        let schedule = &mechanism.schedule;
+        let most = |f: &dyn Fn(Turn) -> usize| schedule.turns().map(f).max().unwrap_or(0);
+        let size = most(&|t| t.freedom + 3 * t.front);
         Self {
-            force: vec![[T::ZERO; 3]; mechanism.bodies()],
-            torque: vec![T::ZERO; coordinates],
-            accelerations: vec![[T::ZERO; 3]; mechanism.bodies()],
+            nodes: vec![Node::CLEAN; schedule.node_count],
+            coupling: vec![[T::ZERO; 9]; schedule.block_count],
+            rows: vec![T::ZERO; schedule.row_entries],
+            coefficients: vec![T::ZERO; schedule.coefficient_entries],
+            base: vec![T::ZERO; coordinates],
+            combined: vec![[[T::ZERO; 3]; 3]; if most(&|t| t.freedom) > 1 { mechanism.bodies() } else { 0 }],
+            handed: Handed::NOTHING,
             nearness: T::ZERO,
-            offsets: Offsets::new(variants),
-            placement: Placement::new(&mechanism, coordinates),
-            work: Workspace::new(&mechanism, coordinates),
-            room: Room::new(&mechanism.schedule),
-            traversal: None,
-            mechanism: Arc::new(mechanism),
+            added: Vec::new(),
+            added_coupling: Vec::new(),
+            front: Scratch {
+                m: vec![T::ZERO; size * size],
+                g: vec![T::ZERO; size],
+                r: vec![T::ZERO; most(&|t| t.rows) * (size + 1)],
+            },
         }
     }
 
-    /// Multiplications of one reduction: the count that grows linearly with n + m.
-    pub fn multiplications(&self) -> u64 {
-        self.mechanism.schedule.multiplications
-    }
-
-    /// Number of bodies that are reduced side by side with those of equal subtrees.
-    pub fn side_by_side(&self) -> usize {
-        self.traversal.as_ref().map_or(0, |t| t.side_by_side())
-    }
-
-    /// Places all bodies for coordinates `q` and rates `v`.
-    pub fn place(&mut self, q: &[T], v: &[T]) {
-        fast::place(self, q, v);
-    }
-
-    /// Solves for `task` at the placed configuration; `out` receives q̈, or the change of the rates or coordinates.
-    ///
-    /// The result is right to rounding times the square of [`Reduction::nearness`].
-    pub fn reduce(&mut self, task: Task, out: &mut [T]) {
-        fast::reduce(self, task, out);
-    }
-
-    /// Places the bodies at `q`, `v` and finds q̈ in `out`, with the forces that [`Reduction::force`] and
-    /// [`Reduction::torque`] hold: [`Reduction::place`] and [`Reduction::reduce`] at one go.
-    pub fn accelerate(&mut self, q: &[T], v: &[T], out: &mut [T]) {
-        fast::accelerate(self, q, v, out);
-    }
-
-    /// Displacement and rotation of a body from its drawn place [m, m, rad].
-    pub fn pose(&self, body: usize) -> [T; 3] {
-        self.placed(body).pose
-    }
-
-    /// Rate of a body's pose.
-    pub fn rate(&self, body: usize) -> [T; 3] {
-        self.placed(body).rate
-    }
-
-    /// Where a body is and how it moves.
-    pub(super) fn placed(&self, body: usize) -> Placed<T> {
-        self.traversal.as_ref().and_then(|t| t.placed(body)).unwrap_or(self.placement.placed[body])
-    }
-
-    /// What a reduction reads, what it works in, and where accelerations go.
+    /// What the outer bodies have left at this one, with its own mass; their place is clean for the next reduction.
     #[inline(always)]
-    pub(super) fn parts(&mut self, task: Task) -> (Given<'_, T>, &mut Workspace<T>, &mut [[T; 3]]) {
-        let Self { mechanism, force, torque, offsets, placement, work, accelerations, .. } = self;
-        (Given { task, mechanism, offsets, placement, force, torque }, work, accelerations)
+    pub(super) fn take_inertia(&mut self, mechanism: &Mechanism<T>, body: usize) -> [T; 6] {
+        let node = &mut self.nodes[mechanism.schedule.steps[body].node as usize];
+        let mut inertia = std::mem::replace(&mut node.inertia, [T::ZERO; 6]);
+        let own = &mechanism.inertias[body];
+        inertia[0] += own.mass;
+        inertia[2] += own.mass;
+        inertia[5] += own.moment;
+        if let Some(added) = self.added.get(body) {
+            for (sum, x) in inertia.iter_mut().zip(&added.body) {
+                *sum += *x;
+            }
+        }
+        inertia
+    }
+
+    /// What has gathered in a block of the pattern; its place is clean for the next.
+    #[inline(always)]
+    pub(super) fn take_coupling(&mut self, mechanism: &Mechanism<T>, block: usize) -> [T; 9] {
+        let at = mechanism.schedule.blocks[block] as usize;
+        let mut coupling = std::mem::replace(&mut self.coupling[at], [T::ZERO; 9]);
+        if let Some(added) = self.added_coupling.get(block) {
+            for (sum, x) in coupling.iter_mut().zip(added) {
+                *sum += *x;
+            }
+        }
+        coupling
+    }
+
+    /// The same for forces; accelerations add the body's own.
+    #[inline(always)]
+    pub(super) fn take_force(&mut self, given: Given<'_, T>, body: usize) -> [T; 3] {
+        let node = &mut self.nodes[given.mechanism.schedule.steps[body].node as usize];
+        let mut force = std::mem::replace(&mut node.momentum, [T::ZERO; 3]);
+        if given.task == Task::Accelerations {
+            for (f, own) in force.iter_mut().zip(&given.force[body]) {
+                *f += *own;
+            }
+        }
+        force
     }
 }

@@ -3,12 +3,11 @@
 //! The front is assembled from the body's inertia, its couplings and the rows that reach it, [`super::front`] takes its
 //! coordinates out, and what is left goes to the bodies of the front. [`super::fast::kernels`] does the same for small fronts.
 
+use super::data::{Added, Given, Scratch, Task, Workspace};
 use super::front::Front;
 use super::mechanism::Mechanism;
-use super::reduction::{Given, Scratch, Task, Workspace};
 use super::scalar::Real;
 use super::schedule::{NONE, Turn};
-use super::stages::Added;
 
 impl<T: Real> Workspace<T> {
     /// Assembles a body's front, takes its coordinates out, and hands the rest on.

@@ -10,76 +10,11 @@
 //! S are the columns ∂(x, y, θ)/∂(e_u, g, p) of the directions that move, and c gathers the centripetal and Coriolis parts,
 //! the acceleration when q̈ = 0 and the parent's is zero.
 
-use super::mechanism::Mechanism;
+use super::mechanism::{Arms, JointShape, Mechanism};
 use super::pair::{Pair, minus, plus, times, turn};
-use super::placed::{Hanging, Placed};
+use super::placed::{Hanging, Placed, Placement};
 use super::scalar::Real;
-use super::tree::{Link, Parent};
 use std::ops::Range;
-
-/// Inertia of one body over lanes.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Inertia<T> {
-    /// [kg]
-    pub mass: T,
-    /// About the centre of mass [kg·m²].
-    pub moment: T,
-}
-
-/// From the centres of mass of a link's parent and of itself to their joint, as drawn [m], over lanes.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Arms<T> {
-    arm_parent: Pair<T>,
-    arm: Pair<T>,
-}
-
-/// What a joint has beyond a pin.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct JointShape<T> {
-    axis: Pair<T>,
-    second: [T; 3],
-    /// Directions that move.
-    moving: [bool; 3],
-    /// No joint at all: the body moves freely.
-    free: bool,
-}
-
-/// A number of each variant, side by side.
-pub(super) fn lane<T: Real>(of: &[&Link], f: &dyn Fn(&Link) -> f64) -> T {
-    let mut out = T::ZERO;
-    for k in 0..T::LANES {
-        out.set_lane(k, f(of[k % of.len()]));
-    }
-    out
-}
-
-impl<T: Real> JointShape<T> {
-    pub(super) fn new(of: &[&Link]) -> Self {
-        let lane = |f: &dyn Fn(&Link) -> f64| lane(of, f);
-        Self {
-            axis: [lane(&|l| l.frame.axis.x), lane(&|l| l.frame.axis.y)],
-            second: [lane(&|l| l.second[(0, 0)]), lane(&|l| l.second[(0, 1)]), lane(&|l| l.second[(1, 1)])],
-            moving: of[0].moving,
-            free: of[0].parent == Parent::Free,
-        }
-    }
-}
-
-impl<T: Real> Inertia<T> {
-    pub(super) fn new(of: &[&Link]) -> Self {
-        Self { mass: lane(of, &|l| l.mass), moment: lane(of, &|l| l.inertia) }
-    }
-}
-
-impl<T: Real> Arms<T> {
-    pub(super) fn new(of: &[&Link]) -> Self {
-        let lane = |f: &dyn Fn(&Link) -> f64| lane(of, f);
-        Self {
-            arm_parent: [lane(&|l| l.frame.arm_a.x), lane(&|l| l.frame.arm_a.y)],
-            arm: [lane(&|l| l.frame.arm_b.x), lane(&|l| l.frame.arm_b.y)],
-        }
-    }
-}
 
 /// A body that nothing holds: its coordinates are its pose, its axes the directions themselves.
 #[inline(always)]
@@ -175,35 +110,7 @@ fn place_joint<T: Real>(
 /// Bodies whose sines are taken together.
 const BLOCK: usize = 16;
 
-/// Where all bodies are and how they hang together.
-#[derive(Debug, Clone)]
-pub struct Placement<T> {
-    pub(super) placed: Vec<Placed<T>>,
-    pub(super) hanging: Vec<Hanging<T>>,
-    /// Axes of the coordinates of joints that are no pins; none where all joints are.
-    pub(super) axes: Vec<[T; 3]>,
-}
-
 impl<T: Real> Placement<T> {
-    /// Bodies at rest where they are drawn, of a mechanism with `coordinates` coordinates.
-    pub(super) fn new(mechanism: &Mechanism<T>, coordinates: usize) -> Self {
-        Self {
-            placed: vec![Placed::REST; mechanism.bodies()],
-            hanging: vec![Hanging::REST; mechanism.bodies()],
-            axes: vec![[T::ZERO; 3]; if mechanism.joints.is_empty() { 0 } else { coordinates }],
-        }
-    }
-
-    /// Axis of a coordinate of `body`.
-    #[inline(always)]
-    pub(super) fn axis(&self, mechanism: &Mechanism<T>, body: usize, coordinate: usize) -> [T; 3] {
-        if mechanism.schedule.steps[body].pin {
-            self.hanging[body].pin_axis(mechanism.signs[body])
-        } else {
-            self.axes[coordinate]
-        }
-    }
-
     /// Places the bodies of `range`, root → leaf, in blocks: angles first, so that the sines of a block are taken side by
     /// side. `rests` are the axial offsets of locked joints.
     #[inline(always)]

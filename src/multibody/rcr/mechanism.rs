@@ -2,11 +2,11 @@
 //!
 //! Nothing of it changes after [`Mechanism::new`], so that all who step one mechanism share it.
 
-use super::closures::ClosureShape;
-use super::kinematics::{Arms, Inertia, JointShape, lane};
+use super::pair::Pair;
 use super::scalar::Real;
 use super::schedule::{Plan, Schedule};
-use super::tree::Linkage;
+use super::tree::{Closure, Link, Linkage, Parent};
+use crate::multibody::Joint;
 
 /// What does not move.
 #[derive(Debug)]
@@ -20,6 +20,7 @@ pub(super) struct Mechanism<T> {
     pub signs: Vec<T>,
     /// One for each body on a joint that is no pin.
     pub joints: Vec<JointShape<T>>,
+    /// One a loop closure.
     pub closures: Vec<ClosureShape<T>>,
     /// Unit of each coordinate: what makes it a length [m, or m/m].
     pub units: Vec<T>,
@@ -27,6 +28,55 @@ pub(super) struct Mechanism<T> {
     pub levers: Vec<T>,
     /// Loop constraints m.
     pub constraints: usize,
+}
+
+/// Inertia of one body over lanes.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Inertia<T> {
+    /// [kg]
+    pub mass: T,
+    /// About the centre of mass [kg·m²].
+    pub moment: T,
+}
+
+/// From the centres of mass of a link's parent and of itself to their joint, as drawn [m], over lanes.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Arms<T> {
+    pub arm_parent: Pair<T>,
+    pub arm: Pair<T>,
+}
+
+/// What a joint has beyond a pin.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct JointShape<T> {
+    /// Its axial direction, as drawn.
+    pub axis: Pair<T>,
+    /// Second-order axial strain Q: gg, gp, pp.
+    pub second: [T; 3],
+    /// Directions that move.
+    pub moving: [bool; 3],
+    /// No joint at all: the body moves freely.
+    pub free: bool,
+}
+
+/// Geometry of a closure over lanes.
+#[derive(Debug, Clone)]
+pub(super) struct ClosureShape<T> {
+    /// From the centres of mass of its two bodies to the joint, as drawn [m].
+    pub arm_a: Pair<T>,
+    pub arm_b: Pair<T>,
+    /// Its axial direction, as drawn.
+    pub axis: Pair<T>,
+    /// Second-order axial strain Q: gg, gp, pp.
+    pub second: [T; 3],
+    /// What makes a rotation comparable with a displacement [m].
+    pub lever: T,
+    /// Directions of a body that supports hold; none of a joint.
+    pub held: Vec<[T; 3]>,
+    /// Directions of the joint that are constraints.
+    pub locked: [bool; 3],
+    /// Two material points coincide, whatever the turn between the bodies.
+    pub pin: bool,
 }
 
 impl<T: Real> Mechanism<T> {
@@ -59,5 +109,87 @@ impl<T: Real> Mechanism<T> {
     /// Number of bodies.
     pub(super) fn bodies(&self) -> usize {
         self.inertias.len()
+    }
+}
+
+/// A number of each variant, side by side.
+pub(super) fn lane<T: Real>(of: &[&Link], f: &dyn Fn(&Link) -> f64) -> T {
+    let mut out = T::ZERO;
+    for k in 0..T::LANES {
+        out.set_lane(k, f(of[k % of.len()]));
+    }
+    out
+}
+
+impl<T: Real> JointShape<T> {
+    fn new(of: &[&Link]) -> Self {
+        let lane = |f: &dyn Fn(&Link) -> f64| lane(of, f);
+        Self {
+            axis: [lane(&|l| l.frame.axis.x), lane(&|l| l.frame.axis.y)],
+            second: [lane(&|l| l.second[(0, 0)]), lane(&|l| l.second[(0, 1)]), lane(&|l| l.second[(1, 1)])],
+            moving: of[0].moving,
+            free: of[0].parent == Parent::Free,
+        }
+    }
+}
+
+impl<T: Real> Inertia<T> {
+    fn new(of: &[&Link]) -> Self {
+        Self { mass: lane(of, &|l| l.mass), moment: lane(of, &|l| l.inertia) }
+    }
+}
+
+impl<T: Real> Arms<T> {
+    fn new(of: &[&Link]) -> Self {
+        let lane = |f: &dyn Fn(&Link) -> f64| lane(of, f);
+        Self {
+            arm_parent: [lane(&|l| l.frame.arm_a.x), lane(&|l| l.frame.arm_a.y)],
+            arm: [lane(&|l| l.frame.arm_b.x), lane(&|l| l.frame.arm_b.y)],
+        }
+    }
+}
+
+impl<T: Real> ClosureShape<T> {
+    fn new(of: &[(&Closure, f64)]) -> Self {
+        let lane = |f: &dyn Fn(&Closure, f64) -> f64| {
+            let mut out = T::ZERO;
+            for k in 0..T::LANES {
+                let (closure, lever) = of[k % of.len()];
+                out.set_lane(k, f(closure, lever));
+            }
+            out
+        };
+        let joint = |f: &dyn Fn(&Joint) -> f64| {
+            lane(&|c, _| match c {
+                Closure::Joint(j) => f(j),
+                Closure::Held { .. } => 0.0,
+            })
+        };
+        let (locked, count) = match of[0].0 {
+            Closure::Joint(j) => (j.locked, 0),
+            Closure::Held { rows, .. } => ([false; 3], rows.len()),
+        };
+        let held = (0..count)
+            .map(|r| {
+                [0, 1, 2].map(|i| {
+                    lane(&|c, lever| match c {
+                        // a row that only turns gets the unit of the others
+                        Closure::Held { rows, .. } if rows[r].xy().norm() < 0.5 => rows[r][i] * lever,
+                        Closure::Held { rows, .. } => rows[r][i],
+                        Closure::Joint(_) => 0.0,
+                    })
+                })
+            })
+            .collect();
+        Self {
+            arm_a: [joint(&|j| j.frame.arm_a.x), joint(&|j| j.frame.arm_a.y)],
+            arm_b: [joint(&|j| j.frame.arm_b.x), joint(&|j| j.frame.arm_b.y)],
+            axis: [joint(&|j| j.frame.axis.x), joint(&|j| j.frame.axis.y)],
+            second: [joint(&|j| j.second[(0, 0)]), joint(&|j| j.second[(0, 1)]), joint(&|j| j.second[(1, 1)])],
+            lever: lane(&|_, lever| lever),
+            held,
+            locked,
+            pin: of.iter().all(|(closure, _)| closure.is_pin()),
+        }
     }
 }

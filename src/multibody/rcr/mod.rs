@@ -7,23 +7,27 @@
 //! | [`tree`] | the spanning tree and the loops: n coordinates, m constraints |
 //! | [`rotary`] | the paper's model: joints that only turn |
 //! | `coordinates` | joint coordinates of given poses |
-//! | `mechanism` | what the recursion reads of a linkage: geometry and inertia over lanes, and the schedule; immutable |
+//! | [`scalar`], `lanes` | what it runs over: one number, or lanes of variants |
+//! | `pair` | vectors of the plane |
 //! | `schedule` | who meets whom: fronts, rows passing through, places in the arenas |
-//! | `data` | what changes: loads, poses, rows and fronts on the way, accelerations |
-//! | `pair`, `placed` | vectors of the plane; where a body is and how it hangs |
+//! | `mechanism` | what does not move: geometry and inertia over lanes, and the schedule |
+//! | `placed` | where bodies are, how they move, and how they hang on each other |
+//! | `data` | what changes: what a reduction reads beside the mechanism, and what it works in |
 //! | `kinematics` | outward: poses, rates, joint axes, velocity parts |
 //! | `closures` | the rows of loop closures and their velocity parts |
-//! | [`reduction`] | the recursion inward and outward |
 //! | `front` | elimination of one body's coordinates, with a loop's row or without |
 //! | `general` | the turn of any body |
 //! | `pin` | the turn of a body on a pin that no loop passes |
+//! | `recursion` | turn after turn, inward and outward |
+//! | `reduction` | [`Reduction`]: loads in, accelerations out, with all that a run needs |
+//! | `traversal` | its passes over the bodies: one after the other, or as its number says |
 //! | `singular` | the recursion near singular configurations |
 //! | `projection` | positions and rates that fulfil the loops |
-//! | `springs` | forces of the joints' springs |
 //! | `stages` | the recursion for a stage of an implicit method |
-//! | [`scalar`] | what it runs over: one number, or lanes of variants |
-//! | `traversal` | how the bodies are gone through |
-//! | `fast` | what is there for speed alone, with the same bits: runs of pins, small fronts, equal subtrees, lanes |
+//! | `springs` | forces of the joints' springs |
+//! | `fast` | what is there for speed alone, with the same bits: runs of pins, small fronts, equal subtrees, wide instructions |
+//!
+//! A file names those above it. Beside that, `schedule` and `traversal` ask `fast`, and `reduction` holds the room of `singular`.
 
 // fixed-size blocks are indexed as the formulas are written
 #![allow(clippy::needless_range_loop)]
@@ -35,12 +39,14 @@ mod fast;
 mod front;
 mod general;
 mod kinematics;
+mod lanes;
 mod mechanism;
 mod pair;
 mod pin;
 mod placed;
 mod projection;
-pub mod reduction;
+mod recursion;
+mod reduction;
 pub mod rotary;
 pub mod scalar;
 mod schedule;
@@ -50,10 +56,10 @@ mod stages;
 mod traversal;
 pub mod tree;
 
-pub use data::Reduction;
-pub use fast::Lanes;
-pub(crate) use fast::has_lanes;
-pub use reduction::Task;
+pub use data::Task;
+pub use lanes::Lanes;
+pub(crate) use lanes::has_lanes;
+pub use reduction::{Reduction, Traversed};
 pub use rotary::Counts;
 pub use scalar::Real;
 pub use singular::Singularity;

@@ -14,23 +14,10 @@
 //! Reference: R. Featherstone, "Rigid Body Dynamics Algorithms" (2008), chapter 7, for the articulated inertia; the choice
 //! of the pin as its point of reference is ours.
 
-use super::kinematics::Inertia;
+use super::data::{Given, Handed, Node, Workspace};
+use super::mechanism::Inertia;
 use super::placed::Hanging;
-use super::reduction::{Given, Node, Workspace};
 use super::scalar::Real;
-
-/// What one pin's body hands to the next inward, about the pin between them.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Handed<T> {
-    /// Inertia left at the pin: xx, xy, yy [kg].
-    inertia: [T; 3],
-    /// Force through the pin [N].
-    force: [T; 2],
-    /// Moment of the pin's drive on the next body [N·m].
-    moment: T,
-    /// From the next body's centre of mass to the pin [m].
-    lever: [T; 2],
-}
 
 /// A body on a pin.
 #[derive(Debug, Clone, Copy)]
@@ -45,9 +32,6 @@ pub(super) struct Pinned<'a, T> {
 }
 
 impl<T: Real> Handed<T> {
-    pub(super) const NOTHING: Self =
-        Self { inertia: [T::ZERO; 3], force: [T::ZERO; 2], moment: T::ZERO, lever: [T::ZERO; 2] };
-
     /// Takes the coordinate of the body out, to which this was handed, and what has gathered in `node`. Returns base and
     /// slope of its angular acceleration, and what it hands on. `FORCED`: with forces and velocity parts.
     #[inline(always)]

@@ -6,11 +6,9 @@
 //!
 //! Reference: E. Hairer, G. Wanner, "Solving Ordinary Differential Equations II" (1996), §VII.2 (projection methods).
 
-use super::Real;
-use super::data::Reduction;
-use super::reduction::Task;
+use super::data::Task;
+use super::reduction::{Reduction, Traversal, Traversed};
 use super::singular::Singularity;
-use super::traversal::Traversal;
 
 /// A loop's pivot below 1/100 of its lever loses more than 1e-12: the path for singular configurations is taken instead.
 const NEAR: f64 = 1e2;
@@ -78,6 +76,6 @@ impl Reduction<f64> {
 
     /// Largest residual of the loops [m, or m/s].
     pub fn largest(&mut self, task: Task) -> f64 {
-        <f64 as Real>::Traversal::rows(self, task)
+        <f64 as Traversed>::Traversal::rows(self, task)
     }
 }

@@ -3,8 +3,6 @@
 //! Both go through the same additions and multiplications in the same order, without fused operations and with the same
 //! sine and cosine, so that a lane's bits are those of the serial run, whatever the width of the processor's vectors.
 
-use super::fast::{Lanes, Packs};
-use super::traversal::Traversal;
 use crate::multibody::sine::{REDUCED, reduced};
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
@@ -25,8 +23,6 @@ pub trait Real:
     + SubAssign
     + 'static
 {
-    /// How the bodies of a mechanism over it are gone through.
-    type Traversal: Traversal<Self>;
     /// How many variants it holds.
     const LANES: usize;
     /// 0 in every lane.
@@ -59,7 +55,6 @@ pub trait Real:
 }
 
 impl Real for f64 {
-    type Traversal = Packs;
     const LANES: usize = 1;
     const ZERO: Self = 0.0;
     const ONE: Self = 1.0;
@@ -85,8 +80,7 @@ impl Real for f64 {
         let (eights, ones) = sin.as_chunks_mut::<8>();
         let (cos_eights, cos_ones) = cos.as_chunks_mut::<8>();
         for (s, c) in eights.iter_mut().zip(cos_eights) {
-            let (sines, cosines) = Lanes(*s).sin_cos();
-            (*s, *c) = (sines.0, cosines.0);
+            (*s, *c) = side_by_side(s);
         }
         for (s, c) in ones.iter_mut().zip(cos_ones) {
             // not f64's own method, which is the platform's
@@ -109,4 +103,23 @@ impl Real for f64 {
     fn abs(self) -> Self {
         f64::abs(self)
     }
+}
+
+/// Sines and cosines of `N` angles in vector instructions, each with the bits of [`Real::sin_cos`] of that angle alone.
+#[inline(always)]
+pub(super) fn side_by_side<const N: usize>(angles: &[f64; N]) -> ([f64; N], [f64; N]) {
+    let (mut sin, mut cos) = (*angles, *angles);
+    let mut far = false;
+    for k in 0..N {
+        far |= angles[k].abs() > REDUCED;
+    }
+    for k in 0..N {
+        (sin[k], cos[k]) = reduced(angles[k]);
+    }
+    if far {
+        for k in 0..N {
+            (sin[k], cos[k]) = Real::sin_cos(angles[k]);
+        }
+    }
+    (sin, cos)
 }

@@ -25,7 +25,7 @@ mod room;
 
 pub(super) use room::Room;
 
-use super::reduction::Task;
+use super::data::Task;
 
 /// Ratio up to which a row is squared into the inertia: its square times the rounding unit is lost.
 const LIGHT: f64 = 30.0;

@@ -3,10 +3,9 @@
 //! The coordinates of the tree are the strains of its joints, so their forces are −K·(e − e₀) as they stand. An elastic
 //! direction of a closure acts on its two bodies through its rows.
 
-use super::data::Reduction;
 use super::placed::Placed;
+use super::reduction::{Reduction, Traversal};
 use super::stages::AddedInertia;
-use super::traversal::Traversal;
 use super::tree::{Closure, Linkage};
 use crate::multibody::BodyId;
 use crate::multibody::forces::RestStrain;

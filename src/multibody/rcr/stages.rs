@@ -13,8 +13,8 @@
 //! Coriolis terms) for zero, so that the iteration converges linearly, at the rate of what is left out over W. What it
 //! converges to does not depend on W.
 
-use super::data::Reduction;
-use super::reduction::Task;
+use super::data::{Added, Task};
+use super::reduction::Reduction;
 use super::schedule::Plan;
 use super::singular::Singularity;
 use super::tree::Linkage;
@@ -28,15 +28,6 @@ pub struct AddedInertia {
     pub joints: Vec<[f64; 6]>,
     /// Of bodies and pairs of bodies.
     pub bodies: BlockMatrix<f64, 3>,
-}
-
-/// What the turn of one body finds of it.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Added<T> {
-    /// Over the coordinates of its joint, the lower triangle by rows.
-    pub joint: [T; 6],
-    /// On the body: xx, xy, yy, xθ, yθ, θθ.
-    pub body: [T; 6],
 }
 
 impl AddedInertia {

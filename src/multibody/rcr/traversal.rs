@@ -1,45 +1,37 @@
 //! How the bodies of a mechanism are gone through: one after the other, or, where a number has a faster way, by that.
 
-use super::data::{Offsets, Reduction};
-use super::kinematics::Placement;
-use super::placed::Placed;
-use super::reduction::Task;
-use super::scalar::Real;
+use super::data::{Offsets, Task};
+use super::fast;
+use super::lanes::Lanes;
+use super::placed::{Placed, Placement};
+use super::reduction::{Reduction, Traversal, Traversed};
 use super::tree::Linkage;
-use std::fmt::Debug;
 
-/// The passes over all bodies. What comes out has the same bits whatever the way.
-pub trait Traversal<T: Real>: Sized + Clone + Debug + Send + Sync + 'static {
-    /// Lays the way out; none where one after the other is as good.
-    fn new(linkage: &Linkage, reduction: &Reduction<T>) -> Option<Box<Self>>;
+impl<T: Traversed> Reduction<T> {
+    /// Places all bodies for coordinates `q` and rates `v`.
+    pub fn place(&mut self, q: &[T], v: &[T]) {
+        fast::place(self, q, v);
+    }
 
-    /// Places all bodies.
-    fn place(reduction: &mut Reduction<T>, q: &[T], v: &[T]);
+    /// Solves for `task` at the placed configuration; `out` receives q̈, or the change of the rates or coordinates.
+    ///
+    /// The result is right to rounding times the square of [`Reduction::nearness`].
+    pub fn reduce(&mut self, task: Task, out: &mut [T]) {
+        fast::reduce(self, task, out);
+    }
 
-    /// Writes the rows of all closures for `task`. Returns the largest residual.
-    fn rows(reduction: &mut Reduction<T>, task: Task) -> T;
-
-    /// Reduces for `task`.
-    fn reduce(reduction: &mut Reduction<T>, task: Task, out: &mut [T]);
-
-    /// Where a body is and how it moves, that went another way.
-    fn placed(&self, body: usize) -> Option<Placed<T>>;
-
-    /// Places all those bodies where one after the other would have.
-    fn spread(&self, placement: &mut Placement<T>);
-
-    /// Takes the offsets of locked directions over.
-    fn prescribe(&mut self, offsets: &Offsets<T>);
-
-    /// Number of bodies that go another way.
-    fn side_by_side(&self) -> usize;
+    /// Places the bodies at `q`, `v` and finds q̈ in `out`, with the forces that [`Reduction::force`] and
+    /// [`Reduction::torque`] hold: [`Reduction::place`] and [`Reduction::reduce`] at one go.
+    pub fn accelerate(&mut self, q: &[T], v: &[T], out: &mut [T]) {
+        fast::accelerate(self, q, v, out);
+    }
 }
 
 /// One body after the other.
 #[derive(Debug, Clone, Copy)]
 pub struct OneByOne;
 
-impl<T: Real> Traversal<T> for OneByOne {
+impl<T: Traversed> Traversal<T> for OneByOne {
     fn new(_: &Linkage, _: &Reduction<T>) -> Option<Box<Self>> {
         None
     }
@@ -78,4 +70,9 @@ impl<T: Real> Traversal<T> for OneByOne {
     fn side_by_side(&self) -> usize {
         0
     }
+}
+
+/// Lanes are full already.
+impl<const N: usize> Traversed for Lanes<N> {
+    type Traversal = OneByOne;
 }

@@ -4,20 +4,18 @@
 //! set and chosen at run time (AVX-512, AVX2, NEON or the base set); as nothing is fused, the bits do not depend on the
 //! choice.
 
-use crate::multibody::rcr::data::Reduction;
-use crate::multibody::rcr::reduction::Task;
-use crate::multibody::rcr::scalar::Real;
-use crate::multibody::rcr::traversal::Traversal;
+use crate::multibody::rcr::data::Task;
+use crate::multibody::rcr::reduction::{Reduction, Traversal, Traversed};
 use pulp::{Arch, Simd, WithSimd};
 
 /// Places the bodies.
-struct Place<'a, T: Real>(&'a mut Reduction<T>, &'a [T], &'a [T]);
+struct Place<'a, T: Traversed>(&'a mut Reduction<T>, &'a [T], &'a [T]);
 /// Reduces.
-struct Reduce<'a, T: Real>(&'a mut Reduction<T>, Task, &'a mut [T]);
+struct Reduce<'a, T: Traversed>(&'a mut Reduction<T>, Task, &'a mut [T]);
 /// Both, for accelerations.
-struct Accelerate<'a, T: Real>(&'a mut Reduction<T>, &'a [T], &'a [T], &'a mut [T]);
+struct Accelerate<'a, T: Traversed>(&'a mut Reduction<T>, &'a [T], &'a [T], &'a mut [T]);
 
-impl<T: Real> WithSimd for Place<'_, T> {
+impl<T: Traversed> WithSimd for Place<'_, T> {
     type Output = ();
 
     #[inline(always)]
@@ -26,7 +24,7 @@ impl<T: Real> WithSimd for Place<'_, T> {
     }
 }
 
-impl<T: Real> WithSimd for Reduce<'_, T> {
+impl<T: Traversed> WithSimd for Reduce<'_, T> {
     type Output = ();
 
     #[inline(always)]
@@ -35,7 +33,7 @@ impl<T: Real> WithSimd for Reduce<'_, T> {
     }
 }
 
-impl<T: Real> WithSimd for Accelerate<'_, T> {
+impl<T: Traversed> WithSimd for Accelerate<'_, T> {
     type Output = ();
 
     #[inline(always)]
@@ -46,23 +44,23 @@ impl<T: Real> WithSimd for Accelerate<'_, T> {
 }
 
 /// [`Traversal::place`] in the widest instructions.
-pub(in crate::multibody::rcr) fn place<T: Real>(reduction: &mut Reduction<T>, q: &[T], v: &[T]) {
+pub(in crate::multibody::rcr) fn place<T: Traversed>(reduction: &mut Reduction<T>, q: &[T], v: &[T]) {
     Arch::new().dispatch(Place(reduction, q, v));
 }
 
 /// [`Traversal::reduce`] in the widest instructions.
-pub(in crate::multibody::rcr) fn reduce<T: Real>(reduction: &mut Reduction<T>, task: Task, out: &mut [T]) {
+pub(in crate::multibody::rcr) fn reduce<T: Traversed>(reduction: &mut Reduction<T>, task: Task, out: &mut [T]) {
     Arch::new().dispatch(Reduce(reduction, task, out));
 }
 
 /// Both, for accelerations.
-pub(in crate::multibody::rcr) fn accelerate<T: Real>(reduction: &mut Reduction<T>, q: &[T], v: &[T], out: &mut [T]) {
+pub(in crate::multibody::rcr) fn accelerate<T: Traversed>(
+    reduction: &mut Reduction<T>,
+    q: &[T],
+    v: &[T],
+    out: &mut [T],
+) {
     Arch::new().dispatch(Accelerate(reduction, q, v, out));
-}
-
-/// Whether the processor has vector instructions. Without them eight lanes are eight times the work, and nothing is packed.
-pub(crate) fn has_lanes() -> bool {
-    !matches!(Arch::new(), Arch::Scalar)
 }
 
 /// Runs `work` over lanes in the widest instructions. It is not compiled for a processor without any: that copy would be the

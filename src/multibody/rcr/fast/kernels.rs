@@ -1,21 +1,10 @@
 //! Turns of bodies with one coordinate and a front of one or two bodies, with the rows of loops, in closed form. They do what
 //! the turn of any body does (`general.rs`, `front.rs`), in the same order, with nothing left to decide while running.
 
-use crate::multibody::rcr::reduction::{Given, Task, Workspace};
+use super::small::Small;
+use crate::multibody::rcr::data::{Given, Task, Workspace};
 use crate::multibody::rcr::scalar::Real;
 use crate::multibody::rcr::schedule::NONE;
-
-/// How small a front is: four times its bodies, and the constraint rows that reach it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::multibody::rcr) struct Small(u8);
-
-impl Small {
-    /// Of a body with one coordinate, a front of one or two bodies and at most three rows; none of any other.
-    pub(in crate::multibody::rcr) fn of(freedom: usize, front: usize, rows: usize) -> Option<Self> {
-        let small = freedom == 1 && (1..=2).contains(&front) && rows <= 3;
-        small.then_some(Self((4 * front + rows) as u8))
-    }
-}
 
 impl<T: Real> Workspace<T> {
     /// Takes the coordinate of a body with a small front out.

@@ -17,13 +17,11 @@ mod packing;
 mod subtrees;
 
 use super::dispatch::across;
-use super::lanes::Lanes;
-use crate::multibody::rcr::data::{Offsets, Reduction};
-use crate::multibody::rcr::kinematics::Placement;
-use crate::multibody::rcr::placed::Placed;
-use crate::multibody::rcr::reduction::Task;
+use crate::multibody::rcr::data::{Offsets, Task};
+use crate::multibody::rcr::lanes::Lanes;
+use crate::multibody::rcr::placed::{Placed, Placement};
+use crate::multibody::rcr::reduction::{Reduction, Traversal, Traversed};
 use crate::multibody::rcr::scalar::Real;
-use crate::multibody::rcr::traversal::Traversal;
 use crate::multibody::rcr::tree::Linkage;
 use pulp::{Simd, WithSimd};
 use std::ops::Range;
@@ -113,6 +111,11 @@ pub struct Packs {
     kept: Vec<[Wide; 9]>,
     /// Couplings handed to pairs of shared bodies.
     kept_blocks: Vec<[Wide; 9]>,
+}
+
+/// Numbers alone are laid side by side where subtrees are equal.
+impl Traversed for f64 {
+    type Traversal = Packs;
 }
 
 impl Traversal<f64> for Packs {

@@ -1,7 +1,7 @@
 //! Runs of pins: what one hands to the next stays in registers, and all that a run reads is walked side by side.
 
-use crate::multibody::rcr::pin::{Handed, Pinned, outward};
-use crate::multibody::rcr::reduction::{Given, Workspace};
+use crate::multibody::rcr::data::{Given, Handed, Workspace};
+use crate::multibody::rcr::pin::{Pinned, outward};
 use crate::multibody::rcr::scalar::Real;
 use crate::multibody::rcr::schedule::{Kind, Schedule};
 use std::ops::Range;

@@ -6,7 +6,7 @@
 
 /// Places for `of.len()` users, each of which holds one for a time.
 #[derive(Debug)]
-pub(in crate::multibody::rcr) struct Slots {
+pub(super) struct Slots {
     /// Place of each user; `u32::MAX`: none yet, or not any more.
     of: Vec<u32>,
     free: Vec<u32>,
@@ -14,12 +14,12 @@ pub(in crate::multibody::rcr) struct Slots {
 }
 
 impl Slots {
-    pub(in crate::multibody::rcr) fn new(users: usize) -> Self {
+    pub(super) fn new(users: usize) -> Self {
         Self { of: vec![u32::MAX; users], free: Vec::new(), count: 0 }
     }
 
     /// The place of `user`, who gets one if there is none yet.
-    pub(in crate::multibody::rcr) fn hold(&mut self, user: usize) -> u32 {
+    pub(super) fn hold(&mut self, user: usize) -> u32 {
         if self.of[user] == u32::MAX {
             self.of[user] = self.free.pop().unwrap_or_else(|| {
                 self.count += 1;
@@ -30,12 +30,12 @@ impl Slots {
     }
 
     /// Takes the place of `user` back.
-    pub(in crate::multibody::rcr) fn release(&mut self, user: usize) {
+    pub(super) fn release(&mut self, user: usize) {
         self.free.push(std::mem::replace(&mut self.of[user], u32::MAX));
     }
 
     /// Places that were in use at one time.
-    pub(in crate::multibody::rcr) fn count(&self) -> usize {
+    pub(super) fn count(&self) -> usize {
         self.count as usize
     }
 }

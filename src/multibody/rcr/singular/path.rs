@@ -2,10 +2,9 @@
 
 use super::room::Room;
 use super::{LIGHT, Singularity};
-use crate::multibody::rcr::data::Reduction;
-use crate::multibody::rcr::reduction::{Given, Task, Workspace};
+use crate::multibody::rcr::data::{Given, Task, Workspace};
+use crate::multibody::rcr::reduction::{Reduction, Traversal};
 use crate::multibody::rcr::schedule::NONE;
-use crate::multibody::rcr::traversal::Traversal;
 
 impl Reduction<f64> {
     /// [`Reduction::reduce`] for any configuration: in a singular one too it gives the accelerations of least constraint.

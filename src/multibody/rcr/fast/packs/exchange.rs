@@ -1,10 +1,8 @@
 //! What packs and the rest of the mechanism exchange.
 
 use super::{Packs, WIDTH, Wide};
-use crate::multibody::rcr::data::Offsets;
-use crate::multibody::rcr::kinematics::Placement;
-use crate::multibody::rcr::placed::Placed;
-use crate::multibody::rcr::reduction::Node;
+use crate::multibody::rcr::data::{Node, Offsets};
+use crate::multibody::rcr::placed::{Placed, Placement};
 use std::ops::Range;
 
 /// Copies the numbers of each lane, from where its subtree starts.

@@ -2,8 +2,8 @@
 
 use super::subtrees::equal;
 use super::{First, Hand, Item, Pack, Packing, Packs, WIDTH, Wide};
-use crate::multibody::rcr::data::Reduction;
-use crate::multibody::rcr::fast::dispatch::has_lanes;
+use crate::multibody::rcr::lanes::has_lanes;
+use crate::multibody::rcr::reduction::Reduction;
 use crate::multibody::rcr::scalar::Real;
 use crate::multibody::rcr::schedule::{NONE, Schedule};
 use crate::multibody::rcr::tree::{Closure, Link, Linkage, Parent};

@@ -1,14 +1,18 @@
 //! Lanes of numbers: variants side by side, in vector instructions.
 
-use crate::multibody::rcr::scalar::Real;
-use crate::multibody::rcr::traversal::OneByOne;
-use crate::multibody::sine::{REDUCED, reduced};
+use super::scalar::{Real, side_by_side};
+use pulp::Arch;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 /// `N` variants side by side.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(align(64))]
 pub struct Lanes<const N: usize>(pub [f64; N]);
+
+/// Whether the processor has vector instructions. Without them eight lanes are eight times the work, and nothing is packed.
+pub(crate) fn has_lanes() -> bool {
+    !matches!(Arch::new(), Arch::Scalar)
+}
 
 macro_rules! lanewise {
     ($trait:ident, $method:ident) => {
@@ -59,7 +63,6 @@ impl<const N: usize> SubAssign for Lanes<N> {
 }
 
 impl<const N: usize> Real for Lanes<N> {
-    type Traversal = OneByOne;
     const LANES: usize = N;
     const ZERO: Self = Self([0.0; N]);
     const ONE: Self = Self([1.0; N]);
@@ -77,20 +80,8 @@ impl<const N: usize> Real for Lanes<N> {
     }
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
-        let (mut sin, mut cos) = (self, self);
-        let mut far = false;
-        for k in 0..N {
-            far |= self.0[k].abs() > REDUCED;
-        }
-        for k in 0..N {
-            (sin.0[k], cos.0[k]) = reduced(self.0[k]);
-        }
-        if far {
-            for k in 0..N {
-                (sin.0[k], cos.0[k]) = Real::sin_cos(self.0[k]);
-            }
-        }
-        (sin, cos)
+        let (sin, cos) = side_by_side(&self.0);
+        (Self(sin), Self(cos))
     }
     #[inline(always)]
     fn sqrt(mut self) -> Self {
