@@ -4,13 +4,17 @@
 //!     taskset -c 0 cargo run --release --no-default-features --example compliant_speed
 //!
 //! The compliant formulation: three coordinates a body and flexible joints. What stands beside the peers' evaluation of
-//! accelerations is a solve with its residual; beside a full Newton iteration, that and a tangent with its factorization.
+//! accelerations is a solve with its residual; beside a full Newton iteration, that and a tangent with its factorization. The same in
+//! joint coordinates, loops closed by springs; `straight` is a bank whose arms are straight, as they are drawn.
 
 #[path = "../tests/topologies/mod.rs"]
 mod topologies;
 
 use bimorph::domains::{Drive, System};
+use bimorph::equations::Joints;
 use bimorph::multibody::planar::Pose;
+use bimorph::multibody::relative::JointMatrix;
+use bimorph::multibody::relative::kinematics::Placed;
 use bimorph::multibody::{BlockMatrix, forces};
 use std::hint::black_box;
 use std::sync::Arc;
@@ -23,6 +27,9 @@ fn main() {
     }
     for count in [10, 100, 1000] {
         report("bank", count, count, &topologies::arms(count, 2));
+    }
+    for count in [10, 100, 1000] {
+        report("straight", count, count, &topologies::straight_arms(count, 2));
     }
     for count in [10, 100, 1000] {
         report("ladder", count, count, &topologies::ladder(count, 1));
@@ -51,9 +58,42 @@ fn report(name: &str, count: usize, units: usize, topology: &Topology) {
         system.residual(black_box(&q), &drive, &mut x);
         a.solve(pattern, &mut x);
     });
-    for (what, time) in [("solve", per_solve), ("Newton iteration", per_factor + per_solve)] {
-        println!("bimorph compliant {what},{name},{count},{:.1}", time / units as f64);
+    let (joint_factor, joint_solve) = by_springs(&system, &q, &drive);
+    let bodies = ("compliant", per_factor, per_solve);
+    for (formulation, factor, solve) in [bodies, ("rcr by springs", joint_factor, joint_solve)] {
+        for (what, time) in [("solve", solve), ("Newton iteration", factor + solve)] {
+            println!("bimorph {formulation} {what},{name},{count},{:.1}", time / units as f64);
+        }
     }
+}
+
+/// The same in joint coordinates, loops closed by springs: nanoseconds of a tangent with its factorization, and of a residual with a solve.
+fn by_springs(system: &System, q: &[Pose], drive: &Drive) -> (f64, f64) {
+    let joints = Joints::elastic(system).unwrap_or_else(|e| panic!("{e}"));
+    let Joints { tree, closures } = &joints;
+    let mut s = q.to_vec();
+    tree.coordinates_at(q, &mut s);
+    let (mut placed, mut w) = (Placed::new(tree), JointMatrix::new(tree));
+    let (mut r, mut share, mut poses) = (q.to_vec(), q.to_vec(), q.to_vec());
+    let factor = median(|| {
+        placed.put(tree, black_box(&s));
+        placed.poses(&mut poses);
+        closures.tangent(&poses, drive, &mut w.bodies, &mut r);
+        forces::add_inertia(&system.model, 1e16, 1e8, &mut w.bodies);
+        w.factor(tree, placed.maps(), 1.0, None, Err).unwrap_or_else(|e| panic!("{e:?}"));
+    });
+    let solve = median(|| {
+        placed.put(tree, black_box(&s));
+        placed.poses(&mut poses);
+        closures.residual(&poses, drive, &mut r);
+        placed.gather(tree, &mut r, &mut share);
+        for ((share, link), s) in share.iter_mut().zip(&tree.links).zip(&s) {
+            *share += link.stress(s, &drive.rest());
+        }
+        r.fill(Pose::zeros());
+        w.solve(tree, &mut r, &mut share);
+    });
+    (factor, solve)
 }
 
 /// Median nanoseconds of thread CPU time of one call, over samples of 40 ms.

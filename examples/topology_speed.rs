@@ -2,7 +2,7 @@
 //!
 //! Prints `name,topology,count,ns` lines: `serial` for one mechanism, whose equal subtrees go side by side, `single` for the
 //! same with every body on its own, `lanes` for eight variants side by side (per variant). A chain counts bodies, a bank (arms
-//! of two rods to ground) and a ladder count loops. Best of several runs of the whole evaluation: positions, rates, velocity
+//! of two rods to ground) and a ladder count loops; `straight` is the bank as it is drawn, by the path for singular configurations. Best of several runs of the whole evaluation: positions, rates, velocity
 //! parts, reduction and accelerations.
 //!
 //! `cargo run --release --no-default-features --example topology_speed [COUNT…]`
@@ -10,7 +10,7 @@
 #[path = "../tests/topologies/mod.rs"]
 mod topologies;
 
-use bimorph::multibody::rcr::{Lanes, Linkage, Real, Reduction};
+use bimorph::multibody::rcr::{Lanes, Linkage, Real, Reduction, Task};
 use std::hint::black_box;
 use std::time::Instant;
 use topologies::Topology;
@@ -61,6 +61,22 @@ fn measure(name: &str, count: usize, topology: &Topology) {
     assert!(equal, "a lane's bits differ from the serial run's");
 }
 
+/// One evaluation of a bank as it is drawn: its arms are straight, and with constraints in the place of springs each loop is singular there.
+fn drawn(count: usize) {
+    let linkage = &Linkage::new(&topologies::straight_arms(count, 2).pinned());
+    let n = linkage.coordinates;
+    let (q, v, mut out) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+    let mut serial = Reduction::<f64>::new(&[linkage]);
+    serial.force.fill([1e-9, -1e-8, 0.0]);
+    serial.place(&q, &v);
+    let met = serial.solve(Task::Accelerations, &mut out);
+    let t = best(|| {
+        serial.place(black_box(&q), black_box(&v));
+        serial.solve(Task::Accelerations, &mut out);
+    });
+    println!("{},straight,{count},{:.1}", if met.is_some() { "singular" } else { "serial" }, t / count as f64);
+}
+
 fn main() {
     let counts: Vec<usize> = std::env::args().skip(1).filter_map(|a| a.parse().ok()).collect();
     let counts = if counts.is_empty() { vec![10, 100, 1000] } else { counts };
@@ -68,6 +84,7 @@ fn main() {
     for &n in &counts {
         measure("chain", n, &topologies::chain(n));
         measure("bank", n, &topologies::arms(n, 2));
+        drawn(n);
         measure("ladder", n, &topologies::ladder(n, 1));
     }
 }

@@ -76,7 +76,7 @@ def run(drawing, steps):
 
 
 def main():
-    for kind, counts in (("chain", (10, 100, 400)), ("bank", (10, 30, 100)), ("ladder", (10, 30, 100))):
+    for kind, counts in (("chain", (10, 100, 400)), ("bank", (10, 30, 100)), ("straight", (10, 30, 100)), ("ladder", (10, 30, 100))):
         for count in counts:
             drawing = MAKE[kind](count)
             differences = []

@@ -2,6 +2,7 @@
 
 chain    N rods in a row, the first on ground
 bank     a free hub held by N two-rod arms, each pinned to ground and to the hub; kinked by 0.3 rad
+straight the same with straight arms, as banks are drawn: a singular configuration
 ladder   two rails of N rods from ground, the ends of each pair of rods joined by a rung
 
 `bodies` is what the figures are divided by for a chain, `loops` for the others: one loop an arm (the hub is free, so that
@@ -49,12 +50,12 @@ def chain(count):
     return Drawing("chain", count, tuple(angles), tuple(start))
 
 
-def bank(count):
+def bank(count, kink=KINK):
     """Rods 2k (from ground) and 2k + 1 (to the hub at the origin), the k-th arm's ground pin in its own direction."""
     angles, start = [], []
     for k in range(count):
         angle = TURN + 2 * math.pi * k / count
-        first, second = angle + KINK / 2, angle - KINK / 2
+        first, second = angle + kink / 2, angle - kink / 2
         elbow = tuple(-x for x in along(second))
         foot = tuple(e - x for e, x in zip(elbow, along(first)))
         angles += [first, second]
@@ -73,4 +74,8 @@ def ladder(count):
     return Drawing("ladder", count, tuple(angles), tuple(start))
 
 
-MAKE = {"chain": chain, "bank": bank, "ladder": ladder}
+def straight(count):
+    return bank(count, 0.0)
+
+
+MAKE = {"chain": chain, "bank": bank, "straight": straight, "ladder": ladder}

@@ -225,6 +225,15 @@ pub fn ladder(cells: usize, links: usize) -> Topology {
 
 /// A hub held by `count` kinked arms of `links` rods from ground.
 pub fn arms(count: usize, links: usize) -> Topology {
+    bent_arms(count, links, KINK)
+}
+
+/// The same with straight arms, as they are drawn.
+pub fn straight_arms(count: usize, links: usize) -> Topology {
+    bent_arms(count, links, 0.0)
+}
+
+fn bent_arms(count: usize, links: usize, kink: f64) -> Topology {
     let mut t = Topology::default();
     let hub = t.body(Vector2::zeros(), 20.0);
     for k in 0..count {
@@ -232,7 +241,7 @@ pub fn arms(count: usize, links: usize) -> Topology {
         let angle = 0.6435 + if k % 2 == 0 { 0.0 } else { std::f64::consts::PI };
         let (along, across) = (Vector2::new(angle.cos(), angle.sin()), Vector2::new(-angle.sin(), angle.cos()));
         let foot = -along * (ROD * (links + 1) as f64) + across * (10e-6 * (k / 2) as f64);
-        let end = t.rods(End { body: None, at: foot }, links, |k| angle + if 2 * k < links { KINK } else { -KINK });
+        let end = t.rods(End { body: None, at: foot }, links, |k| angle + if 2 * k < links { kink } else { -kink });
         t.join(end.body, hub, end.at, angle);
     }
     t
