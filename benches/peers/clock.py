@@ -23,4 +23,4 @@ def median_ns(call, budget=1.0, least=5, most=200):
 
 def line(name, drawing, nanoseconds):
     """`name,topology,count,ns_per_body_or_loop`"""
-    print(f"{name},{drawing.kind},{drawing.count},{nanoseconds / drawing.per:.1f}", flush=True)
+    print(f"{name},{drawing.label},{drawing.count},{nanoseconds / drawing.per:.1f}", flush=True)

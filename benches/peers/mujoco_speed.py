@@ -62,7 +62,8 @@ def build(drawing):
 
 
 def main():
-    for kind, counts in (("chain", (1, 10, 100, 400)), ("bank", (10, 30, 100)), ("straight", (10, 30, 100)), ("ladder", (10, 30, 100))):
+    some = (10, 30, 100)
+    for kind, counts in (("chain", (1, 10, 100, 400)), ("bank", some), ("straight", some), ("ladder", some)):
         for count in counts:
             drawing = MAKE[kind](count)
             model = build(drawing)

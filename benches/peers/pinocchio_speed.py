@@ -78,7 +78,8 @@ def gap(model, constraints, q):
 
 
 def main():
-    for kind, counts in (("chain", (1, 10, 100, 400)), ("bank", (10, 30, 100)), ("straight", (10, 30, 100)), ("ladder", (10, 30, 100))):
+    some = (10, 30, 100)
+    for kind, counts in (("chain", (1, 10, 100, 400)), ("bank", some), ("straight", some), ("ladder", some)):
         for count in counts:
             drawing = MAKE[kind](count)
             model, constraints = build(drawing)

@@ -10,7 +10,7 @@ every arm closes one), one a rung.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 GRAVITY = 9.81
 TURN = 0.6435  # rad: nothing lies along an axis
@@ -19,12 +19,17 @@ KINK = 0.3
 
 @dataclass(frozen=True)
 class Drawing:
-    """`angles[i]` is the angle of rod i to the x axis; `start[i]` where it starts."""
+    """`angles[i]` is the angle of rod i to the x axis; `start[i]` where it starts; `name` what it is called, if not by its kind."""
 
     kind: str
     count: int
     angles: tuple
     start: tuple
+    name: str = ""
+
+    @property
+    def label(self):
+        return self.name or self.kind
 
     @property
     def loops(self):
@@ -75,7 +80,7 @@ def ladder(count):
 
 
 def straight(count):
-    return bank(count, 0.0)
+    return replace(bank(count, 0.0), name="straight")
 
 
 MAKE = {"chain": chain, "bank": bank, "straight": straight, "ladder": ladder}

@@ -40,10 +40,16 @@ pub(crate) fn footing(compiled: &Compiled, unknowns: usize) -> String {
     format!("{unknowns} unknowns, {}", options(compiled))
 }
 
+/// By how much four digits may be off at most [1].
+const ROUNDED: f64 = 5e-4;
+
 /// The options of a model in one line.
 pub(crate) fn options(compiled: &Compiled) -> String {
     let options = &compiled.options;
     let mut text = format!("tolerance {:e}", options.tol);
+    if options.tol < ROUNDED {
+        text += " (shown to four digits; --json has all)";
+    }
     if let Some(band) = options.band {
         let _ = write!(text, ", band {}", quantity(band, "Hz"));
     }
