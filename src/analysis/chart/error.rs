@@ -7,6 +7,9 @@
 use crate::analysis::mesh::seen::SHARE;
 use crate::analysis::transient::TransientResult;
 
+/// A signal: name, unit, samples.
+type Named = (String, String, Vec<f64>);
+
 /// The error of `found` relative to the amplitude of `reference`; infinite where a motion stands against none, or is not
 /// finite. Both have the same signals at the same times.
 pub fn relative_error(reference: &TransientResult, found: &TransientResult) -> f64 {
@@ -33,7 +36,7 @@ pub fn largest_error(reference: &TransientResult, found: &TransientResult, least
         let swings = reference.signals.iter().filter(|s| s.1 == unit).map(|s| half_range(&s.2));
         swings.fold(0.0, f64::max)
     };
-    let error = |(want, got): (&(String, String, Vec<f64>), &(String, String, Vec<f64>))| {
+    let error = |(want, got): (&Named, &Named)| {
         let amplitude = half_range(&want.2).max(SHARE * largest(&want.1)).max(least(&want.1));
         quotient((squares(&want.2, &got.2) / want.2.len().max(1) as f64).sqrt(), amplitude)
     };
