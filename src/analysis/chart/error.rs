@@ -29,7 +29,7 @@ pub fn relative_error(reference: &TransientResult, found: &TransientResult) -> f
     worst
 }
 
-/// The largest error of a signal of `found`, relative to its own amplitude in `reference`, to [`SHARE`] of the largest of its unit, or to
+/// The largest error of a signal of `found`, relative to its own amplitude in `reference`, to a thirtieth of the largest of its unit, or to
 /// what `least` says of the unit, whichever is most: what swings less than that is measured by it.
 pub fn largest_error(reference: &TransientResult, found: &TransientResult, least: &dyn Fn(&str) -> f64) -> f64 {
     let largest = |unit: &str| {
