@@ -56,7 +56,7 @@ pub fn fit<E>(
         passes,
     };
     let mut coarse = analyse(&segments)?;
-    let (mut before, mut slow) = (f64::INFINITY, 0);
+    let (mut before, mut slow) = ((f64::INFINITY, usize::MAX), 0);
     // of all that were compared: where rounding begins, finer meshes are worse
     let mut best: Option<ModelOrder> = None;
     for passes in 1..=MOST_PASSES {
@@ -74,12 +74,15 @@ pub fn fit<E>(
             return Ok(here);
         }
         best = Some(best.filter(|best| best.estimated_error.is_some_and(|least| least <= worst)).unwrap_or(here));
-        // where the prediction did not help, twice the segments do; if not, it is a kink of the results (contact, a snap), or rounding
-        slow = if worst > 0.5 * before { slow + 1 } else { 0 };
+        // where the prediction did not help, twice the segments do; if not, it is a kink of the results (contact, a snap), or rounding.
+        // A few segments more need not halve the error
+        let all = segments.iter().sum::<usize>();
+        let fewer = (before.1 as f64 / all as f64).clamp(0.5, 1.0);
+        slow = if worst > fewer * before.0 { slow + 1 } else { 0 };
         if passes == MOST_PASSES || slow > 1 {
             break;
         }
-        before = worst;
+        before = (worst, all);
         if slow == 1 {
             (segments, coarse) = (twice, fine);
             continue;

@@ -4,8 +4,10 @@
 //! amplitude (half of the range) among them in the reference. Of several units the largest error counts. What a run tells of itself
 //! ([`largest_error`]) is of each signal alone.
 
-use crate::analysis::mesh::seen::SHARE;
 use crate::analysis::transient::TransientResult;
+
+/// Share of the largest swing of a unit by which a signal that swings less is measured.
+pub(crate) const SHARE: f64 = 1.0 / 30.0;
 
 /// A signal: name, unit, samples.
 type Named = (String, String, Vec<f64>);

@@ -23,7 +23,7 @@ mod in_band;
 mod meshed;
 mod path;
 mod pull_in;
-pub(crate) mod seen;
+mod seen;
 mod swung;
 mod unasked;
 mod warnings;

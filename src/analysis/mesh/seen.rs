@@ -1,17 +1,15 @@
 //! What the signals of a run see of small motions about a state.
 //!
 //! A part that hardly moves beside another is all that a signal on it shows. So each signal is measured by its own swing, or by
-//! [`SHARE`] of the largest of its unit where that is more: what swings less than that beside another is a small part of a picture.
+//! [`SHARE`](super::super::chart::error::SHARE) of the largest of its unit where that is more: what swings less than that beside another is a small part of a picture.
 
+use super::super::chart::error::SHARE;
 use super::super::signal::{Signal, View};
 use super::super::statics::OperatingPoint;
 use super::super::step_error;
 use super::super::transient::TransientOptions;
 use crate::compile::Compiled;
 use crate::multibody::planar::Pose;
-
-/// Share of the largest swing of a unit by which a signal that swings less is measured.
-pub(crate) const SHARE: f64 = 1.0 / 30.0;
 
 /// The signals of a run about a state.
 pub(super) struct Seen<'a> {
