@@ -146,7 +146,7 @@ fn folds_have_modes_on_any_mesh() {
         modes(&compile(&Bundle::from_text("fold.net", text), &options).unwrap(), 3, &[]).unwrap().frequencies_hz
     };
     let finest = cut(256);
-    for n in [16, 64] {
+    for n in [32, 64] {
         for (a, b) in cut(n).iter().zip(&finest) {
             assert!((a / b - 1.0).abs() < 1e-4, "{n}: {a:e}, {b:e}");
         }
