@@ -8,11 +8,12 @@ pub use super::bar::{SHEAR_COEFFICIENT, bar};
 use super::junction_springs::End;
 use super::rigid::{Assembly, Lump};
 use super::scheme::{Bar, Cut, Pin};
+use super::sprung::second_strain;
 use crate::domains::Point;
 use crate::multibody::{BodyName, Coupling, Joint};
 use crate::options::{CompileOptions, Junctions, Scheme};
 use crate::structure::Beam;
-use nalgebra::{Matrix3, Vector2};
+use nalgebra::{Matrix2, Matrix3, Vector2};
 use std::sync::Arc;
 
 /// Joints of the model in the making.
@@ -51,7 +52,7 @@ pub fn lay(
     let give = shear_flexibility(beam);
     let drawn_as = Drawn { bar, give, segments, wall: rigid.grounded(beam.b.0), ends: *ends };
     let Joints { joints, couplings, bodies, known } = out;
-    let Sprung { cut, stiffness, .. } = sprung(known, drawn_as, options);
+    let Sprung { cut, strained, .. } = sprung(known, drawn_as, options);
     let segments = segments.max(1);
     let last = cut.parts.len() - 1;
     let name = if last > 1 { Arc::from(beam.name.as_str()) } else { Arc::default() };
@@ -77,7 +78,7 @@ pub fn lay(
         - m.stress / m.youngs_modulus;
     // what is drawn expands, junctions included
     let whole = beam.length / bar.length;
-    for ((pin, &stiffness), between) in cut.pins.iter().zip(stiffness).zip(bodies.windows(2)) {
+    for ((pin, &(stiffness, second)), between) in cut.pins.iter().zip(strained).zip(bodies.windows(2)) {
         let (a, b) = (between[0], between[1]);
         if a.body == b.body {
             continue; // both ends on one rigid body: nothing can strain
@@ -87,7 +88,7 @@ pub fn lay(
             b: b.body,
             frame: rigid.frame_at(a, b, place(pin.at), along),
             stiffness,
-            second: pin.second,
+            second,
             expansion: heater.map(|group| (group, whole * pin.length)),
             rest: whole * pin.length * strain,
             locked: pin.locked,
@@ -120,12 +121,15 @@ struct Drawn {
     ends: [End; 2],
 }
 
-/// A beam that was cut, with the stiffness of its joints, junctions included.
+/// Stress per strain of a joint, and its second-order axial strain.
+type Strained = (Matrix3<f64>, Matrix2<f64>);
+
+/// A beam that was cut, with the stiffness of its joints and their second-order strain, junctions included.
 #[derive(Debug, Clone)]
 struct Sprung {
     drawn: Drawn,
     cut: Cut,
-    stiffness: Vec<Matrix3<f64>>,
+    strained: Vec<Strained>,
 }
 
 /// The beam cut, or found among those that were.
@@ -139,66 +143,76 @@ fn sprung<'a>(known: &'a mut Vec<Sprung>, drawn: Drawn, options: &CompileOptions
     // a rigid beam is the rods of a single segment, which its one body holds together
     let scheme = if drawn.segments == 0 { Scheme::B } else { options.scheme };
     let cut = scheme.cut(&drawn.bar, drawn.segments.max(1), drawn.wall);
-    let stiffness = if options.junctions == Junctions::Calibrated {
+    let strained = if options.junctions == Junctions::Calibrated {
         let mut springs = Springs::default();
         (0..cut.pins.len()).map(|k| springs.with(&drawn, &cut, k)).collect()
     } else {
-        cut.pins.iter().map(|pin| pin.stiffness).collect()
+        cut.pins.iter().map(|pin| (pin.stiffness, pin.second)).collect()
     };
-    known.push(Sprung { drawn, cut, stiffness });
+    known.push(Sprung { drawn, cut, strained });
     &known[known.len() - 1]
 }
 
 /// What the joints of one beam have in common: they are mostly alike.
 #[derive(Default)]
 struct Springs {
-    /// The last joint away from the ends, and its stiffness.
-    inner: Option<(Pin, Matrix3<f64>)>,
+    /// The last joint away from the ends, and what it is.
+    inner: Option<(Pin, Strained)>,
     /// The last stiffness, and its inverse.
     own: Option<(Matrix3<f64>, Option<Matrix3<f64>>)>,
 }
 
 impl Springs {
     /// [`Springs::with_ends`] of joint `k`.
-    fn with(&mut self, drawn: &Drawn, cut: &Cut, k: usize) -> Matrix3<f64> {
+    fn with(&mut self, drawn: &Drawn, cut: &Cut, k: usize) -> Strained {
         let pin = &cut.pins[k];
         if k == 0 || k == cut.pins.len() - 1 {
             return self.with_ends(drawn, cut, k);
         }
         let alike = |last: &Pin| (last.stiffness, last.length, last.locked) == (pin.stiffness, pin.length, pin.locked);
         match &self.inner {
-            Some((last, stiffness)) if alike(last) => *stiffness,
+            Some((last, (stiffness, _))) if alike(last) => (*stiffness, pin.second),
             _ => {
-                let stiffness = self.with_ends(drawn, cut, k);
-                self.inner = Some((*pin, stiffness));
-                stiffness
+                let strained = self.with_ends(drawn, cut, k);
+                self.inner = Some((*pin, strained));
+                strained
             }
         }
     }
 
-    /// Stiffness of joint `k` of a cut beam with the shear compliance of its segment and the springs of the ends next to it.
+    /// Joint `k` of a cut beam with the shear compliance of its segment and the springs of the ends next to it.
     ///
     /// A joint with rigid directions takes the bending part of the springs alone.
-    fn with_ends(&mut self, drawn: &Drawn, cut: &Cut, k: usize) -> Matrix3<f64> {
+    fn with_ends(&mut self, drawn: &Drawn, cut: &Cut, k: usize) -> Strained {
         let Drawn { bar, give, ends, .. } = drawn;
         let pin = &cut.pins[k];
+        let next = [(k == 0).then_some(&ends[0]), (k == cut.pins.len() - 1).then_some(&ends[1])];
         let mut springs = Matrix3::zeros();
-        if k == 0 {
-            springs += ends[0].at_joint(pin.at, true);
+        if let Some(end) = next[0] {
+            springs += end.at_joint(pin.at, true);
         }
-        if k == cut.pins.len() - 1 {
-            springs += ends[1].at_joint(bar.length - pin.at, false);
+        if let Some(end) = next[1] {
+            springs += end.at_joint(bar.length - pin.at, false);
         }
-        if pin.locked != [false; 3] {
+        let locked = pin.locked != [false; 3];
+        if locked {
             let bent = springs[(2, 2)];
             springs = Matrix3::zeros();
             springs[(2, 2)] = bent;
         }
-        let Some(mut own) = self.compliance(&pin.stiffness) else { return pin.stiffness };
+        let plain = (pin.stiffness, pin.second);
+        let Some(mut own) = self.compliance(&pin.stiffness) else { return plain };
         if bar.shear == 0.0 && !pin.locked[1] {
             own[(1, 1)] += pin.length * give;
         }
-        (own + springs).cholesky().map_or(pin.stiffness, |whole| whole.inverse())
+        let Some(whole) = (own + springs).cholesky() else { return plain };
+        // what only turns has no second-order strain
+        let second = if locked || next == [None; 2] {
+            pin.second
+        } else {
+            second_strain(&pin.second, pin.length, &own.fixed_view::<2, 2>(1, 1).into_owned(), next)
+        };
+        (whole.inverse(), second)
     }
 
     /// Inverse of a joint's own stiffness.

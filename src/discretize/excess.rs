@@ -1,10 +1,18 @@
 //! What junctions have of mass and drag twice, and what they lack: made up for once a drawing, whatever its mesh.
+//!
+//! It is taken off the body of the junction's node, of which the beams' rigid ends are the part that no mesh changes. Where beams lie along
+//! each other for longer than those, as where one folds straight back over the other, only so much goes as leaves half of that part: what is
+//! drawn twice further out stays, as fine meshes would else have bodies of less than no mass.
 
 use super::beam::drag_per_mass;
-use super::overlap::{Strip, overlap};
+use super::junction_springs::End;
+use super::overlap::{Strip, overlap, turn};
 use super::rigid::{Assembly, Lump};
 use crate::structure::{Beam, Structure};
+use nalgebra::Vector2;
 
+/// Sharpest turn up to which beams lie above each other within their rigid ends only [rad].
+const SHARPEST: f64 = 0.75 * std::f64::consts::PI;
 /// Share of the mass that beams bring to a junction which it may have twice.
 const MOST_MASS: f64 = 0.5;
 
@@ -58,8 +66,8 @@ impl Excess {
     }
 }
 
-/// Of each junction of a drawing.
-pub(super) fn find(structure: &Structure, meetings: &Meetings, undamped: bool) -> Vec<Excess> {
+/// Of each junction of a drawing whose beams end so.
+pub(super) fn find(structure: &Structure, ends: &[[End; 2]], meetings: &Meetings, undamped: bool) -> Vec<Excess> {
     let mut shortest = vec![f64::INFINITY; structure.nodes.len()];
     let mut brought = vec![0.0; structure.nodes.len()];
     for beam in &structure.beams {
@@ -85,7 +93,14 @@ pub(super) fn find(structure: &Structure, meetings: &Meetings, undamped: bool) -
         let whole = mass * room;
         // where junctions of stout beams overlap in turn, no more goes than leaves half of what the beams bring
         let left = MOST_MASS * brought[node] / (whole * excess.amount).max(f64::MIN_POSITIVE);
-        let mass = scaled(excess, -whole * left.min(1.0));
+        let mut left = left.min(1.0);
+        if folded(&strips) {
+            let end = |beam: usize| &ends[beam][usize::from(structure.beams[beam].a.0 != node)];
+            let rods = meeting.iter().map(|(strip, beam)| rod(strip, &structure.beams[*beam], end(*beam).offset));
+            let rods = rods.fold(Lump::default(), |sum, rod| plus(sum, rod, 1.0));
+            left = left.min(spared(&rods, &scaled(excess, whole)));
+        }
+        let mass = scaled(excess, -whole * left);
         let drag = |beam: &Beam| drag_per_mass(beam, undamped);
         let first = beams().next().map_or(0.0, drag);
         if beams().all(|beam| drag(beam) == first) {
@@ -94,10 +109,48 @@ pub(super) fn find(structure: &Structure, meetings: &Meetings, undamped: bool) -
         }
         let film = |b: &Beam| if b.material.density > 0.0 { drag(b) * b.material.density * b.thickness } else { 0.0 };
         let most = weigh(&mut strips, beams().map(film));
-        let twice = scaled(overlap(&strips), -most * room * left.min(1.0));
+        let twice = scaled(overlap(&strips), -most * room * left);
         all.push(Excess { node, mass, drag_per_mass: 0.0, drag: Some(twice) });
     }
     all
+}
+
+/// True where two beams lie along each other, one turning back sharply.
+fn folded(strips: &[Strip]) -> bool {
+    let others = |k: usize| strips.iter().skip(k + 1);
+    strips.iter().enumerate().any(|(k, strip)| others(k).any(|other| turn(strip.angle, other.angle) > SHARPEST))
+}
+
+/// The rigid end of a beam, of a length, about its node.
+fn rod(strip: &Strip, beam: &Beam, length: f64) -> Lump {
+    let amount = beam.material.density * beam.width * beam.thickness * length;
+    let along = Vector2::new(strip.angle.cos(), strip.angle.sin());
+    let second = amount * (length * length / 3.0 + beam.width * beam.width / 12.0);
+    Lump { amount, first: along * (0.5 * length * amount), second }
+}
+
+/// The largest share of what is there twice that leaves half of the mass of rigid ends, and half of its inertia about its centre.
+fn spared(rods: &Lump, twice: &Lump) -> f64 {
+    let inertia = |lump: &Lump| lump.second - lump.first.norm_squared() / lump.amount.max(f64::MIN_POSITIVE);
+    let enough = |share: f64| {
+        let rest = plus(*rods, *twice, -share);
+        rest.amount >= 0.5 * rods.amount && inertia(&rest) >= 0.5 * inertia(rods)
+    };
+    let (mut low, mut high) = (0.0, 1.0);
+    if enough(high) {
+        return high;
+    }
+    for _ in 0..f64::MANTISSA_DIGITS {
+        let middle = 0.5 * (low + high);
+        (low, high) = if enough(middle) { (middle, high) } else { (low, middle) };
+    }
+    low
+}
+
+fn plus(sum: Lump, lump: Lump, share: f64) -> Lump {
+    let mut sum = sum;
+    sum.add(&lump, Vector2::zeros(), share);
+    sum
 }
 
 /// Gives strips their shares in the largest of some amounts per area, which it returns.

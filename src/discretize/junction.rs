@@ -145,7 +145,7 @@ pub fn find(structure: &Structure, rigid: &Assembly, kind: Junctions, undamped: 
             known.push((bar, raw, *both));
         }
     }
-    ends.excess = excess::find(structure, &ends.meetings, undamped);
+    ends.excess = excess::find(structure, &ends.beams, &ends.meetings, undamped);
     ends
 }
 

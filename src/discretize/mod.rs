@@ -15,6 +15,7 @@
 //! | [`junction_limits`] | where a drawing goes beyond the table of junctions |
 //! | [`junction_springs`] | offset and spring at the end of a beam |
 //! | [`junction_table`] | the springs' numbers, from plane stress |
+//! | `sprung` | the second-order strain of segments that end in those springs |
 //! | `excess` | mass and drag that junctions have twice, or lack |
 //! | [`overlap`] | mass that is drawn twice where beams meet |
 //! | [`scheme`] | ways to cut a beam: places, stiffness and second-order strain of joints, masses |
@@ -38,6 +39,7 @@ pub mod overlap;
 pub mod ports;
 pub mod rigid;
 pub mod scheme;
+mod sprung;
 pub mod yielded;
 
 pub use crate::options::{Junctions, Scheme};

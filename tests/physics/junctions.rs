@@ -134,3 +134,21 @@ fn in_line_is_no_junction() {
         close(parts, whole, 1e-9);
     }
 }
+
+/// A beam that folds back over another, at a turn of 178° beyond the table: what is drawn twice takes no body's mass away, so that there are
+/// modes with any number of segments, and they converge.
+#[test]
+fn folds_have_modes_on_any_mesh() {
+    let text = "process p = [Youngsmodulus=165e9 density=2300 h=2u]\nanchor p [a] []\nbeam2d p [a b] [l=100u w=4u]\n\
+                beam2d p [b c] [l=100u w=2u oz=deg(178)]\n";
+    let cut = |n: usize| {
+        let options = CompileOptions { segments: Some(n), ..CompileOptions::default() };
+        modes(&compile(&Bundle::from_text("fold.net", text), &options).unwrap(), 3, &[]).unwrap().frequencies_hz
+    };
+    let finest = cut(256);
+    for n in [32, 64] {
+        for (a, b) in cut(n).iter().zip(&finest) {
+            assert!((a / b - 1.0).abs() < 1e-4, "{n}: {a:e}, {b:e}");
+        }
+    }
+}

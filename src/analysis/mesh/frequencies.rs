@@ -6,12 +6,19 @@ use super::equilibrium;
 use super::meshed::{chosen, meshed, on};
 use crate::compile::Compiled;
 use crate::discretize::DiscretizeError;
+use crate::options::{CompileOptions, Junctions};
 use crate::refine::counted;
 use crate::refine::doubling::{self, Output};
 use crate::refine::model_order::ModelOrder;
 
 /// Modes beyond which none are compared with those of a finer mesh: their own estimates stand.
 const MOST_COMPARED: usize = 64;
+
+/// Tolerance below which the estimate of modes with calibrated junctions is compared with twice the segments: what it does not know, the mass of
+/// half a segment on the wrong side of a junction's spring, falls with the first power of the segments and was found up to 1e-5.
+const FINEST_KNOWN: f64 = 3e-5;
+/// What is left of an error of the first order over what the comparison, which takes it for one of the second, says.
+const FIRST_ORDER: f64 = 1.5;
 
 /// The modes on the mesh for them, which comes with them, and the displacement of points along every beam.
 ///
@@ -61,15 +68,24 @@ pub(super) fn for_modes(
         let model = meshed(compiled, segments)?;
         Ok::<_, AnalysisError>(frequency_outputs(&modes(&model, count, voltages)?, count))
     };
+    let fine = is_fine(compiled);
+    let mut fit = |segments: Vec<usize>| {
+        if !fine {
+            return doubling::fit(&compiled.structure, &compiled.options, segments, &mut analyse);
+        }
+        let options = CompileOptions { tol: compiled.options.tol / FIRST_ORDER, ..compiled.options.clone() };
+        let order = doubling::fit(&compiled.structure, &options, segments, &mut analyse)?;
+        Ok(ModelOrder { estimated_error: order.estimated_error.map(|error| FIRST_ORDER * error), ..order })
+    };
     if !loaded {
         // modes about the drawing know their errors, where the scheme lets them
         let (order, found) = own_estimate(compiled, order, count, &[])?;
-        if order.estimated_error.is_some() || count > MOST_COMPARED {
+        if (order.estimated_error.is_some() && (given || !fine)) || count > MOST_COMPARED {
             return Ok((order, found));
         }
         let order = match given {
             true => doubling::estimate(&compiled.options, order.segments, &mut analyse),
-            false => doubling::fit(&compiled.structure, &compiled.options, order.segments, &mut analyse),
+            false => fit(order.segments),
         };
         return Ok((order?, found));
     }
@@ -81,14 +97,19 @@ pub(super) fn for_modes(
     let worst = |a: Option<f64>, b: Option<f64>| Some(a?.max(b?));
     let carried = found.as_ref().is_some_and(|(_, (modes, _))| is_carried(compiled, modes, still.estimated_error));
     let enough = carried && own.estimated_error.is_some_and(|error| error <= counted::SAFETY * compiled.options.tol);
-    if enough || count > MOST_COMPARED {
+    if (enough && !fine) || count > MOST_COMPARED {
         let faster = found.as_ref().map_or(1.0, |(_, (modes, _))| modes.per_deflection.max(1.0));
         let moved = still.estimated_error.map(|error| if carried { error } else { error * faster });
         let estimated_error = worst(moved, own.estimated_error);
         return Ok((ModelOrder { estimated_error, ..own }, found));
     }
-    let moving = doubling::fit(&compiled.structure, &compiled.options, still.segments, &mut analyse)?;
+    let moving = fit(own.segments)?;
     Ok((ModelOrder { estimated_error: worst(still.estimated_error, moving.estimated_error), ..moving }, found))
+}
+
+/// Whether the tolerance is finer than what modes of the drawing know of their errors.
+pub(super) fn is_fine(compiled: &Compiled) -> bool {
+    compiled.options.junctions == Junctions::Calibrated && compiled.options.tol < FINEST_KNOWN
 }
 
 /// Whether what the mesh leaves uncertain of the equilibrium moves no frequency beyond the tolerance: next to a fold it does.

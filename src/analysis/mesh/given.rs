@@ -10,7 +10,7 @@ use super::super::pull_in::{PullInResult, pull_in};
 use super::super::statics::{OperatingPoint, StaticResult, operating_point, result_at};
 use super::super::{AnalysisError, PortVoltages};
 use super::equilibrium::{self, told_of_static};
-use super::frequencies::{frequency_outputs, is_carried, worst};
+use super::frequencies::{frequency_outputs, is_carried, is_fine, worst};
 use super::meshed::meshed;
 use super::pull_in::{pull_in_outputs, told_of_pull_in};
 use super::{Request, fitted};
@@ -141,7 +141,7 @@ pub(crate) fn judged_modes(
     let loaded = about_equilibrium(compiled, voltages);
     let moved = if loaded { equilibrium::judged(compiled, voltages)?.1 } else { Some(0.0) };
     let (own, sure) = match own {
-        Some(_) if !loaded || (sure && is_carried(compiled, &found, moved)) => (own, sure),
+        Some(_) if !is_fine(compiled) && (!loaded || (sure && is_carried(compiled, &found, moved))) => (own, sure),
         _ => doubled(compiled, &found, count, voltages)?,
     };
     let estimated_error = moved.zip(own).map(|(a, b)| a.max(b));
