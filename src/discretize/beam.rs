@@ -186,7 +186,9 @@ impl Springs {
     fn with_ends(&mut self, drawn: &Drawn, cut: &Cut, k: usize) -> Strained {
         let Drawn { bar, give, ends, .. } = drawn;
         let pin = &cut.pins[k];
+        // an end without a spring is none: the joint is then one of the others to the last bit
         let next = [(k == 0).then_some(&ends[0]), (k == cut.pins.len() - 1).then_some(&ends[1])];
+        let next = next.map(|end| end.filter(|end| end.spring != Matrix3::zeros()));
         let mut springs = Matrix3::zeros();
         if let Some(end) = next[0] {
             springs += end.at_joint(pin.at, true);
