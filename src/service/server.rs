@@ -25,6 +25,7 @@ use crate::device::local::LocalDevice;
 use std::future::Future;
 use std::io::IsTerminal;
 use std::path::PathBuf;
+use std::pin::Pin;
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::net::TcpListener;
@@ -51,7 +52,7 @@ const LAST_WORDS: Duration = Duration::from_millis(200);
 /// # Errors
 /// [`ServeError`]; a clean stop is `Ok`.
 pub async fn run(options: ServeOptions, shutdown: impl Future<Output = ()> + Send) -> Result<(), ServeError> {
-    run_with(options, |compiled| Box::new(LocalDevice::new(compiled)), shutdown).await
+    serve(options, |compiled| Box::new(LocalDevice::new(compiled)), Box::pin(shutdown)).await
 }
 
 /// [`run`] with devices of another make: a measuring or a faulty one, say.
@@ -63,6 +64,18 @@ pub async fn run_with(
     make: MakeDevice,
     shutdown: impl Future<Output = ()> + Send,
 ) -> Result<(), ServeError> {
+    serve(options, make, Box::pin(shutdown)).await
+}
+
+/// Something to wait for, whatever it is.
+type Waiting<'a, T> = Pin<Box<dyn Future<Output = T> + Send + 'a>>;
+
+/// [`run_with`], compiled once, here: the service of every program that runs one.
+fn serve(options: ServeOptions, make: MakeDevice, shutdown: Waiting<'_, ()>) -> Waiting<'_, Result<(), ServeError>> {
+    Box::pin(serve_until(options, make, shutdown))
+}
+
+async fn serve_until(options: ServeOptions, make: MakeDevice, shutdown: Waiting<'_, ()>) -> Result<(), ServeError> {
     let ServeOptions {
         listen,
         guard,

@@ -10,20 +10,21 @@ use super::tree::Linkage;
 impl<T: Traversed> Reduction<T> {
     /// Places all bodies for coordinates `q` and rates `v`.
     pub fn place(&mut self, q: &[T], v: &[T]) {
-        fast::place(self, q, v);
+        T::place(self, q, v);
     }
 
     /// Solves for `task` at the placed configuration; `out` receives q̈, or the change of the rates or coordinates.
     ///
     /// The result is right to rounding times the square of [`Reduction::nearness`].
     pub fn reduce(&mut self, task: Task, out: &mut [T]) {
-        fast::reduce(self, task, out);
+        T::reduce(self, task, out);
     }
 
     /// Places the bodies at `q`, `v` and finds q̈ in `out`, with the forces that [`Reduction::force`] and
     /// [`Reduction::torque`] hold: [`Reduction::place`] and [`Reduction::reduce`] at one go.
     pub fn accelerate(&mut self, q: &[T], v: &[T], out: &mut [T]) {
-        fast::accelerate(self, q, v, out);
+        T::place(self, q, v);
+        T::reduce(self, Task::Accelerations, out);
     }
 }
 
@@ -75,4 +76,12 @@ impl<T: Traversed> Traversal<T> for OneByOne {
 /// Lanes are full already.
 impl<const N: usize> Traversed for Lanes<N> {
     type Traversal = OneByOne;
+
+    fn place(reduction: &mut Reduction<Self>, q: &[Self], v: &[Self]) {
+        fast::place(reduction, q, v);
+    }
+
+    fn reduce(reduction: &mut Reduction<Self>, task: Task, out: &mut [Self]) {
+        fast::reduce(reduction, task, out);
+    }
 }

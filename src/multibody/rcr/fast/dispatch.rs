@@ -12,9 +12,6 @@ use pulp::{Arch, Simd, WithSimd};
 struct Place<'a, T: Traversed>(&'a mut Reduction<T>, &'a [T], &'a [T]);
 /// Reduces.
 struct Reduce<'a, T: Traversed>(&'a mut Reduction<T>, Task, &'a mut [T]);
-/// Both, for accelerations.
-struct Accelerate<'a, T: Traversed>(&'a mut Reduction<T>, &'a [T], &'a [T], &'a mut [T]);
-
 impl<T: Traversed> WithSimd for Place<'_, T> {
     type Output = ();
 
@@ -33,16 +30,6 @@ impl<T: Traversed> WithSimd for Reduce<'_, T> {
     }
 }
 
-impl<T: Traversed> WithSimd for Accelerate<'_, T> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
-        T::Traversal::place(self.0, self.1, self.2);
-        T::Traversal::reduce(self.0, Task::Accelerations, self.3);
-    }
-}
-
 /// [`Traversal::place`] in the widest instructions.
 pub(in crate::multibody::rcr) fn place<T: Traversed>(reduction: &mut Reduction<T>, q: &[T], v: &[T]) {
     Arch::new().dispatch(Place(reduction, q, v));
@@ -51,16 +38,6 @@ pub(in crate::multibody::rcr) fn place<T: Traversed>(reduction: &mut Reduction<T
 /// [`Traversal::reduce`] in the widest instructions.
 pub(in crate::multibody::rcr) fn reduce<T: Traversed>(reduction: &mut Reduction<T>, task: Task, out: &mut [T]) {
     Arch::new().dispatch(Reduce(reduction, task, out));
-}
-
-/// Both, for accelerations.
-pub(in crate::multibody::rcr) fn accelerate<T: Traversed>(
-    reduction: &mut Reduction<T>,
-    q: &[T],
-    v: &[T],
-    out: &mut [T],
-) {
-    Arch::new().dispatch(Accelerate(reduction, q, v, out));
 }
 
 /// Runs `work` over lanes in the widest instructions. It is not compiled for a processor without any: that copy would be the

@@ -13,5 +13,5 @@ mod packs;
 mod pins;
 mod small;
 
-pub(super) use dispatch::{accelerate, place, reduce};
+pub(super) use dispatch::{place, reduce};
 pub(super) use small::Small;

@@ -16,7 +16,7 @@ mod exchange;
 mod packing;
 mod subtrees;
 
-use super::dispatch::across;
+use super::dispatch::{self, across};
 use crate::multibody::rcr::data::{Offsets, Task};
 use crate::multibody::rcr::lanes::Lanes;
 use crate::multibody::rcr::placed::{Placed, Placement};
@@ -116,6 +116,14 @@ pub struct Packs {
 /// Numbers alone are laid side by side where subtrees are equal.
 impl Traversed for f64 {
     type Traversal = Packs;
+
+    fn place(reduction: &mut Reduction<f64>, q: &[f64], v: &[f64]) {
+        dispatch::place(reduction, q, v);
+    }
+
+    fn reduce(reduction: &mut Reduction<f64>, task: Task, out: &mut [f64]) {
+        dispatch::reduce(reduction, task, out);
+    }
 }
 
 impl Traversal<f64> for Packs {
