@@ -73,12 +73,12 @@ pub fn pull_in(compiled: &Compiled, port: Option<&str>, max: f64) -> Result<Pull
         source,
         equilibrium: Equilibrium::new(system, EquilibriumOptions::default()),
         jumped: None,
+        rest: Vec::new(),
         passed: Vec::new(),
     };
     let name = system.electrics.names[source].clone();
     let estimated_error = compiled.order.estimated_error;
     let q = sweep.at_rest()?;
-    let touching = sweep.touching(&q);
     match sweep.close(q, max)? {
         Closed::Falls { volts } => Ok(PullInResult {
             port: name,
@@ -89,7 +89,7 @@ pub fn pull_in(compiled: &Compiled, port: Option<&str>, max: f64) -> Result<Pull
             warnings: sweep.told(),
         }),
         Closed::Rests { fold, volts, q } => {
-            let made: Vec<usize> = (0..touching.len()).filter(|&g| !touching[g] && system.touches(g, &q)).collect();
+            let made: Vec<usize> = (0..sweep.rest.len()).filter(|&g| !sweep.rest[g] && system.touches(g, &q)).collect();
             let release_v = sweep.release(q, volts, &made)?;
             Ok(PullInResult {
                 port: name,
@@ -137,6 +137,8 @@ struct Sweep<'a> {
     equilibrium: Equilibrium,
     /// What the part did before any voltage, where it did not just give way.
     jumped: Option<&'static str>,
+    /// Which gaps are closed without any voltage.
+    rest: Vec<bool>,
     /// Voltages at which it jumped without closing a gap [V].
     passed: Vec<f64>,
 }
@@ -162,6 +164,7 @@ impl Sweep<'_> {
             "without any voltage the part has snapped through or buckled: these voltages are those of one of its branches; \
              `bimorph path` shows them, --imperfection chooses",
         );
+        self.rest = self.touching(&q);
         Ok(q)
     }
 
@@ -200,21 +203,21 @@ impl Sweep<'_> {
             }
             from = beyond;
         }
-        let name = &self.system.electrics.names[self.source];
-        let detail = format!("no pull-in found after {MOST_FOLDS} folds of the open branch, at {name} = {from:.6} V");
+        let port = &self.system.electrics.names[self.source];
+        let detail = format!("no pull-in found after {MOST_FOLDS} folds of the open branch, at {port} = {from:.6} V");
         Err(AnalysisError::NoEquilibrium { detail })
     }
 
     /// Why there is no pull-in up to `max`, for a part that is at `q` before the last piece of its way.
     fn nothing(&self, max: f64, q: &[Pose]) -> AnalysisError {
         let name = &self.system.electrics.names[self.source];
-        let shut = self.touching(q).iter().position(|touches| *touches);
-        let way_out = match shut {
-            Some(gap) => format!("`{}` is closed already before that", self.compiled.parts.gap_names[gap]),
-            None => {
-                "raise the largest voltage; a comb, whose force does not grow as it closes, pulls nothing in at any"
-                    .to_owned()
+        let gap = |gap: usize| &self.compiled.parts.gap_names[gap];
+        let way_out = match self.touching(q).iter().position(|touches| *touches) {
+            Some(shut) if self.rest[shut] && self.jumped.is_some() => {
+                format!("without any voltage the part is unstable where it is drawn, and rests on `{}`", gap(shut))
             }
+            Some(shut) => format!("`{}` is closed already before that", gap(shut)),
+            None => "raise the largest voltage; a comb's force does not grow as it closes: it pulls nothing in".into(),
         };
         AnalysisError::NoEquilibrium { detail: format!("{name} pulls nothing in up to {max} V; {way_out}") }
     }
@@ -224,7 +227,7 @@ impl Sweep<'_> {
         let passed = match self.passed.as_slice() {
             [] => None,
             some => {
-                let volts: Vec<String> = some.iter().take(MOST_NAMED).map(|v| format!("{v:.4}")).collect();
+                let volts: Vec<_> = some.iter().take(MOST_NAMED).map(|v| format!("{v:.4}")).collect();
                 let more = if some.len() > MOST_NAMED { ", …" } else { "" };
                 Some(format!(
                     "on the way it jumps at {}{more} V without closing a gap, and goes on from there",

@@ -203,3 +203,12 @@ fn steps_that_outrun_the_motion_are_told() {
     assert!(told(100e-6));
     assert!(!told(1e-6));
 }
+
+/// A part that is unstable where it is drawn, and rests on its gap without any voltage, is said to be so: nothing pulls it in.
+#[test]
+fn what_no_voltage_holds_open_is_told() {
+    let plate = "anchor * [f] []\nspring2d * [f m] [kx=-1]\nmass2d * [m] [m=1e-10]\nguide2d * [m] []\n\
+                 gp plategap2d * [m e] [A=1e-8 gap=2u]\nanchor * [e] []\neground * [e] []\ndrive port * [m e] []\n";
+    let error = pull_in_fitted(&drawn(plate, &CompileOptions::default()), None, 200.0).unwrap_err().to_string();
+    assert!(error.contains("unstable where it is drawn") && error.contains("`gp`"), "{error}");
+}
