@@ -36,11 +36,10 @@ pub trait Traversed: Real {
     /// One body after the other, or a faster way.
     type Traversal: Traversal<Self>;
 
-    /// [`Traversal::place`] in the instructions that are fastest for it. What stands with a number and not with every reduction is compiled
-    /// once.
+    /// Places all bodies in the instructions that are fastest for it. What stands with a number and not with every reduction is compiled once.
     fn place(reduction: &mut Reduction<Self>, q: &[Self], v: &[Self]);
 
-    /// [`Traversal::reduce`] likewise.
+    /// Reduces for `task` likewise.
     fn reduce(reduction: &mut Reduction<Self>, task: Task, out: &mut [Self]);
 }
 
