@@ -16,7 +16,7 @@ use super::proto::{DESCRIPTORS, ServerSetting, bimorph_server::BimorphServer};
 pub use super::serving::{MakeDevice, Ready, ServeError, ServeOptions};
 use super::sessions::Sessions;
 use super::shared::{Calls, Shared};
-use super::shutdown::{GRACE, Shutdown};
+use super::shutdown::{GRACE, Shutdown, Waiting};
 use super::sockets::Listener;
 use super::store::Store;
 use super::survey::StoreError;
@@ -25,7 +25,6 @@ use crate::device::local::LocalDevice;
 use std::future::Future;
 use std::io::IsTerminal;
 use std::path::PathBuf;
-use std::pin::Pin;
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::net::TcpListener;
@@ -66,9 +65,6 @@ pub async fn run_with(
 ) -> Result<(), ServeError> {
     serve(options, make, Box::pin(shutdown)).await
 }
-
-/// Something to wait for, whatever it is.
-type Waiting<'a, T> = Pin<Box<dyn Future<Output = T> + Send + 'a>>;
 
 /// [`run_with`], compiled once, here: the service of every program that runs one.
 fn serve(options: ServeOptions, make: MakeDevice, shutdown: Waiting<'_, ()>) -> Waiting<'_, Result<(), ServeError>> {

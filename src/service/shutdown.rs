@@ -3,11 +3,16 @@
 //! Waiting for clients alone can take forever (a client that never reads also never closes), so each step has its own
 //! signal: `draining` refuses new work, `ending` ends open streams with UNAVAILABLE, `cutting` fails the sockets.
 
+use std::future::Future;
+use std::pin::Pin;
 use std::time::Duration;
 use tokio_util::sync::CancellationToken;
 
 /// How long streams that were told to end may take to say so to their clients before connections are cut.
 pub(super) const GRACE: Duration = Duration::from_millis(300);
+
+/// Something to wait for, whatever it is.
+pub(super) type Waiting<'a, T> = Pin<Box<dyn Future<Output = T> + Send + 'a>>;
 
 /// The three signals, shared by everything that lives as long as the server.
 #[derive(Debug, Clone, Default)]
