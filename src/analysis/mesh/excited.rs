@@ -39,6 +39,8 @@ const FIRST: usize = 6;
 const MOST: usize = 48;
 /// Share of the tolerance below which an amplitude is negligible.
 const NEGLIGIBLE: f64 = 0.3;
+/// Share of what is in none of the modes that each mode may be off by: with all of it uncertain, no mesh holds the tolerance.
+const BESIDE: f64 = 0.1;
 /// Smallest error that is asked of a frequency.
 const SHARPEST: f64 = 1e-8;
 
@@ -98,10 +100,12 @@ pub(super) fn order(moving: &Compiled, options: &TransientOptions<'_>) -> Result
             estimated_error: order.estimated_error.map(|error| error.max(left)),
             ..order
         };
-        let Some(highest) = modes.iter().rposition(|m| m.amplitude > NEGLIGIBLE * tol) else {
+        let looser = if given { 1.0 } else { (BESIDE * left / tol).max(1.0) };
+        let Some(highest) = modes.iter().rposition(|m| m.amplitude > NEGLIGIBLE * looser * tol) else {
             return Ok(at_least(still));
         };
-        let tolerances: Vec<f64> = modes[..=highest].iter().map(|m| tolerance(m, options.stop, tol)).collect();
+        let of_modes = modes[..=highest].iter();
+        let tolerances: Vec<f64> = of_modes.map(|m| tolerance(m, options.stop, looser * tol)).collect();
         let mut analyse = |segments: &[usize]| frequencies(moving, voltages, segments, &tolerances);
         if given {
             let swings: Vec<f64> = modes[..=highest].iter().map(|m| 2f64.sqrt() * m.amplitude).collect();
@@ -112,13 +116,16 @@ pub(super) fn order(moving: &Compiled, options: &TransientOptions<'_>) -> Result
         let sharper = tolerances.iter().map(|t| (counted::SAFETY * t).max(SHARPEST)).collect();
         let aim = Aim { band: 1.01 * modes[highest].frequency, tolerances: sharper, rigid: false };
         let order = model_order::choose_for(&moving.structure, &moving.options, &aim).map_err(refused)?;
-        let order = ModelOrder { estimated_error: order.estimated_error.map(|e| counted::SAFETY * e), ..order };
+        let order =
+            ModelOrder { estimated_error: order.estimated_error.map(|e| looser * counted::SAFETY * e), ..order };
         let mesh = merged(&still, &order);
         if order.estimated_error.is_some() {
             return Ok(at_least(mesh));
         }
         let fitted = doubling::fit(&moving.structure, &moving.options, mesh.segments.clone(), &mut analyse);
-        return Ok(at_least(fitted.map_or(mesh, |fitted| merged(&still, &fitted))));
+        let told =
+            |order: ModelOrder| ModelOrder { estimated_error: order.estimated_error.map(|e| looser * e), ..order };
+        return Ok(at_least(fitted.map_or(mesh, |fitted| merged(&still, &told(fitted)))));
     }
 }
 
