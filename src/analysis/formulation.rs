@@ -43,7 +43,7 @@ impl Formulation {
         if model.linear {
             return compliant("small displacements");
         }
-        if beams.clone().next().is_none() || beams.any(|s| s.locked != [true, true, false]) {
+        if beams.clone().next().is_none() || beams.any(|s| !s.only_turns()) {
             return compliant("joints are elastic in every direction, where a step in joint coordinates costs more");
         }
         let Ok(linkage) = Self::Rcr.linkage(system) else { return compliant("joint coordinates do not suit it") };

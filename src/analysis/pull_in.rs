@@ -214,7 +214,7 @@ impl Sweep<'_> {
         let gap = |gap: usize| &self.compiled.parts.gap_names[gap];
         let way_out = match self.touching(q).iter().position(|touches| *touches) {
             Some(shut) if self.rest[shut] && self.jumped.is_some() => {
-                format!("without any voltage the part is unstable where it is drawn, and rests on `{}`", gap(shut))
+                format!("the part, unstable where it is drawn or on its way from there, rests on `{}`", gap(shut))
             }
             Some(shut) => format!("`{}` is closed already before that", gap(shut)),
             None => "raise the largest voltage; a comb's force does not grow as it closes: it pulls nothing in".into(),
@@ -227,7 +227,7 @@ impl Sweep<'_> {
         let passed = match self.passed.as_slice() {
             [] => None,
             some => {
-                let volts: Vec<_> = some.iter().take(MOST_NAMED).map(|v| format!("{v:.4}")).collect();
+                let volts: Vec<String> = some.iter().take(MOST_NAMED).map(|v| format!("{v:.4}")).collect();
                 let more = if some.len() > MOST_NAMED { ", …" } else { "" };
                 Some(format!(
                     "on the way it jumps at {}{more} V without closing a gap, and goes on from there",

@@ -17,6 +17,14 @@ pub struct ModelOrder {
     pub passes: usize,
 }
 
+impl ModelOrder {
+    /// The same mesh with so many times its estimate.
+    #[must_use]
+    pub fn with_estimate_times(self, factor: f64) -> Self {
+        Self { estimated_error: self.estimated_error.map(|error| factor * error), ..self }
+    }
+}
+
 /// What a mesh is for.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Aim {

@@ -47,8 +47,7 @@ pub fn choose(structure: &Structure, options: &CompileOptions, count: usize) -> 
         };
         let tolerances = vec![SAFETY * options.tol; count];
         let aim = Aim { band: frequency * (1.0 + ABOVE), tolerances, rigid: false };
-        let order = model_order::choose_for(structure, options, &aim)?;
-        let order = ModelOrder { estimated_error: order.estimated_error.map(|e| SAFETY * e), ..order };
+        let order = model_order::choose_for(structure, options, &aim)?.with_estimate_times(SAFETY);
         let done = order.estimated_error.is_none() || order.modes_in_band >= count;
         segments.clone_from(&order.segments);
         chosen = Some(order);

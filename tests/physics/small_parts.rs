@@ -1,6 +1,7 @@
 //! A part that hardly moves beside another: what a signal on it shows holds the tolerance, or is told beyond it.
 
 use crate::model;
+use bimorph::analysis::chart::error::relative_error;
 use bimorph::analysis::mesh::fitted_in_time;
 use bimorph::analysis::step_error::with_step_error;
 use bimorph::analysis::transient::{TransientOptions, TransientResult, transient};
@@ -30,14 +31,6 @@ fn run(signals: &[&str], tol: f64, segments: Option<usize>) -> TransientResult {
     transient(&fitted, &options, &mut |_, _| {}, &mut |_| true).unwrap()
 }
 
-/// Root mean square of the difference of the first signals over half the range.
-fn apart(found: &TransientResult, reference: &TransientResult) -> f64 {
-    let (a, b) = (&found.signals[0].2, &reference.signals[0].2);
-    let sum: f64 = a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum();
-    let range = b.iter().fold(f64::NEG_INFINITY, |m, x| m.max(*x)) - b.iter().fold(f64::INFINITY, |m, x| m.min(*x));
-    (sum / a.len() as f64).sqrt() / (0.5 * range)
-}
-
 /// The tip of a beam that swings a four hundredth of what another swings is within the tolerance of 24 segments a beam, alone and beside the
 /// other. (Its modes counted by their share of the largest displacement: 2.2e-2 off at 1e-3, told 9.1e-5.)
 #[test]
@@ -46,7 +39,7 @@ fn a_signal_has_the_mesh_that_it_shows() {
     for signals in [&["d.y"][..], &["d.y", "b.y"]] {
         for tol in [1e-2, 1e-3] {
             let found = run(signals, tol, None);
-            let error = apart(&found, &reference);
+            let error = relative_error(&reference, &found);
             let told = found.estimated_error.unwrap();
             println!("{signals:?} {tol:e}: {error:.1e}, told {told:.1e}, {} unknowns", found.unknowns);
             // beside another it is measured by a thirtieth of that one's swing

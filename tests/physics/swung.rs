@@ -1,5 +1,6 @@
 //! A run whose stiffness changes on the way holds the tolerance of its mesh, or is told beyond it: contracts of `analysis::mesh` for transients.
 
+use bimorph::analysis::chart::error::relative_error;
 use bimorph::analysis::mesh::{Request, fitted, fitted_in_time};
 use bimorph::analysis::modes::modes;
 use bimorph::analysis::transient::{TransientOptions, TransientResult, transient};
@@ -43,14 +44,6 @@ fn run(text: &str, signal: &str, stop: f64, volts: &[(&str, f64)], options: Comp
     transient(&model, &options, &mut |_, _| {}, &mut |_| true).unwrap()
 }
 
-/// Root mean square of the difference over half the range.
-fn apart(found: &TransientResult, reference: &TransientResult) -> f64 {
-    let (a, b) = (&found.signals[0].2, &reference.signals[0].2);
-    let sum: f64 = a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum();
-    let range = b.iter().fold(f64::NEG_INFINITY, |m, x| m.max(*x)) - b.iter().fold(f64::INFINITY, |m, x| m.min(*x));
-    (sum / a.len() as f64).sqrt() / (0.5 * range)
-}
-
 /// The error of such a run is within the tolerance, and its estimate no smaller than a third of it. Before, the meshes of these runs were those of
 /// their ends and modes, and two to five times the tolerance off. The reference has 40 segments a beam and the steps of 1e-6; for the
 /// heated one it is itself 2e-4 off (by 80 segments), no reference for 1e-4.
@@ -66,7 +59,7 @@ fn runs_far_from_their_ends_hold_the_tolerance() {
         let reference = run(text, signal, stop, volts, fine);
         for &tol in tolerances {
             let found = run(text, signal, stop, volts, CompileOptions { tol, ..CompileOptions::default() });
-            let (error, told) = (apart(&found, &reference), found.estimated_error.unwrap());
+            let (error, told) = (relative_error(&reference, &found), found.estimated_error.unwrap());
             println!("{signal} {tol:e}: {error:.1e}, told {told:.1e}, {} unknowns", found.unknowns);
             assert!(error <= tol && told <= 1.05 * tol, "{signal} {tol:e}: {error:e} {told:e}");
             assert!(error <= 3.0 * told, "{signal} {tol:e}: {error:e} {told:e}");
@@ -107,7 +100,7 @@ fn given_segments_are_told() {
     let reference = run(THROWN, "s.y", 100e-6, &[], with(40, 1e-6));
     for segments in [1, 2, 3, 4, 5, 8] {
         let found = run(THROWN, "s.y", 100e-6, &[], with(segments, 1e-3));
-        let (error, told) = (apart(&found, &reference), found.estimated_error.unwrap());
+        let (error, told) = (relative_error(&reference, &found), found.estimated_error.unwrap());
         println!("{segments}: {error:.1e}, told {told:.1e}");
         assert!(error <= 3.0 * told && told <= 10.0 * error, "{segments}: {error:e} {told:e}");
     }

@@ -5,6 +5,7 @@
 //! goes to. Errors are those of the worst node relative to its own displacement (or a thirtieth of the largest), of the worst mode, and of
 //! runs as elsewhere ([`relative_error`]).
 
+use super::error::SMALL;
 use super::error::relative_error;
 use super::runs::Progress;
 use super::spec::{Chart, ChartError, ChartPoint, ChartSpec, Formulation, Measured, Part};
@@ -25,8 +26,6 @@ use std::time::Instant;
 const COUNT: usize = 5;
 /// How much tighter than the tightest tolerance of the list a reference is.
 const TIGHTER: f64 = 0.1;
-/// Share of the largest displacement below which errors are relative to that.
-const SMALL: f64 = 1.0 / 30.0;
 /// Analyses.
 pub(super) const ANALYSES: [&str; 3] = ["static", "modes", "tran"];
 

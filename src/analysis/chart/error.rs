@@ -6,8 +6,8 @@
 
 use crate::analysis::transient::TransientResult;
 
-/// Share of the largest swing of a unit by which a signal that swings less is measured.
-pub(crate) const SHARE: f64 = 1.0 / 30.0;
+/// Share of the largest displacement, or swing of a unit, by which what moves less is measured.
+pub(crate) const SMALL: f64 = 1.0 / 30.0;
 
 /// A signal: name, unit, samples.
 type Named = (String, String, Vec<f64>);
@@ -39,7 +39,7 @@ pub fn largest_error(reference: &TransientResult, found: &TransientResult, least
         swings.fold(0.0, f64::max)
     };
     let error = |(want, got): (&Named, &Named)| {
-        let amplitude = half_range(&want.2).max(SHARE * largest(&want.1)).max(least(&want.1));
+        let amplitude = half_range(&want.2).max(SMALL * largest(&want.1)).max(least(&want.1));
         quotient((squares(&want.2, &got.2) / want.2.len().max(1) as f64).sqrt(), amplitude)
     };
     reference.signals.iter().zip(&found.signals).map(error).fold(0.0, larger)

@@ -20,7 +20,7 @@ pub(super) fn locked(compiled: &Compiled, formulation: Formulation) -> Compiled 
 pub(super) fn told(compiled: &Compiled, formulation: Formulation, options: &TransientOptions<'_>) -> Option<String> {
     let mut beams = compiled.parts.system.model.sections.iter().filter(|section| section.is_segment());
     // a scheme whose joints only turn leaves nothing out beyond itself
-    if formulation != Formulation::Rcr || beams.all(|section| section.locked == [true, true, false]) {
+    if formulation != Formulation::Rcr || beams.all(|section| section.only_turns()) {
         return None;
     }
     let drawn = options.release.unwrap_or(compiled);

@@ -4,6 +4,7 @@
 //! hardly moves; that of a rotation likewise, and no smaller than what turns the size of the mechanism by a thirtieth of the largest
 //! displacement. The finer mesh starts from the state of the coarser one, so that both are on one branch.
 
+pub(super) use super::super::chart::error::SMALL;
 use super::super::gap_pieces::{OF_DEFLECTION, OF_PULL_IN};
 use super::super::linear_stress::left_out;
 use super::super::sensitivity::deflection_to_voltage;
@@ -21,8 +22,6 @@ use crate::refine::doubling::{self, Output};
 use crate::refine::model_order::ModelOrder;
 use std::borrow::Cow;
 
-/// Share of the largest displacement below which errors are relative to that.
-pub(super) const SMALL: f64 = 1.0 / 30.0;
 /// Share of the mechanism's size below which a displacement is rounding.
 pub(super) const ROUNDING: f64 = 1e-12;
 

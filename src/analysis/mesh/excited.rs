@@ -116,16 +116,13 @@ pub(super) fn order(moving: &Compiled, options: &TransientOptions<'_>) -> Result
         let sharper = tolerances.iter().map(|t| (counted::SAFETY * t).max(SHARPEST)).collect();
         let aim = Aim { band: 1.01 * modes[highest].frequency, tolerances: sharper, rigid: false };
         let order = model_order::choose_for(&moving.structure, &moving.options, &aim).map_err(refused)?;
-        let order =
-            ModelOrder { estimated_error: order.estimated_error.map(|e| looser * counted::SAFETY * e), ..order };
+        let order = order.with_estimate_times(looser * counted::SAFETY);
         let mesh = merged(&still, &order);
         if order.estimated_error.is_some() {
             return Ok(at_least(mesh));
         }
         let fitted = doubling::fit(&moving.structure, &moving.options, mesh.segments.clone(), &mut analyse);
-        let told =
-            |order: ModelOrder| ModelOrder { estimated_error: order.estimated_error.map(|e| looser * e), ..order };
-        return Ok(at_least(fitted.map_or(mesh, |fitted| merged(&still, &told(fitted)))));
+        return Ok(at_least(fitted.map_or(mesh, |fitted| merged(&still, &fitted.with_estimate_times(looser)))));
     }
 }
 

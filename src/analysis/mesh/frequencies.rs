@@ -75,7 +75,7 @@ pub(super) fn for_modes(
         }
         let options = CompileOptions { tol: compiled.options.tol / FIRST_ORDER, ..compiled.options.clone() };
         let order = doubling::fit(&compiled.structure, &options, segments, &mut analyse)?;
-        Ok(ModelOrder { estimated_error: order.estimated_error.map(|error| FIRST_ORDER * error), ..order })
+        Ok(order.with_estimate_times(FIRST_ORDER))
     };
     if !loaded {
         // modes about the drawing know their errors, where the scheme lets them

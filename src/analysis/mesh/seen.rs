@@ -1,9 +1,9 @@
 //! What the signals of a run see of small motions about a state.
 //!
 //! A part that hardly moves beside another is all that a signal on it shows. So each signal is measured by its own swing, or by
-//! [`SHARE`](super::super::chart::error::SHARE) of the largest of its unit where that is more: what swings less than that beside another is a small part of a picture.
+//! [`SMALL`] of the largest of its unit where that is more: what swings less than that beside another is a small part of a picture.
 
-use super::super::chart::error::SHARE;
+use super::super::chart::error::SMALL;
 use super::super::signal::{Signal, View};
 use super::super::statics::OperatingPoint;
 use super::super::step_error;
@@ -54,7 +54,7 @@ impl<'a> Seen<'a> {
             let unit = signal.unit();
             let beside = self.signals.iter().zip(&most).filter(|(other, _)| other.unit() == unit);
             let largest = beside.map(|(_, own)| *own).fold(0.0, f64::max);
-            own.max(SHARE * largest).max(step_error::least(unit, options, self.model)).max(f64::MIN_POSITIVE)
+            own.max(SMALL * largest).max(step_error::least(unit, options, self.model)).max(f64::MIN_POSITIVE)
         };
         self.signals.iter().zip(&most).map(size).collect()
     }

@@ -43,6 +43,11 @@ impl Section {
     pub fn is_segment(&self) -> bool {
         self.stiffness.0[5] > 0.0 && (self.locked[1] || self.second != [0.0; 3])
     }
+
+    /// True for a joint that turns and gives way in no other direction.
+    pub fn only_turns(&self) -> bool {
+        self.locked == [true, true, false]
+    }
 }
 
 impl Model {
