@@ -76,7 +76,7 @@ pub(crate) struct Tran {
     #[arg(long = "port", short = 'p', value_name = "NAME=VOLTS", value_parser = value::volts)]
     ports: Vec<(String, f64)>,
 
-    /// What integrates [default: rodas4; in joint coordinates rk45]
+    /// What integrates [default: rodas4; in joint coordinates whose loops do not close by springs rk45]
     #[arg(long, value_name = "NAME", value_parser = clap::builder::PossibleValuesParser::new(Integrator::NAMES))]
     method: Option<String>,
 

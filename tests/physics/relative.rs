@@ -209,7 +209,7 @@ fn newton_over_coordinates_is_quadratic() {
             for ((share, link), q) in share.iter_mut().zip(&tree.links).zip(&q) {
                 *share += link.stress(q, &drive.rest());
             }
-            fill(tree, &placed, &q, &force, &mut brought);
+            fill(tree, &placed, |j| &q[j], &force, &mut brought);
             form.factor(tree, placed.maps(), 1.0, exact.then_some(&brought), Err).unwrap();
             form.solve(tree, &mut zeros.clone(), &mut share);
             for (q, share) in q.iter_mut().zip(&share) {

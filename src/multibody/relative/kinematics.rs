@@ -27,7 +27,7 @@ fn turn<T: Number>(v: Pair<T>) -> Pair<T> {
 }
 
 #[inline(always)]
-fn dot<T: Number>(a: Pair<T>, b: Pair<T>) -> T {
+pub(super) fn dot<T: Number>(a: Pair<T>, b: Pair<T>) -> T {
     a[0] * b[0] + a[1] * b[1]
 }
 

@@ -8,8 +8,9 @@
 //! W·Uq = −R(q_i, v_i, z_i, t_i) − γ_i·h·∂R/∂t + M·(r₁/(γh) + r₂) + C·r₁          W = M/(γh)² + C/(γh) + K
 //! Uv = Uq/(γh) − r₁                 Uz = Uv/(γh) − r₂
 //! ```
-//! with M, C and K at the start of the step. K holds the springs of the tree's joints and the exact tangent of closures and
-//! gaps; the stiffness that forces bring to the tree's joints is left out, since the number of steps does not depend on it.
+//! with M, C and K at the start of the step. K holds the springs of the tree's joints, the stiffness that forces and inertia
+//! bring to them ([`geometric`]), and the exact tangent of closures and gaps. What rates bring is left out: it is small where
+//! joints turn little in a step.
 //!
 //! To whoever drives it the motion is that of the bodies, as with every other method; coordinates are what it carries.
 //!
@@ -27,6 +28,7 @@ use crate::equations::{Bodies, Joints};
 use crate::multibody::forces;
 use crate::multibody::planar::Pose;
 use crate::multibody::relative::JointMatrix;
+use crate::multibody::relative::geometric::{self, Geometric};
 use crate::multibody::relative::kinematics::Placed;
 use ports::Ports;
 use stages::{STILL, Stages};
@@ -42,6 +44,7 @@ pub struct JointRodas4 {
     joints: Arc<Joints>,
     w: JointMatrix<f64>,
     placed: Placed<f64>,
+    geometric: Vec<Geometric>,
     /// Coordinates and rates, and accelerations (with nothing beside them); then the same of each sensitivity.
     carried: Vec<Motion>,
     stages: Stages,
@@ -77,6 +80,7 @@ impl JointRodas4 {
         Self {
             w: JointMatrix::new(tree),
             placed: Placed::new(tree),
+            geometric: vec![Geometric::ZERO; count],
             carried: vec![Motion::zeros(count); 2 + 2 * sources.len()],
             stages: Stages::new(count),
             ports: Ports::new(&joints, sources),
@@ -157,8 +161,10 @@ impl JointRodas4 {
     }
 
     fn factor(&mut self, gh: f64) -> Result<(), StepFailure> {
-        forces::add_inertia(&self.joints.closures.model, 1.0 / (gh * gh), 1.0 / gh, &mut self.w.bodies);
-        self.w.factor(&self.joints.tree, &self.placed.maps, 1.0, None, Err)?;
+        let Self { joints, w, placed, geometric, stages, force, .. } = self;
+        forces::add_inertia(&joints.closures.model, 1.0 / (gh * gh), 1.0 / gh, &mut w.bodies);
+        geometric::fill(&joints.tree, placed, |j| &stages.argument[j].q, force, geometric);
+        w.factor(&joints.tree, &placed.maps, 1.0, Some(geometric), Err)?;
         self.work.factorizations += 1;
         Ok(())
     }
