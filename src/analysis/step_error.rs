@@ -14,7 +14,7 @@ use super::integrator::Integrator;
 use super::transient::options::STEP_SHARE;
 use super::transient::{TransientOptions, TransientResult, transient};
 use super::{AnalysisError, Watch};
-use crate::compile::Compiled;
+use crate::compile::{Compiled, Formulation};
 use crate::equations::bodies::FLOOR;
 
 /// How much looser a companion is.
@@ -79,7 +79,8 @@ pub fn with_step_error<T>(
     let found = TransientResult { signals, ..companion.clone() };
     let apart = largest_error(&found, &companion, &|unit| least(unit, options, model));
     let share = ((reached - 1) * stride(options)) as f64 / (options.points - 1) as f64;
-    let error = told_of(options) * apart / share.min(1.0);
+    let (_, method) = Formulation::of_run(model, options);
+    let error = told_of(options, method) * apart / share.min(1.0);
     result.step_error = Some(error);
     result.warnings.extend(beyond(options, error, "by the end of the run"));
     Ok((result, more))
@@ -100,8 +101,8 @@ fn loose(options: &TransientOptions<'_>) -> f64 {
 
 /// Share of the difference that is told: of a companion that is hardly looser, more than all of it, since the error is in proportion to
 /// the tolerance at best.
-fn told_of(options: &TransientOptions<'_>) -> f64 {
-    let share = match options.method {
+fn told_of(options: &TransientOptions<'_>, method: Integrator) -> f64 {
+    let share = match method {
         Integrator::Rodas4 | Integrator::Radau5 | Integrator::Sdirk4 => SHARE,
         _ => SHARE_OF_SECOND,
     };

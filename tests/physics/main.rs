@@ -9,6 +9,7 @@ mod drawn;
 mod eigenvalues;
 mod electrothermal;
 mod examples;
+mod excited;
 mod formulations;
 mod gaps;
 mod integrators;

@@ -39,12 +39,12 @@ fn numbers(table: &SweepTable) -> Vec<Vec<f64>> {
 }
 
 /// With the voltage as an axis each point has the numbers that it has where the port is held at it, within the tolerance, and its
-/// voltage stands in the row; more of it pulls further.
+/// voltage stands in the row; more of it pulls further. (A run's first instant is held by no mesh at 1e-4, as its rows say.)
 #[test]
 fn rows_are_those_of_held_ports() {
-    let options = CompileOptions { tol: 1e-4, ..CompileOptions::default() };
     let axes = ["w=1.9u:2.1u:2", "V.v=0:12:3"];
-    for k in 0..3 {
+    for (k, tol) in [1e-4, 1e-4, 1e-3].into_iter().enumerate() {
+        let options = CompileOptions { tol, ..CompileOptions::default() };
         let across = swept(SWITCH, &axes, analyses(&[("heat", 0.3)])[k].clone(), &options, Shard::default());
         let found = numbers(&across);
         assert_eq!(across.parameters, ["w", "V.v"]);
@@ -61,7 +61,7 @@ fn rows_are_those_of_held_ports() {
                 assert_eq!(across.rows[at].parameters[1], Setting::Number(volts));
                 let size = alone.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
                 for (a, b) in found[at].iter().zip(alone) {
-                    assert!((a - b).abs() <= 2e-4 * size, "{k} {volts} V: {a} {b}");
+                    assert!((a - b).abs() <= 2.0 * tol * size, "{k} {volts} V: {a} {b}");
                 }
             }
         }

@@ -39,8 +39,11 @@ const FIRST: usize = 6;
 const MOST: usize = 48;
 /// Share of the tolerance below which an amplitude is negligible.
 const NEGLIGIBLE: f64 = 0.3;
-/// Share of what is in none of the modes that each mode may be off by: with all of it uncertain, no mesh holds the tolerance.
-const BESIDE: f64 = 0.1;
+/// Share that each mode may be off by of what is in none of them, and of what the lack of rotary inertia makes where that is much: no
+/// mesh mends these.
+const BESIDE: f64 = 0.3;
+/// What a waveform is off by that is another one.
+const ANOTHER: f64 = 0.3;
 /// Smallest error that is asked of a frequency.
 const SHARPEST: f64 = 1e-8;
 
@@ -53,16 +56,16 @@ struct Excited {
     rotary: f64,
 }
 
-/// The mesh for a run.
-pub(super) fn order(moving: &Compiled, options: &TransientOptions<'_>) -> Result<ModelOrder, AnalysisError> {
+/// The mesh for a run, with the estimate of what the modes are off by; and how far what is in none of them may be off at most.
+pub(super) fn order(moving: &Compiled, options: &TransientOptions<'_>) -> Result<(ModelOrder, f64), AnalysisError> {
     if moving.structure.beams.is_empty() {
-        return Ok(ModelOrder { estimated_error: Some(0.0), ..moving.order.clone() });
+        return Ok((ModelOrder { estimated_error: Some(0.0), ..moving.order.clone() }, 0.0));
     }
     let given = chosen(moving) || moving.options.band.is_some();
     let voltages = &options.voltages;
     let start = options.release.unwrap_or(moving);
     if start.order.segments.len() != moving.order.segments.len() {
-        return Ok(moving.order.clone()); // another drawing: the run itself says so
+        return Ok((moving.order.clone(), 0.0)); // another drawing: the run itself says so
     }
     let at = |model: &Compiled, segments: Vec<usize>| match given {
         true => equilibrium::estimated(model, voltages, segments).map(|(order, _)| order),
@@ -76,7 +79,6 @@ pub(super) fn order(moving: &Compiled, options: &TransientOptions<'_>) -> Result
         }
     }
     let tol = moving.options.tol;
-    let rates = options.signals.iter().any(|name| is_rate(name));
     let mut count = FIRST;
     loop {
         let mesh = match given {
@@ -86,23 +88,18 @@ pub(super) fn order(moving: &Compiled, options: &TransientOptions<'_>) -> Result
                 merged(&still, &counted)
             }
         };
-        let (mut modes, mut left) = excited(moving, options, &mesh.segments, count)?;
-        if rates {
-            left *= faster(&mut modes);
-        }
+        let (modes, left) = excited(moving, options, &mesh.segments, count)?;
         if left > NEGLIGIBLE * tol && modes.len() >= count && count < MOST {
             count = (2 * count).min(MOST);
             continue;
         }
         // what is in none of the modes may be off by all that it swings
         let left = if left > NEGLIGIBLE * tol { 2f64.sqrt() * left } else { 0.0 };
-        let at_least = |order: ModelOrder| ModelOrder {
-            estimated_error: order.estimated_error.map(|error| error.max(left)),
-            ..order
-        };
-        let looser = if given { 1.0 } else { (BESIDE * left / tol).max(1.0) };
+        // no mesh holds the tolerance where these do not
+        let beside = left.max(turned(&modes, options.stop));
+        let looser = if given { 1.0 } else { (BESIDE * beside / tol).max(1.0) };
         let Some(highest) = modes.iter().rposition(|m| m.amplitude > NEGLIGIBLE * looser * tol) else {
-            return Ok(at_least(still));
+            return Ok((still, left));
         };
         let of_modes = modes[..=highest].iter();
         let tolerances: Vec<f64> = of_modes.map(|m| tolerance(m, options.stop, looser * tol)).collect();
@@ -110,7 +107,7 @@ pub(super) fn order(moving: &Compiled, options: &TransientOptions<'_>) -> Result
         if given {
             let swings: Vec<f64> = modes[..=highest].iter().map(|m| 2f64.sqrt() * m.amplitude).collect();
             let estimated_error = told(&moving.options, &still.segments, &swings, &mut analyse);
-            return Ok(at_least(merged(&still, &ModelOrder { estimated_error, ..still.clone() })));
+            return Ok((merged(&still, &ModelOrder { estimated_error, ..still.clone() }), left));
         }
         // the estimates of frequencies have been found too small: a part of the tolerance is theirs, and what is told is the estimate
         let sharper = tolerances.iter().map(|t| (counted::SAFETY * t).max(SHARPEST)).collect();
@@ -119,10 +116,10 @@ pub(super) fn order(moving: &Compiled, options: &TransientOptions<'_>) -> Result
         let order = order.with_estimate_times(looser * counted::SAFETY);
         let mesh = merged(&still, &order);
         if order.estimated_error.is_some() {
-            return Ok(at_least(mesh));
+            return Ok((mesh, left));
         }
         let fitted = doubling::fit(&moving.structure, &moving.options, mesh.segments.clone(), &mut analyse);
-        return Ok(at_least(fitted.map_or(mesh, |fitted| merged(&still, &fitted.with_estimate_times(looser)))));
+        return Ok((fitted.map_or(mesh, |fitted| merged(&still, &fitted.with_estimate_times(looser))), left));
     }
 }
 
@@ -130,13 +127,23 @@ pub(super) fn order(moving: &Compiled, options: &TransientOptions<'_>) -> Result
 pub(super) fn told_of_motion(moving: &Compiled, options: &TransientOptions<'_>) -> Vec<Diagnostic> {
     let Ok((modes, _)) = excited(moving, options, &moving.order.segments, FIRST) else { return Vec::new() };
     let missed = options.step.and_then(|step| Some(of_steps(step, outrun(moving, step, &modes)?)));
+    missed.into_iter().chain(of_rotary(moving, late(&modes, options.stop))).collect()
+}
+
+/// By how much of its amplitude a run is off for want of rotary inertia.
+fn late(modes: &[Excited], stop: f64) -> f64 {
     let late = |mode: &Excited| {
-        let lasts = options.stop.min(2.0 / mode.decay.max(f64::MIN_POSITIVE));
+        let lasts = stop.min(2.0 / mode.decay.max(f64::MIN_POSITIVE));
         // a wave that has lost its phase is off by what it swings
         mode.amplitude * (mode.rotary * TAU * mode.frequency * lasts / 3f64.sqrt()).min(2f64.sqrt())
     };
-    let error = modes.iter().map(late).fold(0.0, f64::max);
-    missed.into_iter().chain(of_rotary(moving, error)).collect()
+    modes.iter().map(late).fold(0.0, f64::max)
+}
+
+/// The same where it makes another waveform of the run.
+fn turned(modes: &[Excited], stop: f64) -> f64 {
+    let late = late(modes, stop);
+    if late > ANOTHER { late } else { 0.0 }
 }
 
 /// The mode that a run in equal steps begins with and cannot follow: its frequency [Hz] and its share of the way. A step longer than a
@@ -146,25 +153,6 @@ fn outrun(moving: &Compiled, step: f64, modes: &[Excited]) -> Option<(f64, f64)>
     let too_fast = |mode: &&Excited| TAU * mode.frequency * step > 1.0;
     let most = modes.iter().filter(swings).filter(too_fast).max_by(|a, b| a.amplitude.total_cmp(&b.amplitude))?;
     Some((most.frequency, most.amplitude))
-}
-
-/// A signal that is the rate of a displacement.
-fn is_rate(name: &str) -> bool {
-    name.rsplit_once('.').is_some_and(|(_, part)| ["vx", "vy", "vrz"].contains(&part))
-}
-
-/// Counts each mode by its share in rates where that is more than in displacements; and how many times as much what is left counts,
-/// which swings no slower than the last.
-fn faster(modes: &mut [Excited]) -> f64 {
-    let fastest = modes.iter().map(|m| m.amplitude * m.frequency).fold(0.0, f64::max);
-    if fastest == 0.0 {
-        return 1.0;
-    }
-    let largest = modes.iter().map(|m| m.amplitude).fold(0.0, f64::max);
-    for mode in modes.iter_mut() {
-        mode.amplitude = mode.amplitude.max(largest * mode.amplitude * mode.frequency / fastest);
-    }
-    modes.last().map_or(1.0, |last| (largest * last.frequency / fastest).max(1.0))
 }
 
 /// The estimate of a mesh as it is: a mode that has lost its phase is wrong by what it swings, and by no more.

@@ -10,7 +10,7 @@
 //! | path | its folds, bifurcations and end, compared with those of twice the segments | `path` |
 //! | frequency response | the response itself and the modes within the band, compared with those of twice the segments | `in_band` |
 //! | transient | the states it starts from and goes to, and the modes that the difference of the two excites | `excited` |
-//! | transient whose stiffness changes on the way | the run itself, compared with that of half the segments | `swung` |
+//! | transient whose stiffness changes on the way, or with a part in none of the modes | the run itself, compared with that of half the segments | `swung` |
 //!
 //! Who gives a number of segments gets them, and the estimate of their error. Who gives a band gets the mesh for that band at
 //! least. The estimate is in [`Compiled::order`]; where it is missing or beyond the tolerance, a warning is added.
@@ -152,6 +152,6 @@ fn left_out_in_time(moving: &Compiled, start: Option<&Compiled>, voltages: &Port
 /// # Errors
 /// See [`fitted`].
 pub fn order_in_time(moving: &Compiled, options: &TransientOptions<'_>) -> Result<ModelOrder, AnalysisError> {
-    let order = excited::order(moving, options)?;
-    swung::order(moving, options, order)
+    let (order, left) = excited::order(moving, options)?;
+    swung::order(moving, options, order, left)
 }

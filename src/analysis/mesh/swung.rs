@@ -7,6 +7,9 @@
 //! Richardson's rule it is the error of the finer one where the order of convergence is 1, as it is taken to be until it is measured, and three
 //! times that where it is 2. Where it is beyond the tolerance segments are doubled, until the tolerance holds. A coarser mesh on the way that should hold it as well is run and
 //! compared; if it does, it is taken. What is told of a mesh is always of one that was run.
+//!
+//! Where stiffness stays, but more of the run than the tolerance is in none of the modes that its mesh was laid out for, a bound would be all
+//! that could be told: that run is made twice, too, and what the two differ by is told instead.
 
 use super::super::AnalysisError;
 use super::super::chart::error::largest_error;
@@ -45,33 +48,35 @@ const AIM: f64 = 0.7;
 /// where the run is near buckling, it is less, or seems to be more.
 const ORDERS: (f64, f64) = (1.0, 2.0);
 
-/// The mesh for a run, from that for its ends and modes.
+/// The mesh for a run, from that for its ends and modes; what is in none of the modes may be off by `left` of the amplitude.
 pub(super) fn order(
     moving: &Compiled,
     options: &TransientOptions<'_>,
     order: ModelOrder,
+    left: f64,
 ) -> Result<ModelOrder, AnalysisError> {
+    let at_least =
+        |error: f64| ModelOrder { estimated_error: order.estimated_error.map(|own| own.max(error)), ..order.clone() };
     let beams = !moving.structure.beams.is_empty() && order.segments.len() == moving.order.segments.len();
     let same = options.release.is_none_or(|start| start.order.segments.len() == order.segments.len());
-    if !beams || !same || options.signals.is_empty() || !bends(moving, options, &order)? {
-        return Ok(order);
+    if !beams || !same || options.signals.is_empty() {
+        return Ok(at_least(left));
+    }
+    let goal = SAFETY * moving.options.tol;
+    if !bends(moving, options, &order)? {
+        let found = (left > moving.options.tol).then(|| compared(moving, options, &order.segments)).flatten();
+        return Ok(match found {
+            // both runs have what the modes are off by, too
+            Some(error) if error <= goal => ModelOrder { estimated_error: Some(error), ..order },
+            error => at_least(error.map_or(left, |error| error.min(left))),
+        });
     }
     let given = chosen(moving) || moving.options.band.is_some();
-    let goal = SAFETY * moving.options.tol;
-    let on = |segments: &[usize], error: Option<f64>| ModelOrder {
-        segments: segments.to_vec(),
-        estimated_error: order.estimated_error.zip(error).map(|(own, error)| own.max(error)),
-        ..order.clone()
+    let on = |segments: &[usize], error: Option<f64>| {
+        let estimated_error = order.estimated_error.zip(error).map(|(own, error)| own.max(error));
+        ModelOrder { segments: segments.to_vec(), estimated_error, ..order.clone() }
     };
-    // half of an odd number is none: then twice as many are compared
-    let is_even = order.segments.iter().all(|n| n % 2 == 0);
-    let half = || order.segments.iter().map(|n| n / 2).collect();
-    let pair = if is_even {
-        Some((half(), order.segments.clone()))
-    } else {
-        twice(moving, &order.segments).map(|more| (order.segments.clone(), more))
-    };
-    let first = pair.and_then(|(from, to)| Some((swing(moving, options, &from)?, from, to)));
+    let first = pair(moving, &order.segments).and_then(|(from, to)| Some((swing(moving, options, &from)?, from, to)));
     // what fails says so when it is run; nothing tells of what is not compared
     let Some((mut coarse, mut from, mut segments)) = first else { return Ok(on(&order.segments, None)) };
     let (mut before, mut convergence) = (None, ORDERS.0);
@@ -106,6 +111,24 @@ pub(super) fn order(
         segments = next.unwrap_or_default();
     }
     Ok(last)
+}
+
+/// A mesh, and the one beside it that tells what a run on it is off by: half its segments; of an odd number there is no half, then twice as
+/// many. The coarser first.
+fn pair(moving: &Compiled, segments: &[usize]) -> Option<(Vec<usize>, Vec<usize>)> {
+    if segments.iter().all(|n| n % 2 == 0) {
+        Some((segments.iter().map(|n| n / 2).collect(), segments.to_vec()))
+    } else {
+        twice(moving, segments).map(|more| (segments.to_vec(), more))
+    }
+}
+
+/// What the run on this mesh is off by, of the amplitude; none where the runs fail.
+fn compared(moving: &Compiled, options: &TransientOptions<'_>, segments: &[usize]) -> Option<f64> {
+    let (from, to) = pair(moving, segments)?;
+    let difference = apart(moving, options, &swing(moving, options, &from)?, &swing(moving, options, &to)?)?;
+    let of_finer = difference / (ORDERS.0.exp2() - 1.0);
+    Some(if from == segments { difference + of_finer } else { of_finer })
 }
 
 /// A share of the segments, and no fewer than at least.

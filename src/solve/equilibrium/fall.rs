@@ -7,7 +7,7 @@ use super::path::LoadPath;
 use super::{Equilibrium, Path, size};
 use crate::domains::System;
 use crate::multibody::BlockMatrix;
-use crate::multibody::planar::Pose;
+use crate::multibody::planar::{Block, Pose};
 use crate::solve::SolveError;
 
 /// Smallest damping that is tried, as a share of the softest translation of a body by its own joints: what keeps a part back just
@@ -120,8 +120,9 @@ impl Equilibrium {
             damping = if damping == 0.0 { first } else { 3.0 * damping };
         }
         // inverse iteration from a fixed vector without symmetry
+        let lightest = lightest(system);
         for (j, x) in self.step.iter_mut().enumerate() {
-            let m = fall_mass(system, j);
+            let m = fall_mass(system, j, lightest);
             *x = Pose::new(m.x, m.y * (1.0 + 0.37 * ((j * 7) % 5) as f64), m.z / system.length_scale);
         }
         for _ in 0..3 {
@@ -130,7 +131,7 @@ impl Equilibrium {
             let scale = 1e-3 * system.length_scale / size(system, &self.step);
             for (j, x) in self.step.iter_mut().enumerate() {
                 self.trial[j] = *x * scale;
-                *x = fall_mass(system, j).component_mul(&self.trial[j]);
+                *x = fall_mass(system, j, lightest).component_mul(&self.trial[j]);
             }
         }
         if self.trial.iter().all(|x| x.iter().all(|v| v.is_finite())) {
@@ -143,8 +144,9 @@ impl Equilibrium {
     /// `tangent += damping · mass-like weights`.
     fn add_damping(&mut self, system: &System, damping: f64) {
         if damping > 0.0 {
+            let lightest = lightest(system);
             for (j, block) in self.tangent.diagonal.iter_mut().enumerate() {
-                let m = fall_mass(system, j);
+                let m = fall_mass(system, j, lightest);
                 for i in 0..3 {
                     block[(i, i)] += damping * m[i];
                 }
@@ -153,15 +155,23 @@ impl Equilibrium {
     }
 }
 
-/// Mass-like weights of the overdamped motion; massless bodies get the lightest body's.
-fn fall_mass(system: &System, body: usize) -> Pose {
+/// Mass-like weights of the overdamped motion; bodies without mass get `lightest` [kg].
+fn fall_mass(system: &System, body: usize, lightest: f64) -> Pose {
     let m = system.model.mass(body);
-    let floor = 1e-18;
-    Pose::new(m.x.max(floor), m.y.max(floor), m.z.max(floor * system.length_scale * system.length_scale))
+    let turning = lightest * system.length_scale * system.length_scale;
+    Pose::new(m.x.max(lightest), m.y.max(lightest), m.z.max(turning))
+}
+
+/// The smallest mass of a body that has some [kg]; 1 where none has: the overdamped motion knows ratios alone.
+fn lightest(system: &System) -> f64 {
+    let masses = (0..system.bodies()).map(|j| system.model.mass(j).x).filter(|m| *m > 0.0);
+    let least = masses.fold(f64::INFINITY, f64::min);
+    if least.is_finite() { least } else { 1.0 }
 }
 
 /// A typical stiffness over mass, to begin damping with.
 fn mean_ratio(system: &System, tangent: &BlockMatrix<f64, 3>) -> f64 {
-    let n = tangent.diagonal.len();
-    (0..n).map(|j| tangent.diagonal[j][(0, 0)].abs() / fall_mass(system, j).x).fold(f64::INFINITY, f64::min)
+    let lightest = lightest(system);
+    let ratio = |(j, block): (usize, &Block)| block[(0, 0)].abs() / fall_mass(system, j, lightest).x;
+    tangent.diagonal.iter().enumerate().map(ratio).fold(f64::INFINITY, f64::min)
 }
