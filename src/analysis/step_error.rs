@@ -6,6 +6,9 @@
 //! error of the finer run; found are ratios of the two errors from 1 (the single bimorph let go from 7 µm) to 12, so half of it is told, and of
 //! methods of second order, whose ratios are about two, all of it.
 //!
+//! Where the error is beyond the tolerance, and the run is short, it is made again at a tenth of the tolerance, with the run before as its companion: of
+//! a method of order four or more that costs it less than twice the steps. What takes long is told as it comes, once, with its warning.
+//!
 //! A companion has a third to a half of the steps. One that would take long is given up after 3e6 unknowns times steps, and its difference
 //! is continued in proportion to time, as phases go.
 
@@ -29,6 +32,16 @@ const SHARE_OF_SECOND: f64 = 1.0;
 const RESERVE: f64 = 1.2;
 /// Unknowns times steps of a companion, at most.
 const MOST_WORK: f64 = 3e6;
+/// The same of a run that is made again: some seconds.
+const MOST_AGAIN: f64 = 1e7;
+/// Times the steps of a run that one at a tenth of its tolerance takes, of the methods that are run again.
+const MORE: f64 = 2.0;
+/// How much sharper than asked for the steps of a run may be.
+const MOST_SHARPER: f64 = 99.0;
+/// Samples of a run that is run again, at most.
+const MOST_KEPT: usize = 1 << 20;
+/// Where the estimate of a single run is made.
+const AT_THE_END: &str = "by the end of the run";
 /// Output times that a companion must have reached to say something.
 const FEWEST: usize = 16;
 /// Output times that are compared, at most about twice as many: evenly spaced ones of a run that has more.
@@ -59,7 +72,68 @@ pub fn with_step_error<T>(
     sample: &mut dyn FnMut(f64, &[f64]),
     watch: Watch<'_>,
 ) -> Result<(TransientResult, T), AnalysisError> {
+    held(options, model, run, sample, watch).map(|(result, more, _)| (result, more))
+}
+
+/// The same, with the tolerance that the steps of the run followed.
+fn held<T>(
+    options: &TransientOptions<'_>,
+    model: &Compiled,
+    run: Run<'_, T>,
+    sample: &mut dyn FnMut(f64, &[f64]),
+    watch: Watch<'_>,
+) -> Result<(TransientResult, T, f64), AnalysisError> {
+    let unknowns = model.unknowns() as f64;
     let (companion, whole) = companion(options, model.unknowns(), run, watch)?;
+    let steps = companion.as_ref().map_or(0, |c| c.counters.steps) as f64;
+    // what takes long is told as it comes, and once
+    let again = whole
+        && options.step.is_none()
+        && is_high(Formulation::of_run(model, options).1)
+        && MORE * MORE * steps * unknowns <= MOST_AGAIN
+        && options.points * options.signals.len() <= MOST_KEPT;
+    if !again {
+        let mut made = once(options, model, (companion, whole), run, sample, watch)?;
+        made.result.warnings.extend(made.result.step_error.and_then(|e| beyond(options, e, AT_THE_END)));
+        return Ok((made.result, made.more, options.tol));
+    }
+    let mut now = options.clone();
+    let mut kept = Kept::default();
+    let mut made = once(&now, model, (companion, whole), run, &mut |t, values| kept.keep(t, values), watch)?;
+    while made.result.step_error.is_some_and(|error| error > options.tol)
+        && MORE * made.result.counters.steps as f64 * unknowns <= MOST_AGAIN
+        && now.tol > options.tol / MOST_SHARPER
+    {
+        let sharper = TransientOptions { tol: now.tol / LOOSER, ..options.clone() };
+        let mut others = Kept::default();
+        let companion = (Some(made.picked.clone()), true);
+        match once(&sharper, model, companion, run, &mut |t, values| others.keep(t, values), watch) {
+            Ok(found) if found.result.step_error.is_some() => (made, kept, now) = (found, others, sharper),
+            Err(AnalysisError::Cancelled) => return Err(AnalysisError::Cancelled),
+            _ => break,
+        }
+    }
+    kept.tell(sample);
+    made.result.warnings.extend(made.result.step_error.and_then(|e| beyond(options, e, AT_THE_END)));
+    Ok((made.result, made.more, now.tol))
+}
+
+/// A run with its estimate, and what a sharper one is compared with.
+struct Made<T> {
+    result: TransientResult,
+    more: T,
+    picked: TransientResult,
+}
+
+/// One run, compared with its companion, which may have come to its end.
+fn once<T>(
+    options: &TransientOptions<'_>,
+    model: &Compiled,
+    (companion, whole): (Option<TransientResult>, bool),
+    run: Run<'_, T>,
+    sample: &mut dyn FnMut(f64, &[f64]),
+    watch: Watch<'_>,
+) -> Result<Made<T>, AnalysisError> {
     let reached = companion.as_ref().map_or(0, |c| c.signals.first().map_or(0, |s| s.2.len()));
     let mut picked = Picked::new(options, reached);
     let mut both = |t: f64, values: &[f64]| {
@@ -67,23 +141,42 @@ pub fn with_step_error<T>(
         sample(t, values);
     };
     let (mut result, more) = run(options, &mut both, watch)?;
-    // one that took the same steps proves nothing
-    let other = |c: &TransientResult| c.counters.steps != result.counters.steps;
     // what both do not resolve they have in common
     let resolved = options.step.is_some() || resolved(&picked, &result, options, model);
-    let Some(companion) = companion.filter(|c| (whole || reached >= FEWEST) && other(c) && resolved) else {
-        result.warnings.extend((!options.signals.is_empty()).then(|| unknown(options)));
-        return Ok((result, more));
-    };
     let signals = picked.signals(&result.signals);
-    let found = TransientResult { signals, ..companion.clone() };
-    let apart = largest_error(&found, &companion, &|unit| least(unit, options, model));
-    let share = ((reached - 1) * stride(options)) as f64 / (options.points - 1) as f64;
-    let (_, method) = Formulation::of_run(model, options);
-    let error = told_of(options, method) * apart / share.min(1.0);
-    result.step_error = Some(error);
-    result.warnings.extend(beyond(options, error, "by the end of the run"));
-    Ok((result, more))
+    let picked = TransientResult { signals, counters: result.counters, ..TransientResult::default() };
+    // one that took the same steps proves nothing
+    let other = |c: &TransientResult| c.counters.steps != result.counters.steps;
+    match companion.filter(|c| (whole || reached >= FEWEST) && other(c) && resolved) {
+        Some(companion) => {
+            let apart = largest_error(&picked, &companion, &|unit| least(unit, options, model));
+            let share = ((reached - 1) * stride(options)) as f64 / (options.points - 1) as f64;
+            let (_, method) = Formulation::of_run(model, options);
+            result.step_error = Some(told_of(options, method) * apart / share.min(1.0));
+        }
+        None => result.warnings.extend((!options.signals.is_empty()).then(|| unknown(options))),
+    }
+    Ok(Made { result, more, picked })
+}
+
+/// Samples that nobody was told of yet.
+#[derive(Default)]
+struct Kept {
+    t: Vec<f64>,
+    values: Vec<f64>,
+}
+
+impl Kept {
+    fn keep(&mut self, t: f64, values: &[f64]) {
+        crate::budget::lay_out(size_of_val(values) + size_of::<f64>());
+        self.t.push(t);
+        self.values.extend(values);
+    }
+
+    fn tell(&self, sample: &mut dyn FnMut(f64, &[f64])) {
+        let width = (self.values.len() / self.t.len().max(1)).max(1);
+        self.t.iter().zip(self.values.chunks(width)).for_each(|(t, values)| sample(*t, values));
+    }
 }
 
 /// Whether the displacements of a run swing by more than what the floor of a step's error hides, in the run as in its companion; or by rounding.
@@ -102,14 +195,16 @@ fn loose(options: &TransientOptions<'_>) -> f64 {
 /// Share of the difference that is told: of a companion that is hardly looser, more than all of it, since the error is in proportion to
 /// the tolerance at best.
 fn told_of(options: &TransientOptions<'_>, method: Integrator) -> f64 {
-    let share = match method {
-        Integrator::Rodas4 | Integrator::Radau5 | Integrator::Sdirk4 => SHARE,
-        _ => SHARE_OF_SECOND,
-    };
+    let share = if is_high(method) { SHARE } else { SHARE_OF_SECOND };
     match options.step {
         Some(_) => SHARE,
         None => share.max(RESERVE / (loose(options) / options.tol - 1.0)),
     }
+}
+
+/// Of a method whose error falls fast with the length of its steps.
+fn is_high(method: Integrator) -> bool {
+    matches!(method, Integrator::Rodas4 | Integrator::Radau5 | Integrator::Sdirk4)
 }
 
 /// The amplitude below which a signal of this unit stands still.
@@ -206,12 +301,14 @@ impl Picked {
     }
 }
 
-/// The estimate alone, for one of several runs that are alike: at `points` output times. None where nothing was compared.
-pub(crate) fn step_error(options: &TransientOptions<'_>, model: &Compiled, watch: Watch<'_>) -> Option<f64> {
+/// The estimate alone, for one of several runs that are alike, at `points` output times; and the tolerance that their steps have to follow
+/// for it. None where nothing was compared.
+pub(crate) fn step_error(options: &TransientOptions<'_>, model: &Compiled, watch: Watch<'_>) -> (Option<f64>, f64) {
     let mut run = |options: &TransientOptions<'_>, sample: &mut dyn FnMut(f64, &[f64]), watch: Watch<'_>| {
         Ok((transient(model, options, sample, watch)?, ()))
     };
-    with_step_error(options, model, &mut run, &mut |_, _| (), watch).ok()?.0.step_error
+    let found = held(options, model, &mut run, &mut |_, _| (), watch);
+    found.map_or((None, options.tol), |(result, (), tol)| (result.step_error, tol))
 }
 
 /// What to say of steps that nothing was compared with.

@@ -4,8 +4,8 @@
 //! (`probes`); all points take what is the finest of them beam by beam, and are told the largest of their estimates. A
 //! point whose drawing has other beams finds its own.
 //!
-//! How far the steps may be off is estimated in the middle of the grid, at the cost of some two runs, and told at every point where it is
-//! beyond the tolerance.
+//! What tolerance the steps have to follow, and how far they may be off then, is found in the middle of the grid, at the cost of some two runs, and told
+//! at every point where it is beyond the tolerance.
 
 use super::axis::{SweepParameter, at};
 use super::failed::Failed;
@@ -32,6 +32,8 @@ pub(super) const CHUNK: usize = 64;
 /// Corners that are all looked at; where there are more, the ends of each axis with the others in the middle.
 const MOST_CORNERS: usize = 8;
 
+/// Where steps are judged that all points share.
+const IN_THE_MIDDLE: &str = "in the middle of the grid";
 /// Output times of the run by which the steps are judged.
 const JUDGED: usize = 201;
 
@@ -39,15 +41,25 @@ const JUDGED: usize = 201;
 struct Shared {
     beams: Vec<Beam>,
     order: ModelOrder,
-    /// How far the steps may be off in the middle of the grid, as a share of the amplitude; none: not compared.
-    step_error: Option<f64>,
+    /// The steps in the middle of the grid.
+    steps: Steps,
+}
+
+/// What the steps of a run follow, and how far they may be off.
+#[derive(Debug, Clone, Copy)]
+struct Steps {
+    /// Their tolerance [1].
+    tol: f64,
+    /// As a share of the amplitude; none: not compared.
+    error: Option<f64>,
+    /// Where that was found.
+    place: &'static str,
 }
 
 /// A point on its mesh.
 struct Prepared {
     compiled: Compiled,
-    /// How far its steps may be off, none: not compared; and where that was found.
-    step_error: (Option<f64>, &'static str),
+    steps: Steps,
     /// What its run leaves out.
     told: Vec<String>,
 }
@@ -75,13 +87,17 @@ impl<'a> Transients<'a> {
         let go_on = || finished(None);
         let prepare = |&number: &usize| means.guarded(|| self.prepare(&self.spec.settings(number), &go_on));
         let prepared: Vec<Result<Prepared, Failed>> = numbers.iter().map(prepare).collect();
-        let variants: Vec<(usize, &Compiled)> =
-            prepared.iter().enumerate().filter_map(|(k, p)| Some((k, &p.as_ref().ok()?.compiled))).collect();
+        // lanes have one tolerance for all
+        let tol = prepared.iter().flatten().next().map_or(self.options.tol, |point| point.steps.tol);
+        let like = |p: &'_ Result<Prepared, Failed>| p.as_ref().is_ok_and(|point| point.steps.tol == tol);
+        let variants: Vec<(usize, &Compiled)> = (prepared.iter().enumerate().filter(|(_, p)| like(p)))
+            .filter_map(|(k, p)| Some((k, &p.as_ref().ok()?.compiled)))
+            .collect();
         let compiled: Vec<&Compiled> = variants.iter().map(|(_, compiled)| *compiled).collect();
         // lanes have one voltage for all
         let same = self.spec.ports().next().is_none();
         let side_by_side = same.then(|| {
-            let options = self.transient(&[]);
+            let options = TransientOptions { tol, ..self.transient(&[]) };
             means.guarded(|| {
                 side_by_side::ends(&compiled, &options, &mut || finished(None)).map_err(|error| error.to_string())
             })
@@ -99,7 +115,7 @@ impl<'a> Transients<'a> {
             let values = match (prepared, end) {
                 (Err(error), _) => Err(error.clone()),
                 (Ok(point), Some(end)) => self.found(point, &options, end).map_err(Failed::from),
-                (Ok(point), None) => means.guarded(|| self.found(point, &options, alone(&point.compiled, &options)?)),
+                (Ok(point), None) => means.guarded(|| self.found(point, &options, alone(point, &options)?)),
             };
             let parameters = settings.into_iter().map(|(_, value)| value).collect();
             let outcome = Outcome { number, parameters, values };
@@ -135,13 +151,13 @@ impl<'a> Transients<'a> {
         match shared.filter(|shared| alike(&shared.beams, &drawn.structure.beams)) {
             Some(shared) => {
                 let compiled = drawn.on(shared.order.clone()).map_err(|error| error.to_string())?;
-                Ok(prepared(compiled, &options, (shared.step_error, "in the middle of the grid")))
+                Ok(prepared(compiled, &options, shared.steps))
             }
             None => {
                 let compiled = drawn.compile().map_err(|error| brief(&error))?;
                 let (compiled, _) = mesh::fitted_in_time(&compiled, &options).map_err(|error| error.to_string())?;
-                let step_error = steps(&compiled, options.clone(), go_on);
-                Ok(prepared(compiled, &options, (step_error, "by the end of the run")))
+                let steps = steps(&compiled, options.clone(), "by the end of the run", go_on);
+                Ok(prepared(compiled, &options, steps))
             }
         }
     }
@@ -154,7 +170,10 @@ impl<'a> Transients<'a> {
             let Some(compiled) = drawn.ok().and_then(|drawn| drawn.compile().ok()) else { continue };
             let Ok(order) = mesh::order_in_time(&compiled, &self.transient(&settings)) else { continue };
             match &mut shared {
-                None => shared = Some(Shared { beams: compiled.structure.beams.clone(), order, step_error: None }),
+                None => {
+                    let steps = Steps { tol: self.options.tol, error: None, place: IN_THE_MIDDLE };
+                    shared = Some(Shared { beams: compiled.structure.beams.clone(), order, steps });
+                }
                 Some(shared) if alike(&shared.beams, &compiled.structure.beams) => {
                     for (most, n) in shared.order.segments.iter_mut().zip(order.segments) {
                         *most = (*most).max(n);
@@ -170,12 +189,14 @@ impl<'a> Transients<'a> {
         let drawn = draw(self.source, &at(&self.options, &settings)).ok();
         let middle = drawn.filter(|drawn| alike(&shared.beams, &drawn.structure.beams));
         let middle = middle.and_then(|drawn| drawn.on(shared.order.clone()).ok());
-        shared.step_error = middle.and_then(|compiled| steps(&compiled, self.transient(&settings), go_on));
+        if let Some(compiled) = middle {
+            shared.steps = steps(&compiled, self.transient(&settings), IN_THE_MIDDLE, go_on);
+        }
         Some(shared)
     }
 
     fn found(&self, point: &Prepared, options: &TransientOptions<'_>, end: RunEnd) -> Result<Found, String> {
-        let Prepared { compiled, step_error: (step_error, place), told } = point;
+        let Prepared { compiled, steps: Steps { error, place, .. }, told } = point;
         let mut values = Vec::with_capacity(end.values.len());
         for (name, value) in options.signals.iter().zip(end.values) {
             if !value.is_finite() {
@@ -187,7 +208,7 @@ impl<'a> Transients<'a> {
         let estimated_error = compiled.order.estimated_error;
         let beyond = mesh::beyond(self.options.tol, estimated_error);
         let beyond = beyond.map(|message| format!("{}: {message}", mesh::WARNING));
-        let steps = match step_error {
+        let steps = match error {
             Some(error) => step_error::beyond(options, *error, place),
             None => Some(step_error::unknown(options)),
         };
@@ -199,20 +220,22 @@ impl<'a> Transients<'a> {
 }
 
 /// A point on its mesh, with what its run leaves out.
-fn prepared(compiled: Compiled, options: &TransientOptions<'_>, step_error: (Option<f64>, &'static str)) -> Prepared {
+fn prepared(compiled: Compiled, options: &TransientOptions<'_>, steps: Steps) -> Prepared {
     let told = mesh::told_of_run(&compiled, None, &options.voltages);
-    Prepared { step_error, told: told.iter().map(|d| format!("{}: {}", d.code, d.message)).collect(), compiled }
+    Prepared { steps, told: told.iter().map(|d| format!("{}: {}", d.code, d.message)).collect(), compiled }
 }
 
-/// How far the steps of a run of this variant may be off.
-fn steps(compiled: &Compiled, run: TransientOptions<'_>, go_on: &dyn Fn() -> bool) -> Option<f64> {
+/// The steps of a run of this variant.
+fn steps(compiled: &Compiled, run: TransientOptions<'_>, place: &'static str, go_on: &dyn Fn() -> bool) -> Steps {
     let options = TransientOptions { points: JUDGED, ..run };
-    step_error::step_error(&options, compiled, &mut |_| go_on())
+    let (error, tol) = step_error::step_error(&options, compiled, &mut |_| go_on());
+    Steps { tol, error, place }
 }
 
 /// A run of its own.
-fn alone(compiled: &Compiled, options: &TransientOptions<'_>) -> Result<RunEnd, String> {
-    let result = transient(compiled, options, &mut |_, _| (), &mut |_| true);
+fn alone(point: &Prepared, options: &TransientOptions<'_>) -> Result<RunEnd, String> {
+    let options = TransientOptions { tol: point.steps.tol, ..options.clone() };
+    let result = transient(&point.compiled, &options, &mut |_, _| (), &mut |_| true);
     let result = result.map_err(|error: AnalysisError| error.to_string())?;
     let last = |(_, _, values): &(String, String, Vec<f64>)| values.last().copied().unwrap_or(f64::NAN);
     let values = result.signals.iter().map(last).collect();
