@@ -71,6 +71,23 @@ pub(super) fn judge(heard: &Heard, failure: &Path, deck: &Path, has_control: boo
 const ABORTS: [&str; 4] =
     ["simulation(s) aborted", "MIF-ERROR", "circuit not parsed", "Simulation interrupted due to error"];
 
+/// What ngspice says of a look at a part that has no such thing, before it saves a column of zeros for it.
+fn unseen(text: &str) -> Option<String> {
+    let (_, name) = text.split_once("unrecognized variable")?;
+    let name = name.trim_start_matches([' ', '-']).trim();
+    let of_part = name.get(..2).is_some_and(|start| start.eq_ignore_ascii_case("@a"));
+    of_part.then(|| format!("nothing is called {name}: it would be saved as zeros; names are those of the part's signals, and hottest, closest, moved in process"))
+}
+
+/// What ngspice shows of its progress, all in one line, is no message.
+const PROGRESS: &str = "Reference value";
+
+/// A line without what shows progress.
+fn without_progress(line: &[u8]) -> Vec<u8> {
+    let shows = |part: &&[u8]| !String::from_utf8_lossy(part).trim_start().starts_with(PROGRESS);
+    line.split(|byte| *byte == b'\r').filter(shows).flatten().copied().collect()
+}
+
 /// Reads ngspice's messages to their end: the line that tells an abort, whether nothing was run, and what was kept.
 fn hear(stderr: impl Read, capture: bool) -> std::io::Result<(Option<String>, bool, Vec<u8>)> {
     let (mut aborted, mut nothing_run, mut messages) = (None, false, Vec::new());
@@ -81,11 +98,19 @@ fn hear(stderr: impl Read, capture: bool) -> std::io::Result<(Option<String>, bo
         if ABORTS.iter().any(|words| text.contains(words)) {
             aborted.get_or_insert_with(|| text.trim().to_owned());
         }
+        if let Some(reason) = unseen(&text) {
+            aborted.get_or_insert(reason);
+        }
         nothing_run |= text.contains("no simulations run");
         if capture {
-            // an option that is misspelt is left out by ngspice: that is told whatever is not shown
-            if text.contains("unrecognized parameter") {
-                let _ = std::io::stderr().write_all(format!("warning: {}\n", text.trim()).as_bytes());
+            let line = without_progress(&line);
+            let text = String::from_utf8_lossy(&line);
+            let text = text.trim();
+            // told whatever is not shown: an option that is misspelt and so left out by ngspice, and how far off a model may be
+            let of_model = text.starts_with("bimorph: ") && text.contains(": warning[");
+            if of_model || text.contains("unrecognized parameter") {
+                let told = if of_model { format!("{text}\n") } else { format!("warning: {text}\n") };
+                let _ = std::io::stderr().write_all(told.as_bytes());
             }
             messages.extend_from_slice(&line);
         } else {

@@ -164,14 +164,18 @@ impl Session {
                     Signal::Pull(g) => nothing * system.pull(*g, view.q, view.volts[*g]).abs(),
                     Signal::Charge(g) => charge(system.capacitance(*g, view.q), view.volts[*g]),
                 };
-                before.shown.step(request.dt, seen, tol, |n| match n.checked_sub(signals) {
+                let pushed = |n: usize| {
+                    n.checked_sub(signals).is_some_and(|port| matches!(self.ports.answers[port], Answer::Motion(_)))
+                };
+                let floor = |n: usize| match n.checked_sub(signals) {
                     None => of_signal(&self.signals[n]),
                     Some(port) => match &self.ports.answers[port] {
                         Answer::Current => charge(reply.dq_dv[port * (ports + 1)], request.voltages[port]),
                         Answer::Motion(signal) => of_signal(signal),
                         Answer::Rise(_) | Answer::Nothing => SAME_TEMPERATURE,
                     },
-                })
+                };
+                before.shown.step(request.dt, seen, tol, floor, pushed)
             }
         }
     }

@@ -66,6 +66,12 @@ pub enum CardError {
         /// The name.
         word: String,
     },
+    /// `set` holds a name twice.
+    #[error("set: \"{word}\" has two values; keep the one that is meant")]
+    SetTwice {
+        /// The name.
+        word: String,
+    },
     /// An address that ngspice cut at its `//`.
     #[error(
         "remote: ngspice takes // for a comment; write remote=\"unix:/PATH\", remote=\"HOST:PORT\" or remote=\"https:HOST:PORT\""
@@ -126,10 +132,14 @@ impl ModelCard {
             Some(value) if !(value.is_finite() && value > 0.0) => Err(CardError::NotPositive { name, value }),
             _ => Ok(value),
         };
-        let mut options = CompileOptions {
-            set: settings::settings(&raw.set).map_err(|word| CardError::Set { word })?,
-            ..CompileOptions::default()
+        let set = settings::settings(&raw.set).map_err(|word| CardError::Set { word })?;
+        let twice = |(k, (name, _)): &(usize, &(String, bimorph::netlist::Setting))| {
+            set[..*k].iter().any(|(before, _)| before == name)
         };
+        if let Some((_, (word, _))) = set.iter().enumerate().find(twice) {
+            return Err(CardError::SetTwice { word: word.clone() });
+        }
+        let mut options = CompileOptions { set, ..CompileOptions::default() };
         for (option, written) in MODEL.iter().zip(&raw.options) {
             if let Some(written) = written {
                 deck_options::choose(&mut options, option, written)?;
@@ -270,5 +280,7 @@ mod tests {
         assert_eq!(ModelCard::new(&bad, None), Err(CardError::Address));
         let bad = RawCard { set: vec!["w".into()], ..raw() };
         assert_eq!(ModelCard::new(&bad, None), Err(CardError::Set { word: "w".into() }));
+        let bad = RawCard { set: vec!["w=2u".into(), "g=1u".into(), "w=3u".into()], ..raw() };
+        assert_eq!(ModelCard::new(&bad, None), Err(CardError::SetTwice { word: "w".into() }));
     }
 }
