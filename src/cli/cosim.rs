@@ -125,7 +125,11 @@ impl Cosim {
         if format == Format::Raw {
             return Ok(());
         }
-        let drawn = longest(&raw, None).and_then(|table| {
+        let drawn = longest(&raw, None).and_then(|(table, count)| {
+            if count > 1 {
+                let (file, plot) = (out.display(), &table.title);
+                eprintln!("note: {file} has the longest of {count} plots ({plot}); a .raw file has all, and `bimorph plot` draws any of them");
+            }
             let picture = chart_of(&table, None, &[]);
             write(out, format, || Ok(table), || picture)
         });

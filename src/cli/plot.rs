@@ -71,7 +71,7 @@ impl Plot {
         interrupt::listen();
         let format = Format::from_path(&self.out)?;
         check_folder(&self.out)?;
-        let mut table = longest(&self.file, self.plot)?;
+        let (mut table, _) = longest(&self.file, self.plot)?;
         for other in &self.others {
             join(&mut table, other)?;
         }
@@ -105,8 +105,8 @@ impl Plot {
     }
 }
 
-/// One plot of a raw file: that number, from 1, or the longest.
-pub(crate) fn longest(path: &Path, number: Option<usize>) -> Result<Table, Failure> {
+/// One plot of a raw file: that number, from 1, or the longest; and how many the file has.
+pub(crate) fn longest(path: &Path, number: Option<usize>) -> Result<(Table, usize), Failure> {
     let bytes = std::fs::read(path).map_err(|source| Failure::Read { path: path.to_owned(), source })?;
     let plots = raw::read(&bytes).map_err(|source| Failure::Raw { path: path.to_owned(), source })?;
     let count = plots.len();
@@ -118,7 +118,8 @@ pub(crate) fn longest(path: &Path, number: Option<usize>) -> Result<Table, Failu
         Some(number) => format!("{number}; {} holds {count}", path.display()),
         None => format!("none: {} is empty", path.display()),
     };
-    chosen.ok_or_else(|| Failure::bad("--plot", "the number of a plot in the file", got()))
+    let chosen = chosen.ok_or_else(|| Failure::bad("--plot", "the number of a plot in the file", got()))?;
+    Ok((chosen, count))
 }
 
 /// The chart of a table; without panels one for each unit.
@@ -141,7 +142,7 @@ pub(crate) fn chart_of(table: &Table, title: Option<&str>, panels: &[String]) ->
 
 /// Adds the signals of another raw file, which must run over the same axis.
 fn join(table: &mut Table, path: &Path) -> Result<(), Failure> {
-    let other = longest(path, None)?;
+    let (other, _) = longest(path, None)?;
     let axis = |t: &Table| t.columns().first().map(|c| c.samples.magnitudes()).unwrap_or_default();
     let (own, its) = (axis(table), axis(&other));
     let end = own.last().map_or(0.0, |x| x.abs());
