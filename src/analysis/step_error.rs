@@ -6,7 +6,7 @@
 //! error of the finer run; found are ratios of the two errors from 1 (the single bimorph let go from 7 µm) to 12, so half of it is told, and of
 //! methods of second order, whose ratios are about two, all of it.
 //!
-//! Where the error is beyond the tolerance, and the run is short, it is made again at a tenth of the tolerance, with the run before as its companion: of
+//! Where the error is beyond what the mesh leaves of the tolerance, and the run is short, it is made again at a tenth of the tolerance, with the run before as its companion: of
 //! a method of order four or more that costs it less than twice the steps. What takes long is told as it comes, once, with its warning.
 //!
 //! A companion has a third to a half of the steps. One that would take long is given up after 3e6 unknowns times steps, and its difference
@@ -38,6 +38,8 @@ const MOST_AGAIN: f64 = 1e7;
 const MORE: f64 = 2.0;
 /// How much sharper than asked for the steps of a run may be.
 const MOST_SHARPER: f64 = 99.0;
+/// Share of the tolerance that is left to steps in any case.
+const LEAST_ROOM: f64 = 0.3;
 /// Samples of a run that is run again, at most.
 const MOST_KEPT: usize = 1 << 20;
 /// Where the estimate of a single run is made.
@@ -100,7 +102,8 @@ fn held<T>(
     let mut now = options.clone();
     let mut kept = Kept::default();
     let mut made = once(&now, model, (companion, whole), run, &mut |t, values| kept.keep(t, values), watch)?;
-    while made.result.step_error.is_some_and(|error| error > options.tol)
+    let room = room(options.tol, made.result.estimated_error);
+    while made.result.step_error.is_some_and(|error| error > room)
         && MORE * made.result.counters.steps as f64 * unknowns <= MOST_AGAIN
         && now.tol > options.tol / MOST_SHARPER
     {
@@ -116,6 +119,14 @@ fn held<T>(
     kept.tell(sample);
     made.result.warnings.extend(made.result.step_error.and_then(|e| beyond(options, e, AT_THE_END)));
     Ok((made.result, made.more, now.tol))
+}
+
+/// What a tolerance leaves to the steps of a run whose mesh may be off by so much.
+fn room(tol: f64, mesh: Option<f64>) -> f64 {
+    match mesh {
+        Some(mesh) if mesh <= tol => (tol - mesh).max(LEAST_ROOM * tol),
+        _ => tol,
+    }
 }
 
 /// A run with its estimate, and what a sharper one is compared with.

@@ -23,7 +23,7 @@ use std::path::PathBuf;
 
 /// Motion in time, from rest or from a released equilibrium.
 ///
-/// A run whose steps turn out to be off by more than --tol at its end is made again with sharper ones, where that takes some seconds at most.
+/// A run whose steps turn out to be off by more than its mesh leaves of --tol is made again with sharper ones, where that takes some seconds at most.
 ///
 /// Signals: NODE.x, NODE.y [m], NODE.rz [rad], NODE.vx, NODE.vy [m/s], NODE.vrz [rad/s], BEAM.T [K], GAP.q [C], GAP.gap [m], GAP.C [F], GAP.F [N].
 /// JSON: "t" [s]; "signals": samples by name in SI; "units" by name; "method"; "counters": the work done; "events":
