@@ -144,7 +144,7 @@ pub(crate) fn electrical(compiled: &Compiled, sources: &[f64], rise: &[f64]) -> 
 }
 
 /// An equilibrium with what it was found at.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct OperatingPoint {
     pub(crate) q: Vec<Pose>,
     pub(crate) sources: Vec<f64>,

@@ -4,7 +4,7 @@ use super::failure::Failure;
 use super::model::{Context, ModelArgs, Named, warn_of};
 use super::output::{check_folder, print, write_page};
 use super::{progress, report, value};
-use bimorph::analysis::mesh::beyond;
+use bimorph::analysis::mesh::{beyond, in_circuit};
 use bimorph::compile::Compiled;
 use bimorph::export::compare::{Fitted, fit};
 use bimorph::export::names::{self, Pins};
@@ -107,7 +107,7 @@ impl Export {
             Some(name) => names::checked(name)?.to_owned(),
             None => names::from_file(stem.rsplit_once('.').map_or(stem.as_str(), |(stem, _)| stem)),
         };
-        let compiled = Arc::new(self.model.compile()?);
+        let compiled = Arc::new(in_circuit(&self.model.compile()?));
         if self.nonlinear {
             return self.whole(&compiled, &request, &name);
         }
@@ -257,6 +257,9 @@ fn mesh_error(compiled: &Compiled) -> Option<f64> {
 /// How far the full model itself may be off by its mesh.
 fn mesh(compiled: &Compiled) -> String {
     match mesh_error(compiled) {
+        Some(error) if compiled.options.band.is_none() && compiled.options.segments.is_none() => format!(
+            "the lowest frequency of the full model: off by {error:.1e} at most, by its mesh; --band HZ holds all below it"
+        ),
         Some(error) => format!("frequencies of the full model: off by {error:.1e} at most in the band, by its mesh"),
         None => "frequencies of the full model: nothing tells how far its mesh is off; --band HZ does".to_owned(),
     }

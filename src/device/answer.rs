@@ -3,7 +3,7 @@
 
 use super::ports::Answer;
 use super::session::Session;
-use super::shown::Shown;
+use super::shown::{Follow, Shown};
 use super::states::Snapshot;
 use super::{Trial, TrialReply};
 use crate::analysis::signal::{Signal, View};
@@ -164,8 +164,10 @@ impl Session {
                     Signal::Pull(g) => nothing * system.pull(*g, view.q, view.volts[*g]).abs(),
                     Signal::Charge(g) => charge(system.capacitance(*g, view.q), view.volts[*g]),
                 };
-                let pushed = |n: usize| {
-                    n.checked_sub(signals).is_some_and(|port| matches!(self.ports.answers[port], Answer::Motion(_)))
+                let follow = |n: usize| match n.checked_sub(signals).map(|port| &self.ports.answers[port]) {
+                    Some(Answer::Motion(_)) => Follow::Even,
+                    Some(Answer::Current) => Follow::Differentiated,
+                    _ => Follow::Line,
                 };
                 let floor = |n: usize| match n.checked_sub(signals) {
                     None => of_signal(&self.signals[n]),
@@ -175,7 +177,7 @@ impl Session {
                         Answer::Rise(_) | Answer::Nothing => SAME_TEMPERATURE,
                     },
                 };
-                before.shown.step(request.dt, seen, tol, floor, pushed)
+                before.shown.step(request.dt, seen, tol, floor, follow)
             }
         }
     }

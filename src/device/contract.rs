@@ -1,6 +1,7 @@
 //! The contract of a device: what is asked, what is answered, and what may be refused.
 
 use super::port_kind::PortKind;
+use crate::netlist::Diagnostic;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -186,6 +187,13 @@ pub trait Device: Send {
 
     /// Says that the circuit accepted this state. Advisory: only frees memory, never changes an answer.
     fn accept(&mut self, token: Token);
+
+    /// What an accepted state warns of, each kind once in an epoch. Advisory: never changes an answer. Empty where a device
+    /// does not know.
+    fn warns(&mut self, token: Token) -> Vec<Diagnostic> {
+        let _ = token;
+        Vec::new()
+    }
 
     /// Small-signal answer at angular frequency `omega` [rad/s] about the state `token`.
     ///

@@ -10,6 +10,7 @@ use super::saved;
 use super::session::Session;
 use super::{Description, Device, DeviceError, Mode, OpenRequest, SmallSignal, Status, Token, Trial, TrialReply};
 use crate::compile::Compiled;
+use crate::netlist::Diagnostic;
 use std::sync::Arc;
 
 /// A [`Device`] over a compiled model.
@@ -65,6 +66,12 @@ impl Device for LocalDevice {
         if let Some(session) = self.session.as_mut() {
             session.states.accept(token);
         }
+    }
+
+    fn warns(&mut self, token: Token) -> Vec<Diagnostic> {
+        let Some(session) = self.session.as_mut() else { return Vec::new() };
+        let Some(state) = session.states.get(token) else { return Vec::new() };
+        session.warns(&self.compiled, &state)
     }
 
     fn linearize(&mut self, token: Token, omega: f64, reply: &mut SmallSignal) -> Result<(), DeviceError> {

@@ -30,6 +30,7 @@ pub mod shown;
 pub(crate) mod small_signal;
 pub mod states;
 mod trial;
+mod warned;
 
 pub use contract::{
     Agitation, Description, Device, DeviceError, Mode, OpenRequest, PortInfo, SignalInfo, SmallSignal, Status, Token,

@@ -200,7 +200,9 @@ mod tests {
                 sources: vec![1.0, -2.0],
                 elapsed: 3e-6,
                 next_step: f64::INFINITY,
-                shown: Shown::start(vec![1.0, 2.0]).step(1e-6, vec![1.5, 2.5], 1e-3, |_| 1e-9, |_| false).0,
+                shown: Shown::start(vec![1.0, 2.0])
+                    .step(1e-6, vec![1.5, 2.5], 1e-3, |_| 1e-9, |_| crate::device::shown::Follow::Line)
+                    .0,
                 carried,
             };
             let voltages = [f64::from(k)];

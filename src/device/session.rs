@@ -50,6 +50,8 @@ pub(super) struct Session {
     /// What each answer sees of a displacement, about the state that was asked for its noise last.
     pub(super) seen: Option<(Token, Vec<Seen>)>,
     pub(super) response: Vec<ComplexPose>,
+    /// Codes of the warnings that were given.
+    pub(super) warned: Vec<String>,
 }
 
 impl Session {
@@ -120,6 +122,7 @@ impl Session {
             harmonic: Harmonic::new(system),
             seen: None,
             response: vec![ComplexPose::zeros(); n],
+            warned: Vec::new(),
         };
         Ok((session, description))
     }

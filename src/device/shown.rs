@@ -7,15 +7,31 @@
 //! d = ((y₂ − y₁)/h₂ − (y₁ − y₀)/h₁)/(h₁ + h₂),
 //! ```
 //! and a parabola with that d leaves the line over the next step H by |d|·H²/4 in the middle. Where a curve turns from one
-//! side to the other d vanishes; there its own change d′ counts, |d′|·H³/4, and more of it where the circuit gives a force for a displacement: steps that
-//! become longer and shorter twice a cycle would pump what a spring of the circuit holds (a parametric resonance). A ringing that is faster than the steps shows in d
-//! by its height: where that may be seen, the steps become short enough to follow it.
+//! side to the other d vanishes; there its own change d′ counts, |d′|·H³/4, and more of it where the circuit gives a force for a displacement or
+//! differentiates a charge: steps that become longer and shorter twice a cycle would pump what a spring of the circuit holds, and damp a tank of a charge and an
+//! inductor (a parametric resonance). A ringing that is faster than the steps shows in d by its height: where that may be seen, the steps become short
+//! enough to follow it.
 
 use serde::{Deserialize, Serialize};
 
 /// Share of its range by which a quantity may leave the line as either term tells, in units of the compilation's tolerance
 /// [1]: 0.2 % at the default, 28 points for a cycle of a full swing, which then stays within 0.5 %.
 const SHARE: f64 = 2.0;
+
+/// The same of a charge [1]. Nobody looks at it but at its change: with even steps the formula of the plug-in keeps that within 0.5 % of its
+/// range, again with 28 points a cycle.
+const SHARE_DIFFERENTIATED: f64 = 3.6;
+
+/// How the circuit's steps follow a quantity.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Follow {
+    /// On straight lines between its points.
+    Line,
+    /// The same, with steps that are even over a swing.
+    Even,
+    /// As what is differentiated, with even steps.
+    Differentiated,
+}
 
 /// What was seen up to a state, part of that state.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -42,14 +58,14 @@ impl Shown {
     }
 
     /// After a step of `dt` [s], and the longest next step [s] at which each quantity keeps to the line within its share
-    /// of `tol` [1] or within `floor`, in its own unit; those that want `even` steps have the same over a whole cycle.
+    /// of `tol` [1] or within `floor`, in its own unit.
     pub fn step(
         &self,
         dt: f64,
         values: Vec<f64>,
         tol: f64,
         floor: impl Fn(usize) -> f64,
-        even: impl Fn(usize) -> bool,
+        follow: impl Fn(usize) -> Follow,
     ) -> (Self, f64) {
         if self.now.len() != values.len() {
             return (Self::start(values), f64::INFINITY);
@@ -64,7 +80,9 @@ impl Shown {
             let slope = (y - self.now[n]) / dt;
             next.slopes.push(slope);
             let Some(slope_before) = self.slopes.get(n) else { continue };
-            let allowed = SHARE * tol * (next.high[n] - next.low[n]) + floor(n);
+            let follow = follow(n);
+            let share = if follow == Follow::Differentiated { SHARE_DIFFERENTIATED } else { SHARE };
+            let allowed = share * tol * (next.high[n] - next.low[n]) + floor(n);
             let bend = (slope - slope_before) / (self.steps[0] + dt);
             next.bends.push(bend);
             bound = bound.min(2.0 * (allowed / bend.abs()).sqrt());
@@ -72,7 +90,7 @@ impl Shown {
                 // A divided difference stands for the middle of its three points.
                 let change = 3.0 * (bend - bend_before) / (self.steps[1] + self.steps[0] + dt);
                 // of a sine even steps are as long where it turns as where it bends most
-                let turns = if even(n) { (16.0 * SHARE * tol).sqrt().min(1.0) } else { 1.0 };
+                let turns = if follow == Follow::Line { 1.0 } else { (16.0 * share * tol).sqrt().min(1.0) };
                 bound = bound.min((turns * 4.0 * allowed / change.abs()).cbrt());
             }
         }
@@ -120,7 +138,7 @@ mod tests {
         let (mut shown, mut t, mut dt) = (Shown::start(vec![1.0]), 0.0, 1e-3);
         let (mut worst, mut points) = (0.0f64, 0);
         while t < 40.0 {
-            let (after, bound) = shown.step(dt, vec![f64::cos(t + dt)], tol, |_| 0.0, |_| false);
+            let (after, bound) = shown.step(dt, vec![f64::cos(t + dt)], tol, |_| 0.0, |_| Follow::Line);
             if t > 20.0 {
                 let line = 0.5 * (f64::cos(t) + f64::cos(t + dt));
                 worst = worst.max((f64::cos(t + 0.5 * dt) - line).abs() / 2.0);
@@ -140,7 +158,7 @@ mod tests {
         let mut shown = Shown::start(vec![293.0, 0.0]);
         for k in 1..100 {
             let noise = if k % 2 == 0 { 1e-9 } else { -1e-9 };
-            let (after, bound) = shown.step(1e-6, vec![293.0, noise], 1e-3, |_| 1e-6, |_| false);
+            let (after, bound) = shown.step(1e-6, vec![293.0, noise], 1e-3, |_| 1e-6, |_| Follow::Line);
             assert!(bound > 1e-5, "{bound:e}");
             shown = after;
         }

@@ -119,7 +119,7 @@ impl Session {
                 return;
             }
             Err(error) => {
-                reply.status = Status::Fail(error.to_string());
+                reply.status = Status::Fail(error.begun_at(request.t - request.dt).to_string());
                 return;
             }
         }

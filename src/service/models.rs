@@ -5,6 +5,7 @@ use super::convert::options::options_to_wire;
 use super::limits::Limits;
 use super::server::MakeDevice;
 use super::{proto, status};
+use crate::analysis::mesh;
 use crate::budget;
 use crate::compile::{CompileOptions, Compiled, compile};
 use crate::content::Fnv;
@@ -17,6 +18,8 @@ use tonic::Status;
 /// A model that clients can name.
 pub(super) struct Model {
     pub(super) compiled: Arc<Compiled>,
+    /// The same on the mesh that it has in a circuit.
+    pub(super) in_circuit: Arc<Compiled>,
     pub(super) description: proto::ModelDescription,
     bundle: Bundle,
     options: CompileOptions,
@@ -92,14 +95,19 @@ impl Models {
             key = key.wrapping_add(1);
         }
         let compiled = compile(&bundle, &options).map_err(|error| status::compile(&error))?;
+        if compiled.unknowns() > limits.unknowns {
+            return Err(status::limit("unknowns", limits.unknowns, compiled.unknowns()));
+        }
+        let in_circuit = Some(mesh::in_circuit(&compiled)).filter(|finer| finer.unknowns() <= limits.unknowns);
         let compiled = Arc::new(compiled);
-        let description = describe(format!("{key:032x}"), &compiled, make)?;
+        let in_circuit = in_circuit.map_or_else(|| Arc::clone(&compiled), Arc::new);
+        let description = describe(format!("{key:032x}"), &in_circuit, make)?;
         let unknowns = usize::try_from(description.unknowns).unwrap_or(usize::MAX);
         if unknowns > limits.unknowns {
             return Err(status::limit("unknowns", limits.unknowns, unknowns));
         }
         let bytes = budget::current().map_or(0, |budget| budget.used());
-        let model = Arc::new(Model { compiled, description, bundle, options, bytes });
+        let model = Arc::new(Model { compiled, in_circuit, description, bundle, options, bytes });
         self.keep(Arc::clone(&model), limits);
         Ok(model)
     }

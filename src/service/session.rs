@@ -69,7 +69,7 @@ impl Session {
         make: MakeDevice,
         limits: &Limits,
     ) -> Result<Arc<Self>, Status> {
-        let device = catch_unwind(|| make(Arc::clone(&model.compiled))).map_err(|_| status::fault())?;
+        let device = catch_unwind(|| make(Arc::clone(&model.in_circuit))).map_err(|_| status::fault())?;
         let seat = client().account.map(|account| account.seat(model.unknowns())).transpose()?;
         Ok(Arc::new(Self {
             id,

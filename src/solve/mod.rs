@@ -58,7 +58,7 @@ pub enum SolveError {
     },
     /// The integrator's steps became too small.
     #[error(
-        "step size fell to {dt:.3e} s at {t:.6e} s after {rejected} rejections in a row; worst body \"{body}\" in {direction}"
+        "step size fell to {dt:.3e} s at {t:.6e} s after {rejected} rejections in a row; worst body \"{body}\" {direction}"
     )]
     StepTooSmall {
         /// Time reached since the start of the step [s].
@@ -124,6 +124,14 @@ pub use crate::equations::bodies::DIRECTIONS;
 pub use crate::equations::linear;
 
 impl SolveError {
+    /// The same with times counted from when the integration began, `start` [s] after what its reader calls 0.
+    pub(crate) fn begun_at(mut self, start: f64) -> Self {
+        if let Self::StepTooSmall { t, .. } | Self::StepFailed { t, .. } = &mut self {
+            *t += start;
+        }
+        self
+    }
+
     pub(crate) fn singular(system: &crate::domains::System, pivot: ZeroPivot) -> Self {
         Self::Singular {
             body: system.model.bodies[pivot.body].name.to_string(),

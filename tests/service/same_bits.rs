@@ -5,6 +5,7 @@ use bimorph::analysis::harmonic::HarmonicOptions;
 use bimorph::analysis::integrator::Integrator;
 use bimorph::analysis::mesh::fitted_in_time;
 use bimorph::analysis::mesh::harmonic_fitted;
+use bimorph::analysis::mesh::in_circuit;
 use bimorph::analysis::mesh::{modes_fitted, pull_in_fitted, static_fitted};
 use bimorph::analysis::step_error::with_step_error;
 use bimorph::analysis::transient::{TransientOptions, transient};
@@ -36,7 +37,8 @@ fn local_server(limits: Limits) -> Running {
 }
 
 fn compiled(bundle: &Bundle) -> Arc<Compiled> {
-    Arc::new(compile(bundle, &CompileOptions::default()).unwrap_or_else(|error| panic!("{error}")))
+    let drawn = compile(bundle, &CompileOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+    Arc::new(in_circuit(&drawn))
 }
 
 /// Drives a device as a circuit would, each port in proportion to its number, with rejected attempts in between, and writes down

@@ -12,6 +12,7 @@ use crate::registry::{close, registry};
 use crate::respond::{respond, settle};
 use crate::table::{DEVICE, LAYOUT};
 use crate::{host, noise, panics, trace};
+use bimorph::netlist::Diagnostic;
 use std::ffi::{c_int, c_void};
 use std::io::Write;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -71,9 +72,29 @@ pub(crate) unsafe extern "C" fn model_ask(
 }
 
 /// Tests convergence. Derivatives are exact here, so the host's own test of voltages and currents is enough; its test of
-/// integrals would cost one more iteration at every point.
-pub(crate) unsafe extern "C" fn convergence_test(_model: *mut Model, _circuit: *mut c_void) -> c_int {
-    code::OK
+/// integrals would cost one more iteration at every point. It comes where those have converged: of an equilibrium this is
+/// the last that is heard.
+pub(crate) unsafe extern "C" fn convergence_test(model: *mut Model, _circuit: *mut c_void) -> c_int {
+    guarded(|| {
+        let mut registry = registry();
+        // SAFETY: the host's lists.
+        for (_, instance) in unsafe { call::instances(model) } {
+            if let Some(entry) = registry.find(instance.conn as usize) {
+                let warnings = entry.instance.settled();
+                tell_of(entry.instance.name(), &warnings);
+            }
+        }
+        code::OK
+    })
+}
+
+/// Warnings of what an instance came to, on standard error.
+fn tell_of(name: &str, warnings: &[Diagnostic]) {
+    for warning in warnings {
+        let line = format!("bimorph: instance {name}: warning[{}]: {}", warning.code, warning.message);
+        let _ = writeln!(std::io::stderr(), "{line}");
+        trace::line(format_args!("{line}"));
+    }
 }
 
 /// Opens every instance, after the host's own setup. An error ends the run before it starts.
@@ -282,7 +303,8 @@ pub(crate) unsafe extern "C" fn accept(circuit: *mut c_void, model: *mut Model) 
         for (_, instance) in unsafe { call::instances(model) } {
             if let Some(entry) = registry.find(instance.conn as usize) {
                 settle(entry, circuit);
-                entry.instance.accept();
+                let warnings = entry.instance.accept();
+                tell_of(entry.instance.name(), &warnings);
             }
         }
         code::OK

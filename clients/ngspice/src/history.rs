@@ -5,8 +5,9 @@
 //! damping blends the doubles of two states into numbers that never were. Each record therefore carries a check over
 //! its own bits; a record that does not check is none.
 //!
-//! Doubles: check, token, step, skipped time; then p charges at this point, at the base, and at the base before.
+//! Doubles: check, token, two steps, skipped time; then p charges at this point, and at the last three bases.
 
+use crate::companion::{Companion, shortest};
 use bimorph::device::Token;
 
 /// A record as it was read.
@@ -20,34 +21,75 @@ pub struct History {
     pub charges: Vec<f64>,
 }
 
-/// The last two points far enough apart to tell a slope, see [`crate::companion`].
+/// The last three points far enough apart to tell a slope, the last one first, see [`crate::companion`].
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Base {
-    /// Time between the two [s]; 0 after an operating point.
-    pub step: f64,
-    /// Time since the later one [s].
+    /// Times between them [s]; 0 where there is none since an operating point, or since the slope changed.
+    pub steps: [f64; 2],
+    /// Time since the last one [s].
     pub skipped: f64,
-    /// Charges at the later one [C].
-    pub charges: Vec<f64>,
-    /// Charges at the earlier one [C].
-    pub charges_before: Vec<f64>,
+    /// Charges at each [C].
+    pub charges: [Vec<f64>; 3],
+}
+
+impl Base {
+    /// At an operating point with these charges [C].
+    pub fn start(&mut self, charges: &[f64]) {
+        (self.steps, self.skipped) = ([0.0; 2], 0.0);
+        for place in &mut self.charges {
+            place.clear();
+            place.extend_from_slice(charges);
+        }
+    }
+
+    /// At the end of a step that ends at `t` and is `dt` long [s], with these charges there [C]: adds the currents that they
+    /// make [A], and answers by how much each changes with its charge [1/s].
+    pub fn advance(&mut self, (t, dt): (f64, f64), charges: &[f64], currents: &mut [f64]) -> f64 {
+        let (step, shortest) = (dt + self.skipped, shortest(t));
+        if step < shortest {
+            let slope = 1.0 / shortest;
+            for (n, current) in currents.iter_mut().enumerate() {
+                let [q1, q2, _] = self.of(n);
+                let so_far = if self.steps[0] > 0.0 { (q1 - q2) / self.steps[0] } else { 0.0 };
+                *current += so_far + slope * (charges[n] - q1 - so_far * step);
+            }
+            self.skipped = step;
+            return slope;
+        }
+        let companion = Companion::new(step, self.steps);
+        for (n, current) in currents.iter_mut().enumerate() {
+            *current += companion.current(charges[n], self.of(n));
+        }
+        // where the slope begins anew, nothing before the last point counts any more
+        (self.steps, self.skipped) = ([step, if companion.restarts() { 0.0 } else { self.steps[0] }], 0.0);
+        self.charges.rotate_right(1);
+        self.charges[0].clear();
+        self.charges[0].extend_from_slice(charges);
+        companion.slope
+    }
+
+    /// Charges of port `n` at each point [C].
+    fn of(&self, n: usize) -> [f64; 3] {
+        [self.charges[0][n], self.charges[1][n], self.charges[2][n]]
+    }
 }
 
 /// Doubles before the charges.
-pub const HEAD: usize = 4;
+pub const HEAD: usize = 5;
 
 /// Doubles needed for `ports` ports.
 pub fn len(ports: usize) -> usize {
-    HEAD + 3 * ports
+    HEAD + 4 * ports
 }
 
 /// Writes a record into `memory`. `epoch` names the run the record belongs to.
 pub fn write(memory: &mut [f64], epoch: u64, token: Token, charges: &[f64], base: &Base) {
     let ports = charges.len();
     memory[1] = token.0 as f64;
-    memory[2] = base.step;
-    memory[3] = base.skipped;
-    let parts = [charges, &base.charges, &base.charges_before];
+    memory[2..4].copy_from_slice(&base.steps);
+    memory[4] = base.skipped;
+    let [last, second, third] = &base.charges;
+    let parts = [charges, last, second, third];
     for (place, part) in memory[HEAD..].chunks_exact_mut(ports.max(1)).zip(parts) {
         place.copy_from_slice(part);
     }
@@ -56,12 +98,13 @@ pub fn write(memory: &mut [f64], epoch: u64, token: Token, charges: &[f64], base
 
 /// Reads a record into `history`; without a valid one its token is none and its charges are zero.
 pub fn read(memory: &[f64], epoch: u64, history: &mut History) {
-    let ports = (memory.len() - HEAD) / 3;
+    let ports = (memory.len() - HEAD) / 4;
     let valid = memory[0].to_bits() == check(epoch, &memory[1..]).to_bits();
     let base = &mut history.base;
     history.token = valid.then_some(Token(memory[1] as u64));
-    (base.step, base.skipped) = if valid { (memory[2], memory[3]) } else { (0.0, 0.0) };
-    let into = [&mut history.charges, &mut base.charges, &mut base.charges_before];
+    (base.steps, base.skipped) = if valid { ([memory[2], memory[3]], memory[4]) } else { ([0.0; 2], 0.0) };
+    let [last, second, third] = &mut base.charges;
+    let into = [&mut history.charges, last, second, third];
     for (part, place) in into.into_iter().zip(memory[HEAD..].chunks_exact(ports.max(1))) {
         part.clear();
         part.extend(place.iter().map(|q| if valid { *q } else { 0.0 }));
@@ -82,7 +125,27 @@ mod tests {
     use super::*;
 
     fn base(seed: f64) -> Base {
-        Base { step: 1e-9 * seed, skipped: 0.0, charges: vec![3e-15, 0.0], charges_before: vec![5e-15, 6e-15] }
+        let charges = [vec![3e-15, 0.0], vec![5e-15, 6e-15], vec![7e-15, -1e-15]];
+        Base { steps: [1e-9 * seed, 2e-9], skipped: 0.0, charges }
+    }
+
+    /// Points a rounding of the time apart are differentiated across: the current is the slope so far, and the point after
+    /// them has the same as without them.
+    #[test]
+    fn steps_of_rounding_are_crossed() {
+        let q = |t: f64| vec![2e-15 * t / 1e-6];
+        let run = |times: &[f64]| {
+            let (mut base, mut current) = (Base::default(), [0.0]);
+            base.start(&q(0.0));
+            times.iter().fold(0.0, |before, &t| {
+                current = [0.0];
+                base.advance((t, t - before), &q(t), &mut current);
+                assert!((current[0] / 2e-9 - 1.0).abs() < 1e-6, "{current:?} at {t:e}");
+                t
+            });
+            (base, current)
+        };
+        assert_eq!(run(&[1e-6, 2e-6, 3e-6]), run(&[1e-6, 2e-6, 2e-6 + 1e-18, 3e-6]));
     }
 
     fn record(seed: f64) -> Vec<f64> {
@@ -104,7 +167,7 @@ mod tests {
     fn refuses_what_was_never_written() {
         let blend: Vec<f64> = record(1.0).iter().zip(record(2.0)).map(|(a, b)| a + 0.3 * (b - a)).collect();
         let mut history = History::default();
-        for (memory, epoch) in [(vec![0.0; 10], 7), (vec![f64::NAN; 10], 7), (record(1.0), 8), (blend, 7)] {
+        for (memory, epoch) in [(vec![0.0; 13], 7), (vec![f64::NAN; 13], 7), (record(1.0), 8), (blend, 7)] {
             read(&memory, epoch, &mut history);
             assert_eq!(history.token, None);
             assert_eq!(history.charges, [0.0, 0.0]);

@@ -3,7 +3,6 @@
 //! Nothing here knows ngspice's memory; `crate::call` copies between the two. State that must follow accepted and
 //! rejected steps lives in a [`History`], which the host rolls back; what stays here is only a cache or a count.
 
-use crate::companion::{Companion, shortest};
 use crate::history::History;
 use crate::question::{Answer, Outcome, Question};
 use crate::settings::{Monitor, PortName};
@@ -12,6 +11,7 @@ use bimorph::device::{
     Agitation, Description, Device, DeviceError, Mode, OpenRequest, PortKind, SmallSignal, Status, Token, Trial,
     TrialReply,
 };
+use bimorph::netlist::Diagnostic;
 
 /// How often in a row a step or an operating point may fail before the analysis ends. Each attempt of a transient is
 /// eight times shorter than the one before it.
@@ -192,13 +192,22 @@ impl Instance {
         }
     }
 
-    /// Tells the device that the circuit accepted its last state.
-    pub fn accept(&mut self) {
-        if let Some(token) = self.answer.token.filter(|t| self.accepted != Some(*t)) {
-            self.device.accept(token);
-            self.accepted = Some(token);
-            self.counts.points += 1;
+    /// Tells the device that the circuit accepted its last state, and what that warns of.
+    pub fn accept(&mut self) -> Vec<Diagnostic> {
+        let Some(token) = self.answer.token.filter(|t| self.accepted != Some(*t)) else { return Vec::new() };
+        let warnings = self.device.warns(token);
+        self.device.accept(token);
+        self.accepted = Some(token);
+        self.counts.points += 1;
+        warnings
+    }
+
+    /// What its last equilibrium warns of, where the circuit has converged there.
+    pub fn settled(&mut self) -> Vec<Diagnostic> {
+        if self.answer.step > 0.0 {
+            return Vec::new();
         }
+        self.answer.token.map_or_else(Vec::new, |token| self.device.warns(token))
     }
 
     /// Moves the charges of the last transient answer along their derivatives by `volts` [V], and with them what the next
@@ -212,7 +221,7 @@ impl Instance {
             let given = volts.iter().zip(&self.scales).map(|(v, scale)| v * scale.given);
             answer.charges[n] += row.iter().zip(given).map(|(c, v)| c * v).sum::<f64>();
         }
-        answer.base.charges.clone_from(&answer.charges);
+        answer.base.charges[0].clone_from(&answer.charges);
         true
     }
 
@@ -274,34 +283,13 @@ impl Instance {
         answer.currents.clone_from(&reply.currents);
         answer.conductances.clone_from(&reply.di_dv);
         answer.base.clone_from(&previous.base);
-        let (base, old) = (&mut answer.base, &previous.base);
-        if let Some((t, dt)) = time {
-            let step = dt + old.skipped;
-            let (resolved, shortest) = (step >= shortest(t), shortest(t));
-            let companion = if resolved { Companion::new(step, old.step) } else { Companion::unresolved(shortest) };
-            for (n, current) in answer.currents.iter_mut().enumerate() {
-                let (q, q1, q2) = (reply.charges[n], old.charges[n], old.charges_before[n]);
-                *current += if resolved {
-                    companion.current(q, q1, q2)
-                } else {
-                    let so_far = if old.step > 0.0 { (q1 - q2) / old.step } else { 0.0 };
-                    so_far + companion.slope * (q - q1 - so_far * step)
-                };
-            }
+        if let Some(time) = time {
+            let slope = answer.base.advance(time, &reply.charges, &mut answer.currents);
             for (g, c) in answer.conductances.iter_mut().zip(&reply.dq_dv) {
-                *g += companion.slope * c;
-            }
-            if resolved {
-                (base.step, base.skipped) = (step, 0.0);
-                base.charges_before.clone_from(&old.charges);
-                base.charges.clone_from(&reply.charges);
-            } else {
-                base.skipped = step;
+                *g += slope * c;
             }
         } else {
-            (base.step, base.skipped) = (0.0, 0.0);
-            base.charges_before.clone_from(&reply.charges);
-            base.charges.clone_from(&reply.charges);
+            answer.base.start(&reply.charges);
         }
         for (row, scale) in answer.conductances.chunks_exact_mut(ports.max(1)).zip(&self.scales) {
             row.iter_mut().zip(&self.scales).for_each(|(g, input)| *g *= scale.answered * input.given);

@@ -46,8 +46,8 @@ pub struct ModelCard {
     pub remote: Option<String>,
     /// How the netlist is compiled.
     pub options: CompileOptions,
-    /// On twice the segments, as the run that another is compared with.
-    pub finer: bool,
+    /// Share of its tolerance that the model gets [1]; below 1 on twice the segments, as the run that another is compared with.
+    pub share: f64,
     /// Longest wait for an answer of the server [s], default 5.
     pub deadline: Duration,
     /// Thermal agitation in transients.
@@ -157,16 +157,14 @@ impl ModelCard {
             },
             options,
             noise: raw.noise.unwrap_or(false).then(|| agitation(raw)).transpose()?,
-            finer: false,
+            share: 1.0,
             deadline: Duration::from_secs_f64(positive("deadline", raw.deadline)?.unwrap_or(DEADLINE).min(1e6)),
         })
     }
 
     /// With this share of its tolerance [1]; a smaller one than all of it comes with a finer mesh, too.
-    pub fn with_share(mut self, share: f64) -> Self {
-        self.options.tol *= share;
-        self.finer = share < 1.0;
-        self
+    pub fn with_share(self, share: f64) -> Self {
+        Self { share, ..self }
     }
 
     /// Compares the names on the line with the nodes of an instance.

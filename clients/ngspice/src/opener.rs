@@ -2,7 +2,7 @@
 
 use crate::model_card::ModelCard;
 use crate::names;
-use bimorph::analysis::mesh;
+use bimorph::analysis::{AnalysisError, mesh};
 use bimorph::compile::{CompileError, CompileOptions, Compiled, compile};
 use bimorph::device::local::LocalDevice;
 use bimorph::device::{Device, DeviceError};
@@ -42,6 +42,14 @@ pub enum OpenError {
         file: String,
         /// Diagnostics with file, line and column.
         source: CompileError,
+    },
+    /// There is none on twice the segments.
+    #[error("netlist \"{file}\" on twice the segments: {source}")]
+    Finer {
+        /// As spelled on the line.
+        file: String,
+        /// Why not.
+        source: AnalysisError,
     },
     /// A name that may stand for two of the netlist's.
     #[error("\"{name}\" may be `{}` or `{}` of netlist \"{file}\": ngspice passes lines on in small letters; rename one of the two", .pair[0], .pair[1])]
@@ -109,26 +117,25 @@ pub fn open_model(card: &mut ModelCard, directory: Option<&Path>) -> Result<Box<
     }
     names::respell(card, &structure);
     tell(card, &loaded.warnings.items);
-    if card.finer {
-        refine(card, &bundle)?;
+    let own = match (&card.remote, card.share < 1.0) {
+        (Some(address), false) => return connect(address, &bundle, card),
+        _ => compiled(&card.file, bundle.clone(), &card.options)?,
+    };
+    if card.share == 1.0 {
+        tell(card, &own.warnings.items);
+        return Ok(Box::new(LocalDevice::new(own)));
     }
-    match &card.remote {
-        None => {
-            let model = compiled(&card.file, bundle, &card.options)?;
-            tell(card, &model.warnings.items);
-            Ok(Box::new(LocalDevice::new(model)))
-        }
-        Some(address) => connect(address, &bundle, card),
-    }
-}
-
-/// Gives the model twice the segments that it would have, every beam as many as the finest.
-fn refine(card: &mut ModelCard, bundle: &Bundle) -> Result<(), OpenError> {
-    let model = compiled(&card.file, bundle.clone(), &card.options)?;
-    if let Some(most) = model.order.segments.iter().max().filter(|most| **most > 0) {
+    let tol = card.share * card.options.tol;
+    let Some(address) = &card.remote else {
+        let finer = mesh::twice(&own, tol).map_err(|source| OpenError::Finer { file: card.file.clone(), source })?;
+        return Ok(Box::new(LocalDevice::new(Arc::new(finer))));
+    };
+    // a server takes one number for all beams
+    card.options.tol = tol;
+    if let Some(most) = own.order.segments.iter().max().filter(|most| **most > 0) {
         (card.options.segments, card.options.band) = (Some(2 * most), None);
     }
-    Ok(())
+    connect(address, &bundle, card)
 }
 
 /// Warnings of a netlist on standard error, each once in a process: what a deck's run says of the drawing behind it. Those that a netlist's circuit
@@ -152,7 +159,9 @@ fn connect(address: &str, bundle: &Bundle, card: &ModelCard) -> Result<Box<dyn D
     let socket = address.strip_prefix("unix:").and_then(|p| names::existing(Path::new(p.trim_start_matches("//"))));
     let respelled = socket.map(|path| format!("unix://{}", path.display()));
     let address = respelled.as_deref().unwrap_or(address);
-    Ok(Box::new(RemoteDevice::connect(address, bundle, &card.options, card.deadline)?))
+    let device = RemoteDevice::connect(address, bundle, &card.options, card.deadline)?;
+    tell(card, device.warnings());
+    Ok(Box::new(device))
 }
 
 #[cfg(not(feature = "remote"))]
@@ -197,11 +206,9 @@ fn compiled(file: &str, bundle: Bundle, options: &CompileOptions) -> Result<Arc<
     if let Some(kept) = models.iter().find(|k| k.bundle == bundle && k.options == *options) {
         return Ok(Arc::clone(&kept.model));
     }
-    let mut model = compile(&bundle, options).map_err(|source| OpenError::Compile { file: file.to_owned(), source })?;
+    let drawn = compile(&bundle, options).map_err(|source| OpenError::Compile { file: file.to_owned(), source })?;
     // once for all instances of it
-    let told = mesh::unasked(&model);
-    model.warnings.items.extend(told);
-    let model = Arc::new(model);
+    let model = Arc::new(mesh::in_circuit(&drawn));
     if models.len() == KEPT {
         models.remove(0);
     }

@@ -209,6 +209,16 @@ pub fn static_fitted(
     Ok((fitted, result, curves))
 }
 
+/// What an equilibrium is warned of beside its mesh, as a device comes to it.
+pub(crate) fn told_still(fitted: &Compiled, point: OperatingPoint) -> Vec<Diagnostic> {
+    told_of_static(fitted, point).1
+}
+
+/// What a state in motion is warned of that an equilibrium is, too, where it is seen at once.
+pub(crate) fn told_moving(fitted: &Compiled, point: &OperatingPoint) -> Vec<Diagnostic> {
+    of_fingers(fitted, point).into_iter().chain(of_heat(fitted, point)).collect()
+}
+
 /// What an equilibrium is warned of beside its mesh: what a linear model leaves out, and gaps in too few pieces.
 pub(super) fn told_of_static(fitted: &Compiled, point: OperatingPoint) -> (OperatingPoint, Vec<Diagnostic>) {
     let share = if fitted.options.linear { left_out(fitted, &point, &point.q) } else { None };

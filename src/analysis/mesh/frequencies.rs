@@ -80,7 +80,10 @@ pub(super) fn for_modes(
     if !loaded {
         // modes about the drawing know their errors, where the scheme lets them
         let (order, found) = own_estimate(compiled, order, count, &[])?;
-        if (order.estimated_error.is_some() && (given || !fine)) || count > MOST_COMPARED {
+        // two modes next to each other may change places from the mesh that was looked at to this one
+        let holds = order.estimated_error.is_some_and(|error| error <= compiled.options.tol);
+        let known = if given { order.estimated_error.is_some() } else { holds && !fine };
+        if known || count > MOST_COMPARED {
             return Ok((order, found));
         }
         let order = match given {

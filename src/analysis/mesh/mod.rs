@@ -20,12 +20,12 @@ mod excited;
 mod frequencies;
 pub(crate) mod given;
 mod in_band;
+mod in_circuit;
 mod meshed;
 mod path;
 mod pull_in;
 mod seen;
 mod swung;
-mod unasked;
 mod warnings;
 mod yielded;
 
@@ -50,7 +50,8 @@ use pull_in::for_pull_in;
 pub use pull_in::pull_in_fitted;
 use warnings::{of_fingers, of_heat, of_pieces, of_stress};
 
-pub use unasked::unasked;
+pub(crate) use equilibrium::{told_moving, told_still};
+pub use in_circuit::{in_circuit, twice};
 pub(crate) use warnings::WARNING;
 pub use warnings::{beyond, warnings};
 pub use yielded::static_backbent;

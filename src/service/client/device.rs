@@ -3,7 +3,7 @@
 use super::link::{Link, reason};
 use crate::compile::CompileOptions;
 use crate::device::{Description, Device, DeviceError, OpenRequest, SmallSignal, Token, Trial, TrialReply};
-use crate::netlist::Bundle;
+use crate::netlist::{Bundle, Diagnostic};
 use crate::service::access::Access;
 use crate::service::convert::device as wire;
 use crate::service::proto;
@@ -29,6 +29,8 @@ pub struct RemoteDevice {
     options: CompileOptions,
     deadline: Duration,
     model: String,
+    /// What the server warned of when it compiled the model.
+    warnings: Vec<Diagnostic>,
     /// Declared before `link`: a stream is let go before the runtime that drives it.
     stream: Option<Stream>,
     link: Option<Link>,
@@ -76,12 +78,18 @@ impl RemoteDevice {
             options: options.clone(),
             deadline,
             model: String::new(),
+            warnings: Vec::new(),
             stream: None,
             link: None,
             lost: None,
         };
         device.reach().map_err(|status| device.lose(&status))?;
         Ok(device)
+    }
+
+    /// What the server warned of when it compiled the model, its mesh in a circuit with it.
+    pub fn warnings(&self) -> &[Diagnostic] {
+        &self.warnings
     }
 
     /// The server's address, as given.
@@ -92,7 +100,10 @@ impl RemoteDevice {
     /// Connects and compiles.
     fn reach(&mut self) -> Result<(), Status> {
         let link = Link::connect(&self.address, &self.access, self.deadline)?;
-        self.model = link.compile(&self.bundle, &self.options)?.id;
+        let described = link.compile(&self.bundle, &self.options)?;
+        let warning = |told: proto::Diagnostic| Diagnostic::warning(&told.code, told.message, &told.help);
+        self.warnings = described.warnings.into_iter().map(warning).collect();
+        self.model = described.id;
         self.link = Some(link);
         Ok(())
     }

@@ -1,6 +1,7 @@
 //! Subcircuits that `bimorph export --spice` writes, in ngspice, against the full model in the plug-in, both in one deck.
 
 use crate::support::{complex, deviation, real, run, versions};
+use bimorph::analysis::mesh::in_circuit;
 use bimorph::compile::{CompileOptions, Compiled, compile};
 use bimorph::cosim::CosimOptions;
 use bimorph::export::compare::{Fitted, fit};
@@ -76,7 +77,8 @@ fn netlist(file: &str) -> PathBuf {
 impl Scene {
     fn compiled(&self) -> Arc<Compiled> {
         let bundle = Bundle::read(&netlist(self.file), &[]).unwrap();
-        Arc::new(compile(&bundle, &CompileOptions::default()).unwrap_or_else(|e| panic!("{}: {e}", self.file)))
+        let drawn = compile(&bundle, &CompileOptions::default()).unwrap_or_else(|e| panic!("{}: {e}", self.file));
+        Arc::new(in_circuit(&drawn))
     }
 
     fn ports(&self) -> Vec<&'static str> {

