@@ -202,3 +202,23 @@ fn bad_requests_are_refused() {
     let backwards = Trial { mode: Mode::Transient, dt: -1e-9, ..trial(&[0.0, 0.0]) };
     assert!(matches!(device.trial(&backwards, &mut reply), Err(DeviceError::BadRequest { .. })));
 }
+
+/// A state warns of what no trial refuses, each kind once in an epoch: heat that nothing bears (W037).
+#[test]
+fn states_warn_once() {
+    let compiled = compiled(Formulation::Compliant);
+    let mut device = opened(&compiled);
+    let codes = |device: &mut LocalDevice, token: Option<Token>| -> Vec<String> {
+        device.warns(token.unwrap()).into_iter().map(|warning| warning.code).collect()
+    };
+    let ports = device.open(&OpenRequest::default()).unwrap().ports;
+    let at = |volts: f64| ports.iter().map(|p| if p.name == "heat" { volts } else { 0.0 }).collect::<Vec<_>>();
+    let cool = ask(&mut device, Mode::Static, None, 0.0, &at(0.1)).token;
+    assert_eq!(codes(&mut device, cool), [""; 0]);
+    let hot = ask(&mut device, Mode::Static, None, 0.0, &at(100.0)).token;
+    assert!(codes(&mut device, hot).contains(&"W037".to_owned()));
+    assert_eq!(codes(&mut device, hot), [""; 0]);
+    device.open(&OpenRequest::default()).unwrap();
+    let again = ask(&mut device, Mode::Static, None, 0.0, &at(100.0)).token;
+    assert!(codes(&mut device, again).contains(&"W037".to_owned()));
+}

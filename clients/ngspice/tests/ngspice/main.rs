@@ -18,3 +18,4 @@ mod steps;
 mod support;
 mod syntax;
 mod versions;
+mod warned;

@@ -1,0 +1,36 @@
+//! What decks are warned of when their states are accepted.
+
+use crate::support::{all_decks, run, versions};
+use bimorph::cosim::CosimOptions;
+use std::path::Path;
+
+/// The bank's heaters at a voltage that melts them and drives the comb through its other side, and what was told, in order.
+fn told(ngspice: &Path, source: &str, analysis: &str) -> Vec<String> {
+    let folder = all_decks();
+    let (deck, log) = (folder.path().join("hot.cir"), folder.path().join("log"));
+    let text = format!(
+        "* hot\nV1 h 0 {source}\nV2 s 0 0\nA1 %gd [h 0 s 0] %v [y] bank\n\
+         .model bank bimorph(file=\"bank.net\" ports=[\"heat\" \"sense\"] monitors=[\"yoke.y:1e6\"])\n{analysis}\n.end\n"
+    );
+    std::fs::write(&deck, text).unwrap();
+    let environment = vec![("BIMORPH_LOG", log.clone())];
+    run(CosimOptions { deck, ngspice: Some(ngspice.to_owned()), environment, ..CosimOptions::default() }).unwrap();
+    let trace = std::fs::read_to_string(log).unwrap();
+    let warning = |line: &str| Some(line.split_once("warning[")?.1.split_once(']')?.0.to_owned());
+    trace.lines().filter_map(warning).collect()
+}
+
+/// Heat that nothing bears (W037) and fingers that go through the other side of their comb (W024) are told by an operating point, a sweep
+/// and a transient, each once; a deck in its range is told nothing.
+#[test]
+fn states_beyond_their_range_are_told_once() {
+    for (version, ngspice) in versions() {
+        let both = ["W024", "W037"].map(String::from);
+        for (source, analysis) in [("30", ".op"), ("0", ".dc V1 0 30 1"), ("PWL(0 0 10u 40)", ".tran 1u 400u")] {
+            let mut codes = told(&ngspice, source, analysis);
+            codes.sort();
+            assert_eq!(codes, both, "ngspice {version}: {analysis}");
+        }
+        assert_eq!(told(&ngspice, "PWL(0 0 10u 1)", ".tran 1u 20u"), [""; 0], "ngspice {version}");
+    }
+}
