@@ -66,6 +66,27 @@ def test_transient_streams_its_samples(plate: bimorph.Model) -> None:
     assert result.warnings == ()
 
 
+def test_what_is_beyond_is_said_aloud(client: bimorph.Client) -> None:
+    """Results and meshes beyond their tolerance and netlists that may not be meant come as warnings of Python; what holds says nothing."""
+    beam = "process p = [Youngsmodulus=165e9 density=2300 h=2u]\nanchor p [a] []\nbeam2d p [a b] [l=200u w=2u]\n"
+    net = beam + "f2d * [b] [F=10u oz=pi/2]\ndrive port * [b a] []\n"
+    with pytest.warns(bimorph.NetlistWarning, match="W012"):
+        client.compile(bimorph.Netlist.text(net + "anchor p [c] []\nbeam2d p [d e] [l=200u w=2u]\nbeam2d p [c f] [l=9u w=2u]\n"))
+    coarse = client.compile(bimorph.Netlist.text(net), segments=1)
+    with pytest.warns(bimorph.AccuracyWarning, match="may be off") as told:
+        coarse.static()
+    assert told[0].filename == __file__
+    with pytest.warns(bimorph.AccuracyWarning, match="may be off") as told:
+        coarse.session().close()
+    assert told[0].filename == __file__
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", bimorph.AccuracyWarning)
+        fine = client.compile(bimorph.Netlist.text(net))
+        fine.static()
+        fine.session().close()
+        assert fine.unknowns > coarse.unknowns
+
+
 def test_what_the_numbers_do_not_say_arrives(client: bimorph.Client) -> None:
     """A linear cantilever under half of Euler's load says what stress would do; a gap in one piece, that it should bend."""
     silicon = "process p = [Youngsmodulus=165e9 density=2300 h=2u]\nanchor p [a] []\n"

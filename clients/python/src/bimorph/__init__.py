@@ -8,6 +8,7 @@ V, A, C, K, Hz.
 import importlib.metadata
 
 from . import aio
+from .aloud import AccuracyWarning, NetlistWarning
 from .client import Client, local
 from .conversion import Conversion, LayoutWarning, Piece
 from .errors import (
@@ -44,6 +45,7 @@ from .sweep_handle import Sweep, SweepStatus
 from .ticket import Snapshot, Ticket
 
 __all__ = [
+    "AccuracyWarning",
     "BimorphError",
     "Client",
     "Conversion",
@@ -58,6 +60,7 @@ __all__ = [
     "ModesResult",
     "Netlist",
     "NetlistError",
+    "NetlistWarning",
     "NoResult",
     "NodeMotion",
     "Normal",

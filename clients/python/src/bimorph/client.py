@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from . import sweep as sweeps
 from .access import Access
+from .aloud import of_netlist
 from .channel import Channel
 from .conversion import LAYOUTS, Conversion, LayoutWarning, Piece
 from .errors import InvalidRequest, NetlistError
@@ -117,7 +118,8 @@ class Client:
     ) -> Model:
         """Compiles a netlist (a path, or a :class:`Netlist`), or a layout (.cif or .gds), which :meth:`convert` makes a netlist of.
 
-        What the conversion has to tell, areas not understood above all, comes as :class:`LayoutWarning`.
+        What the conversion has to tell, areas not understood above all, comes as :class:`LayoutWarning`, what the netlist is warned of as
+        :class:`NetlistWarning`, and what results are warned of as :class:`AccuracyWarning`.
 
         ``set`` overrides netlist parameters [SI]. The other keywords are the :class:`Options` of a model, such as ``tol``
         and ``band``; the server refuses a value beyond its range.
@@ -136,7 +138,9 @@ class Client:
                 raise
             diagnostics = [diagnostic(d) for d in checked.diagnostics]
             raise NetlistError(checked.rendered, error.violations, diagnostics) from None
-        return Model(self._channel, answer.model, request)
+        model = Model(self._channel, answer.model, request)
+        of_netlist(model.warnings)
+        return model
 
     def sweep(
         self,

@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from .aloud import of_mesh, said
 from .channel import Channel
 from .errors import Diagnostic, InvalidRequest, NotFound, Unavailable
 from .messages import Voltages, at_least, by_name, diagnostic, estimate_of, listed, named, setting_value
@@ -17,11 +18,6 @@ from .stopping import apart
 from .ticket import Snapshot
 from .v1 import analysis_pb2, device_pb2, model_pb2
 from .waveforms import Waveform, drive, told
-
-_MANY = 8
-"""Segments of every beam in a run that another one is compared with: four times what a slender beam has without being told."""
-
-
 
 class Model:
     """A compiled netlist on a server. Make one with :meth:`Client.compile`.
@@ -44,7 +40,7 @@ class Model:
         self.parameters: dict[str, float | str] = {p.name: setting_value(p) for p in description.parameters}
         """Netlist parameters with the values they took [SI]."""
         self.warnings: tuple[Diagnostic, ...] = tuple(diagnostic(d) for d in description.warnings)
-        """Warnings of the netlist."""
+        """Warnings of the netlist, and of the mesh that a session has (W040)."""
 
     def __getstate__(self) -> dict[str, Any]:
         description, source = self._description.SerializeToString(), self._source.SerializeToString()
@@ -69,12 +65,12 @@ class Model:
         return float(options.tol) if options.HasField("tol") else 1e-3
 
     def _finer(self) -> Model:
-        """The same netlist with a tenth of the tolerance, on a mesh that this refines, or on twice the segments, or on many."""
+        """The same netlist with a tenth of the tolerance, on a mesh that this refines, or on twice the segments."""
         source = model_pb2.CompileRequest()
         source.CopyFrom(self._source)
         source.options.tol = 0.1 * self._tol()
-        if not source.options.HasField("band_hz") or source.options.HasField("segments"):
-            source.options.segments = 2 * source.options.segments or _MANY
+        if source.options.HasField("segments"):
+            source.options.segments = 2 * source.options.segments
         return Model(self._channel, self._channel.call("Compile", source).model, source)
 
     def __repr__(self) -> str:
@@ -94,7 +90,7 @@ class Model:
             iterations=answer.iterations,
             estimated_error=estimate_of(answer),
             jumped=answer.jumped,
-            warnings=tuple(answer.warnings),
+            warnings=said(answer.warnings),
             free_motions=tuple(answer.free_motions),
         )
 
@@ -113,7 +109,7 @@ class Model:
             answer.unknowns,
             [None if math.isnan(e) else e for e in answer.errors],
             answer.deflection_m,
-            tuple(answer.warnings),
+            said(answer.warnings),
             estimate_of(answer),
         )
 
@@ -174,7 +170,7 @@ class Model:
             modal_error=answer.modal_error if answer.HasField("modal_error") else None,
             unknowns=answer.unknowns,
             estimated_error=estimate_of(answer),
-            warnings=tuple(answer.warnings),
+            warnings=said(answer.warnings),
         )
 
     def pull_in(self, max_v: float = 200.0, port: str = "") -> PullInResult:
@@ -182,7 +178,7 @@ class Model:
         request = analysis_pb2.PullInRequest(model=self.id, port=port, max_v=max_v)
         answer = self._call("PullIn", request)
         release = answer.release_v if answer.HasField("release_v") else None
-        warnings = tuple(answer.warnings)
+        warnings = said(answer.warnings)
         return PullInResult(answer.port, answer.pull_in_v, release, estimate_of(answer), not answer.unheld, warnings)
 
     def transient(
@@ -218,12 +214,16 @@ class Model:
                 raise ValueError("a run along inputs begins in their equilibrium, with the model's own tolerance: no release, no tol")
             held: dict[str, Waveform] = {port: ([0.0], [volts]) for port, volts in (voltages or {}).items()}
             waves = {**held, **inputs}
-            with self.session(signals=signals) as session:
+            with self._session(signals) as session:
                 found = drive(session, waves, stop, points, progress)
             if not estimate:
-                return told(found, None, self._tol())
-            with self._finer().session(signals=signals) as session:
-                return told(found, drive(session, waves, stop, points), self._tol())
+                found = told(found, None, self._tol())
+                said(found.warnings)
+                return found
+            with self._finer()._session(signals) as session:
+                found = told(found, drive(session, waves, stop, points), self._tol())
+            said(found.warnings)
+            return found
         request = analysis_pb2.TransientRequest(
             model=self.id,
             stop_s=stop,
@@ -251,7 +251,7 @@ class Model:
                 units = dict(zip(signals, end.units))
                 work = (end.steps, end.rejected, end.unknowns)
                 step_error = end.step_error if end.HasField("step_error") else None
-                return TransientResult(np.array(t), curves, units, *work, estimate_of(end), tuple(end.warnings), step_error)
+                return TransientResult(np.array(t), curves, units, *work, estimate_of(end), said(end.warnings), step_error)
         raise Unavailable(f"server {self._channel.address}: the stream ended before the run did")
 
     def session(
@@ -277,6 +277,19 @@ class Model:
         A ``kept`` session outlives its connection for a time (:meth:`Session.resume`), and the server, where that keeps states
         (``bimorph serve --state-dir``).
         """
+        of_mesh(self.warnings)
+        return self._session(signals, ports, timeout, seed, noise_band, kept)
+
+    def _session(
+        self,
+        signals: Sequence[str],
+        ports: Sequence[str] = (),
+        timeout: float = 60.0,
+        seed: int | None = None,
+        noise_band: float | None = None,
+        kept: bool = False,
+    ) -> Session:
+        """The same, of which nothing is said."""
         self._describe()
         if seed is None and noise_band is not None:
             raise ValueError("noise_band says nothing without a seed")
