@@ -30,6 +30,19 @@ pub struct Compiled {
     pub order: ModelOrder,
     /// The system in joint coordinates where the formulation has them; or why they cannot be had.
     pub joints: Option<Result<Arc<Joints>, Unfit>>,
+    /// Its lowest mode, where that was looked for: in a circuit.
+    pub lowest: Option<LowestMode>,
+}
+
+/// The lowest mode about the equilibrium without voltages.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LowestMode {
+    /// Frequency [Hz].
+    pub frequency_hz: f64,
+    /// Quality by the drag and dampers of the drawing [1]; infinite without.
+    pub quality: f64,
+    /// Estimated relative error of the frequency by the mesh [1].
+    pub error: f64,
 }
 
 impl Compiled {
@@ -57,6 +70,7 @@ impl Compiled {
             joints: in_joints_of(&parts, &self.options),
             parts,
             order,
+            lowest: None,
         })
     }
 }
@@ -144,6 +158,7 @@ impl Drawn {
             options: self.options,
             parts,
             order,
+            lowest: None,
         })
     }
 }

@@ -6,15 +6,16 @@ use super::sensitivity::About;
 use super::signal::{Signal, View};
 use super::statics::{NodeMotion, operating_point, told_at, too_hot};
 use super::{AnalysisError, BeamMotions, NodeMotions, PortVoltages};
-use crate::compile::Compiled;
+use crate::compile::{Compiled, LowestMode};
 use crate::domains::{Domain, Drive, Point};
 use crate::multibody::BlockMatrix;
-use crate::multibody::forces::add_inertia;
+use crate::multibody::forces::{add_damping, add_inertia};
 use crate::multibody::planar::Pose;
 use crate::refine::axial::axial_forces;
 use crate::refine::order_error::{own_stiffness, relative_of_loaded_modes};
 use crate::solve::eigen::{Modes, RELIABLE, lowest_modes};
 use serde::Serialize;
+use std::f64::consts::TAU;
 
 /// Undamped modes.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -64,6 +65,18 @@ pub fn modes(compiled: &Compiled, count: usize, voltages: &PortVoltages) -> Resu
     let (mut result, q, shapes) = shapeless(compiled, count, voltages)?;
     result.shapes = shapes.iter().map(|x| shape(compiled, &q, x, false).0).collect();
     Ok(result)
+}
+
+/// The lowest mode about the equilibrium without voltages; none where its error is not known.
+pub(super) fn lowest(compiled: &Compiled) -> Option<LowestMode> {
+    let (found, _, shapes) = shapeless(compiled, 1, &[]).ok()?;
+    let (model, shape) = (&compiled.parts.system.model, shapes.first()?);
+    let mut drag = vec![Pose::zeros(); shape.len()];
+    add_damping(model, shape, &mut drag);
+    let power: f64 = drag.iter().zip(shape).map(|(force, rate)| force.dot(rate)).sum();
+    let frequency_hz = *found.frequencies_hz.first()?;
+    let quality = TAU * frequency_hz * model.mass_product(shape, shape) / power.abs();
+    Some(LowestMode { frequency_hz, quality, error: (*found.errors.first()?)? })
 }
 
 /// True where modes are about an equilibrium that is not the drawing. As SUGAR has it, that is where voltages pull across gaps: its beams

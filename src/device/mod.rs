@@ -22,6 +22,7 @@ pub mod look;
 mod noise;
 mod port_kind;
 pub mod ports;
+mod ringing;
 mod saved;
 pub mod scale;
 mod seen;

@@ -2,6 +2,7 @@
 
 use super::agitation::Shaken;
 use super::ports::Ports;
+use super::ringing::Ringing;
 use super::seen::{Seen, surroundings};
 use super::states::{Snapshot, States};
 use super::{Description, DeviceError, Mode, OpenRequest, PortInfo, PortKind, SignalInfo, Token, Trial};
@@ -52,6 +53,8 @@ pub(super) struct Session {
     pub(super) response: Vec<ComplexPose>,
     /// Codes of the warnings that were given.
     pub(super) warned: Vec<String>,
+    /// How what was accepted rings.
+    pub(super) ringing: Ringing,
 }
 
 impl Session {
@@ -123,6 +126,7 @@ impl Session {
             seen: None,
             response: vec![ComplexPose::zeros(); n],
             warned: Vec::new(),
+            ringing: Ringing::default(),
         };
         Ok((session, description))
     }

@@ -115,6 +115,11 @@ impl Shown {
         Some(Self { slopes, bends, steps: steps.try_into().ok()?, low, high, now })
     }
 
+    /// Values at this state.
+    pub(super) fn values(&self) -> &[f64] {
+        &self.now
+    }
+
     /// Values that it follows.
     pub fn followed(&self) -> usize {
         self.now.len()

@@ -2,7 +2,7 @@
 //! drawing and the lowest mode about it.
 
 use super::super::AnalysisError;
-use super::super::modes::modes;
+use super::super::modes::lowest;
 use super::equilibrium;
 use super::frequencies::for_modes;
 use super::meshed::{chosen, laid};
@@ -26,6 +26,7 @@ pub fn in_circuit(compiled: &Compiled) -> Compiled {
     let finer = if given { None } else { sought(compiled).filter(|finer| finer.unknowns() <= MOST) };
     let sought = finer.as_ref().and_then(|finer| finer.order.estimated_error);
     let mut fitted = finer.unwrap_or_else(|| compiled.clone());
+    fitted.lowest = lowest(&fitted);
     let (what, error) = match sought {
         Some(error) => ("the equilibrium without voltages or the lowest mode", error),
         None => match worse(&fitted) {
@@ -66,8 +67,7 @@ fn sought(compiled: &Compiled) -> Option<Compiled> {
 /// Which of the two is further off on this mesh, and by how much; none where neither is known.
 fn worse(compiled: &Compiled) -> Option<(&'static str, f64)> {
     let still = equilibrium::judged(compiled, &[]).ok().and_then(|(_, error)| error);
-    let lowest = modes(compiled, 1, &[]).ok().and_then(|found| found.errors.first().copied().flatten());
-    [("the equilibrium without voltages", still), ("the lowest mode", lowest)]
+    [("the equilibrium without voltages", still), ("the lowest mode", compiled.lowest.map(|lowest| lowest.error))]
         .into_iter()
         .filter_map(|(what, error)| Some((what, error?.abs())))
         .max_by(|a, b| a.1.total_cmp(&b.1))

@@ -34,3 +34,27 @@ fn states_beyond_their_range_are_told_once() {
         assert_eq!(told(&ngspice, "PWL(0 0 10u 1)", ".tran 1u 20u"), [""; 0], "ngspice {version}");
     }
 }
+
+/// A cantilever that a force pulse leaves ringing without loss, for 137 cycles: told when its mesh brings it out of step by the tolerance, ten
+/// times and a hundred times that; on sixteen segments it is told nothing.
+#[test]
+fn what_rings_out_of_step_is_told() {
+    let net = "process p = [Youngsmodulus=165e9 density=2300 h=2u]\nanchor p [a] []\nbeam2d p [a b] [l=200u w=2u]\n";
+    for (version, ngspice) in versions() {
+        for (more, told) in [("", 3), ("segments=16", 0)] {
+            let folder = all_decks();
+            let (deck, log) = (folder.path().join("ring.cir"), folder.path().join("log"));
+            std::fs::write(folder.path().join("ring.net"), net).unwrap();
+            let text = format!(
+                "* rings\nI1 0 f PULSE(0 1u 1u 10n 10n 2u 1)\nA1 %hd [f 0] %v [y] r\n\
+                 .model r bimorph(file=\"ring.net\" ports=[\"b.y\"] monitors=[\"b.y:1e6\"] {more})\n.tran 1u 2m\n.end\n"
+            );
+            std::fs::write(&deck, text).unwrap();
+            let environment = vec![("BIMORPH_LOG", log.clone())];
+            run(CosimOptions { deck, ngspice: Some(ngspice.clone()), environment, ..CosimOptions::default() }).unwrap();
+            let trace = std::fs::read_to_string(log).unwrap();
+            let lines: Vec<&str> = trace.lines().filter(|line| line.contains("warning[W040]")).collect();
+            assert_eq!(lines.len(), told, "ngspice {version}, {more}: {lines:#?}");
+        }
+    }
+}
