@@ -14,7 +14,7 @@ struct Document<'a> {
     file: String,
     plots: &'a [Plot],
     printed: &'a [Printed],
-    warnings: &'a [String],
+    warnings: Vec<&'a str>,
 }
 
 /// Prints ngspice's output of the run as it is, unless `quiet`, then a table for each plot; or one document.
@@ -24,12 +24,13 @@ pub(crate) fn print_check(deck: &Path, checked: &Checked, json: bool, quiet: boo
     }
     if json {
         let file = deck.display().to_string();
-        let document = Document { file, plots: &checked.plots, printed: &checked.printed, warnings: &checked.notes };
+        let warnings = checked.notes.iter().map(String::as_str).chain(checked.report.warnings()).collect();
+        let document = Document { file, plots: &checked.plots, printed: &checked.printed, warnings };
         let text = serde_json::to_string(&document).map_err(|e| Failure::Stdout(e.into()))?;
         return print(&format!("{text}\n"));
     }
     let mut text = if quiet { String::new() } else { format!("{}\n", checked.report.output.trim_end()) };
-    text += "as it is, against half the steps and a tenth of the tolerances; differences are relative to the range\n";
+    text += "as it is, against half the steps, a tenth of the tolerances and twice the segments; differences are relative to the range\n";
     for plot in &checked.plots {
         text += &table(plot);
     }

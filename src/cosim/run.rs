@@ -52,6 +52,14 @@ pub struct CosimReport {
     pub output: String,
 }
 
+impl CosimReport {
+    /// What the run was warned of by its models, as it was told.
+    pub fn warnings(&self) -> impl Iterator<Item = &str> {
+        let of_model = |line: &&str| line.starts_with("bimorph: ") && line.contains(": warning[");
+        self.output.lines().map(str::trim).filter(of_model)
+    }
+}
+
 /// Runs a deck to its end, or ends ngspice as soon as `keep_going` says no; then no raw file is left, whole or half.
 ///
 /// # Errors

@@ -1,7 +1,7 @@
 //! What decks are warned of when their states are accepted.
 
 use crate::support::{all_decks, run, versions};
-use bimorph::cosim::CosimOptions;
+use bimorph::cosim::{self, CosimOptions};
 use std::path::Path;
 
 /// The bank's heaters at a voltage that melts them and drives the comb through its other side, and what was told, in order.
@@ -43,17 +43,22 @@ fn what_rings_out_of_step_is_told() {
     for (version, ngspice) in versions() {
         for (more, told) in [("", 3), ("segments=16", 0)] {
             let folder = all_decks();
-            let (deck, log) = (folder.path().join("ring.cir"), folder.path().join("log"));
+            let deck = folder.path().join("ring.cir");
             std::fs::write(folder.path().join("ring.net"), net).unwrap();
             let text = format!(
                 "* rings\nI1 0 f PULSE(0 1u 1u 10n 10n 2u 1)\nA1 %hd [f 0] %v [y] r\n\
                  .model r bimorph(file=\"ring.net\" ports=[\"b.y\"] monitors=[\"b.y:1e6\"] {more})\n.tran 1u 2m\n.end\n"
             );
             std::fs::write(&deck, text).unwrap();
-            let environment = vec![("BIMORPH_LOG", log.clone())];
-            run(CosimOptions { deck, ngspice: Some(ngspice.clone()), environment, ..CosimOptions::default() }).unwrap();
-            let trace = std::fs::read_to_string(log).unwrap();
-            let lines: Vec<&str> = trace.lines().filter(|line| line.contains("warning[W040]")).collect();
+            let options = CosimOptions {
+                raw: Some(folder.path().join("ring.raw")),
+                deck,
+                ngspice: Some(ngspice.clone()),
+                capture: true,
+                ..CosimOptions::default()
+            };
+            let report = cosim::run(&options, &|| true).unwrap();
+            let lines: Vec<&str> = report.warnings().filter(|line| line.contains("warning[W040]")).collect();
             assert_eq!(lines.len(), told, "ngspice {version}, {more}: {lines:#?}");
         }
     }
