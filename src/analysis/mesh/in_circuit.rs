@@ -1,5 +1,5 @@
 //! The mesh of a model in a circuit, whose voltages come while it runs: that for what is known before, the equilibrium under the loads of the
-//! drawing and the lowest mode about it.
+//! drawing and the lowest modes about it, which steps and pulses excite most.
 
 use super::super::AnalysisError;
 use super::super::modes::lowest;
@@ -14,8 +14,11 @@ use crate::refine::model_order::ModelOrder;
 /// Unknowns beyond which no other mesh is sought, and nothing compared: a circuit is not to wait for it.
 const MOST: usize = 3000;
 
+/// Modes that the mesh holds.
+const HELD: usize = 3;
+
 /// The model for a circuit, on a mesh that holds the tolerance for the equilibrium under the loads of the drawing, without any voltage, and for
-/// the lowest mode about it; no coarser anywhere than it was. Where segments or a band are given the mesh stays. A warning says where
+/// the three lowest modes about it; no coarser anywhere than it was. Where segments or a band are given the mesh stays. A warning says where
 /// one of the two may be off by more than the tolerance. What voltages do is not known here.
 pub fn in_circuit(compiled: &Compiled) -> Compiled {
     let given = chosen(compiled) || compiled.options.band.is_some();
@@ -28,7 +31,7 @@ pub fn in_circuit(compiled: &Compiled) -> Compiled {
     let mut fitted = finer.unwrap_or_else(|| compiled.clone());
     fitted.lowest = lowest(&fitted);
     let (what, error) = match sought {
-        Some(error) => ("the equilibrium without voltages or the lowest mode", error),
+        Some(error) => ("the equilibrium without voltages or one of the lowest modes", error),
         None => match worse(&fitted) {
             Some(worse) => worse,
             None => return fitted,
@@ -55,7 +58,7 @@ pub fn twice(compiled: &Compiled, tol: f64) -> Result<Compiled, AnalysisError> {
 
 /// The model on the mesh for both; none where there is no such equilibrium or mode.
 fn sought(compiled: &Compiled) -> Option<Compiled> {
-    let (moving, _) = for_modes(compiled, 1, &[]).ok()?;
+    let (moving, _) = for_modes(compiled, HELD, &[]).ok()?;
     let drawn = &compiled.order.segments;
     let least = moving.segments.iter().zip(drawn).map(|(moving, drawn)| *moving.max(drawn)).collect();
     let (still, _) = equilibrium::order(compiled, &[], least).ok()?;
