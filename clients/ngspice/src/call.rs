@@ -164,8 +164,10 @@ impl Call<'_> {
         }
         let dt = c.t[0] - c.t[1];
         Ok(match dt > 0.0 {
-            true if (dt - delta).abs() <= 4.0 * f64::EPSILON * c.t[0] => Question::Transient { t: c.time, dt: delta },
-            true => Question::Transient { t: c.time, dt },
+            true => {
+                let same = (dt - delta).abs() <= 4.0 * f64::EPSILON * c.t[0];
+                Question::Transient { t: c.time, dt: if same { delta } else { dt }, rule: self.circuit.rule() }
+            }
             false => Question::Static,
         })
     }

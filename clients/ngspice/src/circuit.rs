@@ -4,6 +4,7 @@
 //! Code models are told the kind of an analysis by whoever set it last, and `.noise`, `.pz`, `.tf` and `.sens` do not set
 //! it. The circuit's own mode is right at every call.
 
+use crate::companion::Rule;
 use crate::layout::{Generation, Layout};
 use std::ffi::c_void;
 
@@ -11,6 +12,10 @@ use std::ffi::c_void;
 const STATES: usize = 16;
 /// Offset of the present step [byte].
 const DELTA: usize = 88;
+/// Offset of the order of integration, and after the largest order that of its method, three integers of four bytes [byte].
+const ORDER: usize = 232;
+/// Number of Gear's method.
+const GEAR: i32 = 2;
 /// Offset of the right-hand side; after a solve, of the solution [byte].
 const SOLUTION: usize = 280;
 /// Offset of the solution before it, at which the devices were loaded [byte].
@@ -65,6 +70,16 @@ impl Circuit {
     /// The present step [s].
     pub(crate) fn delta(self) -> f64 {
         self.read(DELTA)
+    }
+
+    /// How ngspice integrates over the present step.
+    pub(crate) fn rule(self) -> Rule {
+        let [order, _, method] = self.read::<[i32; 3]>(ORDER);
+        match (order, method) {
+            (1, _) => Rule::First,
+            (_, GEAR) => Rule::Gear,
+            _ => Rule::Trapezoidal,
+        }
     }
 
     /// The mode word. ngspice 45 and 46 cannot be told apart, and 46 has it one word further on: there the word that can

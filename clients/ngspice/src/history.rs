@@ -5,9 +5,9 @@
 //! damping blends the doubles of two states into numbers that never were. Each record therefore carries a check over
 //! its own bits; a record that does not check is none.
 //!
-//! Doubles: check, token, two steps, skipped time; then p charges at this point, and at the last three bases.
+//! Doubles: check, token, step, skipped time; then p charges at this point, and at the last two bases, and p currents at the last.
 
-use crate::companion::{Companion, shortest};
+use crate::companion::{Companion, Rule, shortest};
 use bimorph::device::Token;
 
 /// A record as it was read.
@@ -21,61 +21,71 @@ pub struct History {
     pub charges: Vec<f64>,
 }
 
-/// The last three points far enough apart to tell a slope, the last one first, see [`crate::companion`].
+/// The last two points far enough apart to tell a slope, the last one first, see [`crate::companion`].
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Base {
-    /// Times between them [s]; 0 where there is none since an operating point, or since the slope changed.
-    pub steps: [f64; 2],
+    /// Time between them [s]; 0 where there is none since an operating point, or since the slope changed.
+    pub step: f64,
     /// Time since the last one [s].
     pub skipped: f64,
     /// Charges at each [C].
-    pub charges: [Vec<f64>; 3],
+    pub charges: [Vec<f64>; 2],
+    /// What the charges' change makes of currents at the last one [A].
+    pub currents: Vec<f64>,
 }
 
 impl Base {
     /// At an operating point with these charges [C].
     pub fn start(&mut self, charges: &[f64]) {
-        (self.steps, self.skipped) = ([0.0; 2], 0.0);
+        (self.step, self.skipped) = (0.0, 0.0);
         for place in &mut self.charges {
             place.clear();
             place.extend_from_slice(charges);
         }
+        self.currents.clear();
+        self.currents.resize(charges.len(), 0.0);
     }
 
     /// At the end of a step that ends at `t` and is `dt` long [s], with these charges there [C]: adds the currents that they
     /// make [A], and answers by how much each changes with its charge [1/s].
-    pub fn advance(&mut self, (t, dt): (f64, f64), charges: &[f64], currents: &mut [f64]) -> f64 {
+    pub fn advance(&mut self, rule: Rule, (t, dt): (f64, f64), charges: &[f64], currents: &mut [f64]) -> f64 {
         let (step, shortest) = (dt + self.skipped, shortest(t));
         if step < shortest {
             let slope = 1.0 / shortest;
             for (n, current) in currents.iter_mut().enumerate() {
-                let [q1, q2, _] = self.of(n);
-                let so_far = if self.steps[0] > 0.0 { (q1 - q2) / self.steps[0] } else { 0.0 };
-                *current += so_far + slope * (charges[n] - q1 - so_far * step);
+                let so_far = self.currents[n];
+                *current += so_far + slope * (charges[n] - self.charges[0][n] - so_far * step);
             }
             self.skipped = step;
+            if rule == Rule::First {
+                self.step = 0.0;
+            }
             return slope;
         }
-        let companion = Companion::new(step, self.steps);
+        let companion = Companion::new(rule, step, self.step);
         for (n, current) in currents.iter_mut().enumerate() {
-            *current += companion.current(charges[n], self.of(n));
+            let before = [self.charges[0][n], self.charges[1][n]];
+            self.currents[n] = companion.current(charges[n], before, self.currents[n]);
+            *current += self.currents[n];
         }
-        // where the slope begins anew, nothing before the last point counts any more
-        (self.steps, self.skipped) = ([step, if companion.restarts() { 0.0 } else { self.steps[0] }], 0.0);
-        self.charges.rotate_right(1);
+        (self.step, self.skipped) = (step, 0.0);
+        self.charges.swap(0, 1);
         self.charges[0].clear();
         self.charges[0].extend_from_slice(charges);
         companion.slope
     }
 
-    /// Charges of port `n` at each point [C].
-    fn of(&self, n: usize) -> [f64; 3] {
-        [self.charges[0][n], self.charges[1][n], self.charges[2][n]]
+    /// The charges at the last point become these [C], and its currents what follows with `slope` [1/s], that of the step to it.
+    pub fn settle(&mut self, charges: &[f64], slope: f64) {
+        for ((kept, current), charge) in self.charges[0].iter_mut().zip(&mut self.currents).zip(charges) {
+            *current += slope * (charge - *kept);
+            *kept = *charge;
+        }
     }
 }
 
 /// Doubles before the charges.
-pub const HEAD: usize = 5;
+pub const HEAD: usize = 4;
 
 /// Doubles needed for `ports` ports.
 pub fn len(ports: usize) -> usize {
@@ -86,10 +96,9 @@ pub fn len(ports: usize) -> usize {
 pub fn write(memory: &mut [f64], epoch: u64, token: Token, charges: &[f64], base: &Base) {
     let ports = charges.len();
     memory[1] = token.0 as f64;
-    memory[2..4].copy_from_slice(&base.steps);
-    memory[4] = base.skipped;
-    let [last, second, third] = &base.charges;
-    let parts = [charges, last, second, third];
+    (memory[2], memory[3]) = (base.step, base.skipped);
+    let [last, second] = &base.charges;
+    let parts = [charges, last, second, &base.currents];
     for (place, part) in memory[HEAD..].chunks_exact_mut(ports.max(1)).zip(parts) {
         place.copy_from_slice(part);
     }
@@ -102,9 +111,9 @@ pub fn read(memory: &[f64], epoch: u64, history: &mut History) {
     let valid = memory[0].to_bits() == check(epoch, &memory[1..]).to_bits();
     let base = &mut history.base;
     history.token = valid.then_some(Token(memory[1] as u64));
-    (base.steps, base.skipped) = if valid { ([memory[2], memory[3]], memory[4]) } else { ([0.0; 2], 0.0) };
-    let [last, second, third] = &mut base.charges;
-    let into = [&mut history.charges, last, second, third];
+    (base.step, base.skipped) = if valid { (memory[2], memory[3]) } else { (0.0, 0.0) };
+    let [last, second] = &mut base.charges;
+    let into = [&mut history.charges, last, second, &mut base.currents];
     for (part, place) in into.into_iter().zip(memory[HEAD..].chunks_exact(ports.max(1))) {
         part.clear();
         part.extend(place.iter().map(|q| if valid { *q } else { 0.0 }));
@@ -125,8 +134,8 @@ mod tests {
     use super::*;
 
     fn base(seed: f64) -> Base {
-        let charges = [vec![3e-15, 0.0], vec![5e-15, 6e-15], vec![7e-15, -1e-15]];
-        Base { steps: [1e-9 * seed, 2e-9], skipped: 0.0, charges }
+        let charges = [vec![3e-15, 0.0], vec![5e-15, 6e-15]];
+        Base { step: 1e-9 * seed, skipped: 0.0, charges, currents: vec![7e-6, -1e-6] }
     }
 
     /// Points a rounding of the time apart are differentiated across: the current is the slope so far, and the point after
@@ -139,13 +148,36 @@ mod tests {
             base.start(&q(0.0));
             times.iter().fold(0.0, |before, &t| {
                 current = [0.0];
-                base.advance((t, t - before), &q(t), &mut current);
+                base.advance(Rule::Trapezoidal, (t, t - before), &q(t), &mut current);
                 assert!((current[0] / 2e-9 - 1.0).abs() < 1e-6, "{current:?} at {t:e}");
                 t
             });
             (base, current)
         };
         assert_eq!(run(&[1e-6, 2e-6, 3e-6]), run(&[1e-6, 2e-6, 2e-6 + 1e-18, 3e-6]));
+    }
+
+    /// A corner after which the first step is one of rounding is one for the step after it, too.
+    #[test]
+    fn a_corner_is_kept_over_a_step_of_rounding() {
+        let mut base = Base { step: 1e-6, skipped: 0.0, charges: [vec![1e-15], vec![0.0]], currents: vec![1e-9] };
+        let mut current = [0.0];
+        base.advance(Rule::First, (1e-6 + 1e-18, 1e-18), &[1e-15], &mut current);
+        current = [0.0];
+        base.advance(Rule::Trapezoidal, (2e-6, 1e-6), &[1e-15], &mut current);
+        assert_eq!(current, [0.0]);
+    }
+
+    /// Charges that have settled elsewhere leave the currents that they would have made.
+    #[test]
+    fn settled_charges_take_their_currents_along() {
+        let run = |asked: f64, settled: f64| {
+            let mut base = base(1.0);
+            let slope = base.advance(Rule::Trapezoidal, (5e-9, 1e-9), &[asked, 0.0], &mut [0.0; 2]);
+            base.settle(&[settled, 0.0], slope);
+            base.currents[0]
+        };
+        assert!((run(4e-15, 6e-15) / run(6e-15, 6e-15) - 1.0).abs() < 1e-12);
     }
 
     fn record(seed: f64) -> Vec<f64> {
@@ -167,7 +199,7 @@ mod tests {
     fn refuses_what_was_never_written() {
         let blend: Vec<f64> = record(1.0).iter().zip(record(2.0)).map(|(a, b)| a + 0.3 * (b - a)).collect();
         let mut history = History::default();
-        for (memory, epoch) in [(vec![0.0; 13], 7), (vec![f64::NAN; 13], 7), (record(1.0), 8), (blend, 7)] {
+        for (memory, epoch) in [(vec![0.0; 12], 7), (vec![f64::NAN; 12], 7), (record(1.0), 8), (blend, 7)] {
             read(&memory, epoch, &mut history);
             assert_eq!(history.token, None);
             assert_eq!(history.charges, [0.0, 0.0]);

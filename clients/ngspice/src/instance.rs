@@ -3,6 +3,7 @@
 //! Nothing here knows ngspice's memory; `crate::call` copies between the two. State that must follow accepted and
 //! rejected steps lives in a [`History`], which the host rolls back; what stays here is only a cache or a count.
 
+use crate::companion::Rule;
 use crate::history::History;
 use crate::question::{Answer, Outcome, Question};
 use crate::settings::{Monitor, PortName};
@@ -187,9 +188,9 @@ impl Instance {
                 let outcome = self.trial(Mode::Static, 0.0, 0.0, voltages, previous.token);
                 self.finish(outcome, None, previous)
             }
-            Question::Transient { t, dt } => {
+            Question::Transient { t, dt, rule } => {
                 let outcome = self.trial(Mode::Transient, t, dt, voltages, previous.token);
-                self.finish(outcome, Some((t, dt)), previous)
+                self.finish(outcome, Some((rule, t, dt)), previous)
             }
             Question::SmallSignal { omega } => self.linearize(omega, previous.token),
         }
@@ -224,7 +225,7 @@ impl Instance {
             let given = volts.iter().zip(&self.scales).map(|(v, scale)| v * scale.given);
             answer.charges[n] += row.iter().zip(given).map(|(c, v)| c * v).sum::<f64>();
         }
-        answer.base.charges[0].clone_from(&answer.charges);
+        answer.base.settle(&answer.charges, answer.slope);
         true
     }
 
@@ -247,11 +248,16 @@ impl Instance {
         }
     }
 
-    fn finish(&mut self, result: Result<(), DeviceError>, time: Option<(f64, f64)>, previous: &History) -> Outcome {
+    fn finish(
+        &mut self,
+        result: Result<(), DeviceError>,
+        time: Option<(Rule, f64, f64)>,
+        previous: &History,
+    ) -> Outcome {
         if let Err(error) = result {
             return Outcome::Stop(error.to_string());
         }
-        let step = time.map_or(0.0, |(_, dt)| dt);
+        let step = time.map_or(0.0, |(.., dt)| dt);
         let why = match &self.reply.status {
             Status::Ok => {
                 self.failures = 0;
@@ -277,19 +283,20 @@ impl Instance {
     }
 
     /// Turns the reply into what ngspice wants; charges into currents where time passes.
-    fn fill(&mut self, time: Option<(f64, f64)>, previous: &History) {
+    fn fill(&mut self, time: Option<(Rule, f64, f64)>, previous: &History) {
         let (reply, answer) = (&self.reply, &mut self.answer);
         let ports = reply.charges.len();
         answer.token = reply.token;
-        answer.step = time.map_or(0.0, |(_, dt)| dt);
+        answer.step = time.map_or(0.0, |(.., dt)| dt);
+        answer.slope = 0.0;
         answer.charges.clone_from(&reply.charges);
         answer.currents.clone_from(&reply.currents);
         answer.conductances.clone_from(&reply.di_dv);
         answer.base.clone_from(&previous.base);
-        if let Some(time) = time {
-            let slope = answer.base.advance(time, &reply.charges, &mut answer.currents);
+        if let Some((rule, t, dt)) = time {
+            answer.slope = answer.base.advance(rule, (t, dt), &reply.charges, &mut answer.currents);
             for (g, c) in answer.conductances.iter_mut().zip(&reply.dq_dv) {
-                *g += slope * c;
+                *g += answer.slope * c;
             }
         } else {
             answer.base.start(&reply.charges);

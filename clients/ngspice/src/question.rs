@@ -1,5 +1,6 @@
 //! What ngspice asks of an instance, and what it is told.
 
+use crate::companion::Rule;
 use crate::history::Base;
 use bimorph::device::Token;
 
@@ -14,6 +15,8 @@ pub enum Question {
         t: f64,
         /// Length [s], positive.
         dt: f64,
+        /// How charges are differentiated over it.
+        rule: Rule,
     },
     /// Small-signal answer at `omega` [rad/s].
     SmallSignal {
@@ -48,6 +51,8 @@ pub struct Answer {
     pub charges: Vec<f64>,
     /// What the next step's charges will be differentiated from, if this point is accepted.
     pub base: Base,
+    /// By how much a current changes with its charge over this step [1/s]; 0 for equilibrium.
+    pub slope: f64,
     /// Scaled monitors [V] (s).
     pub monitors: Vec<f64>,
     /// ∂monitor/∂voltage [1] (s×p).
