@@ -11,11 +11,13 @@
 //! [`Device::recover`](crate::device::Device::recover).
 
 mod allowance;
+mod bounded;
 mod clock;
 mod purse;
 mod stopped;
 
 pub use allowance::Allowance;
+pub use bounded::bounded;
 pub(crate) use clock::thread_cpu;
 pub use purse::{Purse, WINDOW};
 pub use stopped::Stopped;
@@ -54,13 +56,6 @@ impl Budget {
     /// A fresh budget.
     pub fn new(allowance: Allowance) -> Self {
         Self(Arc::new(Shared { allowance, used: AtomicUsize::new(0), order: Arc::default() }))
-    }
-
-    /// The same allowance unused, for a part of the computation: stopped together with it.
-    #[must_use]
-    pub fn part(&self) -> Self {
-        let Shared { allowance, order, .. } = &*self.0;
-        Self(Arc::new(Shared { allowance: allowance.clone(), used: AtomicUsize::new(0), order: Arc::clone(order) }))
     }
 
     /// Takes `bytes` of what may be laid out.

@@ -42,7 +42,7 @@ pub(crate) struct Cosim {
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 
-    /// Repeat the run with half the steps and a tenth of the tolerances (reltol, and tol of every model), and tell the difference
+    /// Repeat the run with half the steps, a tenth of the tolerances (reltol, and tol of every model) and twice the segments, and tell the difference
     #[arg(long)]
     check: bool,
 

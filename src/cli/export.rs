@@ -249,16 +249,17 @@ fn quality(fitted: &Fitted, mode: usize) -> f64 {
     fitted.model.modes[mode].omega / fitted.model.damping[(mode, mode)]
 }
 
-/// The estimate of the mesh; what has no beams has no mesh.
+/// The estimate of the mesh, or of its lowest mode where that is all that is known; what has no beams has no mesh.
 fn mesh_error(compiled: &Compiled) -> Option<f64> {
-    if compiled.structure.beams.is_empty() { Some(0.0) } else { compiled.order.estimated_error }
+    let lowest = || compiled.lowest.map(|lowest| lowest.error.abs());
+    if compiled.structure.beams.is_empty() { Some(0.0) } else { compiled.order.estimated_error.or_else(lowest) }
 }
 
 /// How far the full model itself may be off by its mesh.
 fn mesh(compiled: &Compiled) -> String {
     match mesh_error(compiled) {
         Some(error) if compiled.options.band.is_none() && compiled.options.segments.is_none() => format!(
-            "the lowest frequency of the full model: off by {error:.1e} at most, by its mesh; --band HZ holds all below it"
+            "the equilibrium and the lowest frequencies of the full model: off by {error:.1e} at most, by its mesh; --band HZ holds all below it"
         ),
         Some(error) => format!("frequencies of the full model: off by {error:.1e} at most in the band, by its mesh"),
         None => "frequencies of the full model: nothing tells how far its mesh is off; --band HZ does".to_owned(),

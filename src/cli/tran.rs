@@ -226,6 +226,7 @@ impl Tran {
             voltages: self.ports.clone(),
             release,
             method,
+            step: self.step,
             ..TransientOptions::default()
         };
         let busy = progress::spinner("mesh");

@@ -1,4 +1,4 @@
-//! A run repeated with half the steps and a tenth of the tolerances: how far off it may be.
+//! A run repeated with half the steps, a tenth of the tolerances and twice the segments: how far off it may be.
 
 use super::compare::{self, Plot, Printed};
 use super::error::{CosimError, io};

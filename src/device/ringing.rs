@@ -2,7 +2,7 @@
 //!
 //! A mesh that is off by e in the lowest frequency brings a free motion out of step by π·e with each half of its cycle, until it has died
 //! away: at most 2Q·e, which is also what it makes of a steady swing at resonance. What swings by s of its range r is then off by
-//! that phase times s/2r. Halves are told by turning points of what the circuit sees; those that last neither about as long as half a cycle of
+//! that phase times s/2r. Halves are told by turning points of what the circuit sees; those that do not last about as long as half a cycle of
 //! the mode count nothing, as what a slow drive moves is not out of step.
 
 use crate::compile::LowestMode;

@@ -51,8 +51,8 @@ pub(super) struct Session {
     /// What each answer sees of a displacement, about the state that was asked for its noise last.
     pub(super) seen: Option<(Token, Vec<Seen>)>,
     pub(super) response: Vec<ComplexPose>,
-    /// Codes of the warnings that were given.
-    pub(super) warned: Vec<String>,
+    /// Codes of the warnings that were given, and how much each told of.
+    pub(super) warned: Vec<(String, f64)>,
     /// How what was accepted rings.
     pub(super) ringing: Ringing,
 }

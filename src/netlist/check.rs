@@ -153,7 +153,7 @@ fn facts(drawing: &Drawing, sink: &mut Sink) {
             ),
             Fact::OddRise => (
                 "W037",
-                format!("`T` = {number} K: nothing that structures are made of is solid there ({elements})"),
+                format!("a temperature of {number} K: nothing that structures are made of is solid there ({elements})"),
                 "it is an absolute temperature in kelvin",
             ),
             Fact::Capacitor => (

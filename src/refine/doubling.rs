@@ -165,7 +165,7 @@ fn shares<E>(
 }
 
 /// Twice the segments of some beams; rigid ones stay rigid.
-fn doubled(options: &CompileOptions, segments: &[usize], some: impl Fn(usize) -> bool) -> Vec<usize> {
+pub(crate) fn doubled(options: &CompileOptions, segments: &[usize], some: impl Fn(usize) -> bool) -> Vec<usize> {
     let twice = |n: usize| if n == 0 { 0 } else { options.scheme.segments(2 * n) };
     segments.iter().enumerate().map(|(beam, &n)| if some(beam) { twice(n) } else { n }).collect()
 }

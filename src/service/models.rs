@@ -98,15 +98,17 @@ impl Models {
         if compiled.unknowns() > limits.unknowns {
             return Err(status::limit("unknowns", limits.unknowns, compiled.unknowns()));
         }
-        let in_circuit = Some(mesh::in_circuit(&compiled)).filter(|finer| finer.unknowns() <= limits.unknowns);
+        let bytes = budget::current().map_or(0, |budget| budget.used());
+        let in_circuit = Arc::new(mesh::in_circuit(&compiled));
         let compiled = Arc::new(compiled);
-        let in_circuit = in_circuit.map_or_else(|| Arc::clone(&compiled), Arc::new);
         let description = describe(format!("{key:032x}"), &in_circuit, make)?;
         let unknowns = usize::try_from(description.unknowns).unwrap_or(usize::MAX);
         if unknowns > limits.unknowns {
             return Err(status::limit("unknowns", limits.unknowns, unknowns));
         }
-        let bytes = budget::current().map_or(0, |budget| budget.used());
+        // the meshes that were looked at are gone
+        let larger = in_circuit.unknowns().div_ceil(compiled.unknowns().max(1));
+        let bytes = bytes.saturating_mul(1 + larger);
         let model = Arc::new(Model { compiled, in_circuit, description, bundle, options, bytes });
         self.keep(Arc::clone(&model), limits);
         Ok(model)

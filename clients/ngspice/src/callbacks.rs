@@ -11,8 +11,7 @@ use crate::question::Outcome;
 use crate::registry::{close, registry};
 use crate::respond::{respond, settle};
 use crate::table::{DEVICE, LAYOUT};
-use crate::{host, noise, panics, trace};
-use bimorph::netlist::Diagnostic;
+use crate::{host, noise, panics, told, trace};
 use std::ffi::{c_int, c_void};
 use std::io::Write;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -81,20 +80,11 @@ pub(crate) unsafe extern "C" fn convergence_test(model: *mut Model, _circuit: *m
         for (_, instance) in unsafe { call::instances(model) } {
             if let Some(entry) = registry.find(instance.conn as usize) {
                 let warnings = entry.instance.settled();
-                tell_of(entry.instance.name(), &warnings);
+                told::of_instance(entry.instance.name(), &warnings);
             }
         }
         code::OK
     })
-}
-
-/// Warnings of what an instance came to, on standard error.
-fn tell_of(name: &str, warnings: &[Diagnostic]) {
-    for warning in warnings {
-        let line = format!("bimorph: instance {name}: warning[{}]: {}", warning.code, warning.message);
-        let _ = writeln!(std::io::stderr(), "{line}");
-        trace::line(format_args!("{line}"));
-    }
 }
 
 /// Opens every instance, after the host's own setup. An error ends the run before it starts.
@@ -304,7 +294,7 @@ pub(crate) unsafe extern "C" fn accept(circuit: *mut c_void, model: *mut Model) 
             if let Some(entry) = registry.find(instance.conn as usize) {
                 settle(entry, circuit);
                 let warnings = entry.instance.accept();
-                tell_of(entry.instance.name(), &warnings);
+                told::of_instance(entry.instance.name(), &warnings);
             }
         }
         code::OK

@@ -286,21 +286,7 @@ impl Instance {
     fn fill(&mut self, time: Option<(Rule, f64, f64)>, previous: &History) {
         let (reply, answer) = (&self.reply, &mut self.answer);
         let ports = reply.charges.len();
-        answer.token = reply.token;
-        answer.step = time.map_or(0.0, |(.., dt)| dt);
-        answer.slope = 0.0;
-        answer.charges.clone_from(&reply.charges);
-        answer.currents.clone_from(&reply.currents);
-        answer.conductances.clone_from(&reply.di_dv);
-        answer.base.clone_from(&previous.base);
-        if let Some((rule, t, dt)) = time {
-            answer.slope = answer.base.advance(rule, (t, dt), &reply.charges, &mut answer.currents);
-            for (g, c) in answer.conductances.iter_mut().zip(&reply.dq_dv) {
-                *g += answer.slope * c;
-            }
-        } else {
-            answer.base.start(&reply.charges);
-        }
+        answer.take(reply, time, &previous.base);
         for (row, scale) in answer.conductances.chunks_exact_mut(ports.max(1)).zip(&self.scales) {
             row.iter_mut().zip(&self.scales).for_each(|(g, input)| *g *= scale.answered * input.given);
         }

@@ -46,6 +46,7 @@ mod registry;
 mod respond;
 pub mod settings;
 mod table;
+mod told;
 mod trace;
 
 pub use opener::{Opener, set_opener};

@@ -1,7 +1,7 @@
 //! From a `.model` line to a device: find the netlist, compile it once, step it here or on a server.
 
 use crate::model_card::ModelCard;
-use crate::names;
+use crate::{names, told};
 use bimorph::analysis::{AnalysisError, mesh};
 use bimorph::compile::{CompileError, CompileOptions, Compiled, compile};
 use bimorph::device::local::LocalDevice;
@@ -9,7 +9,7 @@ use bimorph::device::{Device, DeviceError};
 use bimorph::front::{self, Asked, FrontError};
 use bimorph::layout::LayoutError;
 use bimorph::layout::convert::ConvertError;
-use bimorph::netlist::{self, Bundle, Diagnostic};
+use bimorph::netlist::{self, Bundle};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use thiserror::Error;
@@ -74,9 +74,6 @@ pub enum OpenError {
 /// of the netlist.
 pub type Opener = fn(&mut ModelCard, Option<&Path>) -> Result<Box<dyn Device>, OpenError>;
 
-/// Warnings of netlists that a process tells, at most.
-const MOST_TOLD: usize = 200;
-
 static OPENER: OnceLock<Opener> = OnceLock::new();
 
 /// Puts another kind of device behind the plug-in, for code that links this crate into a `.cm` of its own. To be
@@ -116,13 +113,13 @@ pub fn open_model(card: &mut ModelCard, directory: Option<&Path>) -> Result<Box<
         return Err(OpenError::Ambiguous { name, pair, file: card.file.clone() });
     }
     names::respell(card, &structure);
-    tell(card, &loaded.warnings.items);
+    told::of_netlist(&card.file, card.options.without_circuit, &loaded.warnings.items);
     let own = match (&card.remote, card.share < 1.0) {
         (Some(address), false) => return connect(address, &bundle, card),
         _ => compiled(&card.file, bundle.clone(), &card.options)?,
     };
     if card.share == 1.0 {
-        tell(card, &own.warnings.items);
+        told::of_netlist(&card.file, card.options.without_circuit, &own.warnings.items);
         return Ok(Box::new(LocalDevice::new(own)));
     }
     let tol = card.share * card.options.tol;
@@ -138,21 +135,6 @@ pub fn open_model(card: &mut ModelCard, directory: Option<&Path>) -> Result<Box<
     connect(address, &bundle, card)
 }
 
-/// Warnings of a netlist on standard error, each once in a process: what a deck's run says of the drawing behind it. Those that a netlist's circuit
-/// is left out are none where the deck has it.
-fn tell(card: &ModelCard, warnings: &[Diagnostic]) {
-    static TOLD: Mutex<Vec<String>> = Mutex::new(Vec::new());
-    let mut told = TOLD.lock().unwrap_or_else(PoisonError::into_inner);
-    let of_circuit = |code: &str| card.options.without_circuit && ["W013", "W021", "W022"].contains(&code);
-    for warning in warnings.iter().filter(|w| !of_circuit(&w.code)) {
-        let line = format!("bimorph: {}: warning[{}]: {}", card.file, warning.code, warning.message);
-        if told.len() < MOST_TOLD && !told.contains(&line) {
-            eprintln!("{line}");
-            told.push(line);
-        }
-    }
-}
-
 #[cfg(feature = "remote")]
 fn connect(address: &str, bundle: &Bundle, card: &ModelCard) -> Result<Box<dyn Device>, OpenError> {
     use bimorph::service::client::RemoteDevice;
@@ -160,7 +142,7 @@ fn connect(address: &str, bundle: &Bundle, card: &ModelCard) -> Result<Box<dyn D
     let respelled = socket.map(|path| format!("unix://{}", path.display()));
     let address = respelled.as_deref().unwrap_or(address);
     let device = RemoteDevice::connect(address, bundle, &card.options, card.deadline)?;
-    tell(card, device.warnings());
+    told::of_netlist(&card.file, card.options.without_circuit, device.warnings());
     Ok(Box::new(device))
 }
 

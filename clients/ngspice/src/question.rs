@@ -2,7 +2,7 @@
 
 use crate::companion::Rule;
 use crate::history::Base;
-use bimorph::device::Token;
+use bimorph::device::{Token, TrialReply};
 
 /// What ngspice asks.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -57,4 +57,25 @@ pub struct Answer {
     pub monitors: Vec<f64>,
     /// ∂monitor/∂voltage [1] (s×p).
     pub monitor_gains: Vec<f64>,
+}
+
+impl Answer {
+    /// Takes a reply over, its charges as currents where time passes: by a rule, to t [s], over a step [s], from what the point before has
+    /// left.
+    pub(crate) fn take(&mut self, reply: &TrialReply, time: Option<(Rule, f64, f64)>, base: &Base) {
+        self.token = reply.token;
+        (self.step, self.slope) = (time.map_or(0.0, |(.., dt)| dt), 0.0);
+        self.charges.clone_from(&reply.charges);
+        self.currents.clone_from(&reply.currents);
+        self.conductances.clone_from(&reply.di_dv);
+        self.base.clone_from(base);
+        if let Some((rule, t, dt)) = time {
+            self.slope = self.base.advance(rule, (t, dt), &reply.charges, &mut self.currents);
+            for (g, c) in self.conductances.iter_mut().zip(&reply.dq_dv) {
+                *g += self.slope * c;
+            }
+        } else {
+            self.base.start(&reply.charges);
+        }
+    }
 }

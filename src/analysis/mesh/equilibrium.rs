@@ -1,5 +1,7 @@
 //! The mesh for a static equilibrium: displacements and charges are compared with those of twice the segments.
 //!
+//! Next to where the equilibrium ends the stiffness that is left is compared, too ([`super::softening`]).
+//!
 //! The error of a displacement is relative to the displacement of its node, or to a thirtieth of the largest of the mechanism where a node
 //! hardly moves; that of a rotation likewise, and no smaller than what turns the size of the mechanism by a thirtieth of the largest
 //! displacement. The finer mesh starts from the state of the coarser one, so that both are on one branch.
@@ -13,7 +15,8 @@ use super::super::statics::{
 };
 use super::super::{AnalysisError, BeamMotions, PortVoltages};
 use super::meshed::{chosen, meshed, on};
-use super::warnings::{of_fingers, of_heat, of_pieces, of_stress};
+use super::softening;
+use super::warnings::{of_fingers, of_heat, of_share_in_pieces, of_stress, worst_in_pieces};
 use crate::compile::Compiled;
 use crate::multibody::planar::Pose;
 use crate::netlist::Diagnostic;
@@ -25,6 +28,9 @@ use std::borrow::Cow;
 /// Share of the mechanism's size below which a displacement is rounding.
 pub(super) const ROUNDING: f64 = 1e-12;
 
+/// Segments of all beams together up to which the side of a limit is sought.
+const MOST_NEAR_LIMIT: usize = 5000;
+
 /// The mesh for the equilibrium at these voltages, from `segments` upwards, and the equilibrium on it.
 pub(super) fn order(
     compiled: &Compiled,
@@ -34,10 +40,29 @@ pub(super) fn order(
     if chosen(compiled) {
         return estimated(compiled, voltages, segments);
     }
-    let mut search = Search::new(compiled, voltages);
-    let mut analyse = |segments: &[usize]| search.follow(segments);
-    let order = doubling::fit(&compiled.structure, &compiled.options, segments, &mut analyse)?;
-    search.ended(order)
+    let (mut segments, mut lost) = (segments, None);
+    loop {
+        let mut search = Search::new(compiled, voltages);
+        let from = segments.clone();
+        let order = match doubling::fit(&compiled.structure, &compiled.options, segments, &mut |s| search.follow(s)) {
+            // a leg in one piece may bear nothing that one in two does
+            Err(error @ AnalysisError::NoEquilibrium { .. }) if lost.is_none() => {
+                segments = doubling::doubled(&compiled.options, &from, |_| true);
+                if segments == from {
+                    return Err(error);
+                }
+                lost = Some(error);
+                continue;
+            }
+            Err(error) => return Err(lost.unwrap_or(error)),
+            Ok(order) => order,
+        };
+        let finer = if search.is_sure(&order) { None } else { doubling::twice(&compiled.options, &order) };
+        match finer.filter(|finer| finer.segments.iter().sum::<usize>() <= MOST_NEAR_LIMIT) {
+            Some(finer) => segments = finer.segments,
+            None => return search.ended(order),
+        }
+    }
 }
 
 /// A mesh as it is, with the estimate of its error and its equilibrium.
@@ -95,6 +120,8 @@ struct Search<'a> {
     last: Option<Cow<'a, Compiled>>,
     /// Its equilibrium, after those of all before.
     points: Vec<(Vec<usize>, OperatingPoint)>,
+    /// The stiffness that is left at each of them; none where that is much on the first mesh.
+    left: Vec<Option<f64>>,
     /// The first equilibrium, and that of another mesh next to it, where they have been found before.
     known: Option<OperatingPoint>,
     finer: Option<(Compiled, OperatingPoint)>,
@@ -102,7 +129,7 @@ struct Search<'a> {
 
 impl<'a> Search<'a> {
     fn new(compiled: &'a Compiled, voltages: &'a PortVoltages) -> Self {
-        Self { compiled, voltages, last: None, points: Vec::new(), known: None, finer: None }
+        Self { compiled, voltages, last: None, points: Vec::new(), left: Vec::new(), known: None, finer: None }
     }
 
     /// A mesh with the estimate of its error and its equilibrium.
@@ -122,7 +149,15 @@ impl<'a> Search<'a> {
             point.path.fold = point.path.fold.or(before.path.fold);
             point.path.iterations += before.path.iterations;
         }
-        let outputs = outputs(&model, &point);
+        let mut outputs = outputs(&model, &point);
+        let near = if self.left.is_empty() { softening::is_soft(&model, &point) } else { self.left[0].is_some() };
+        let left = if near { softening::left(&model, &point) } else { None };
+        let tol = self.compiled.options.tol;
+        if near {
+            let value = left.unwrap_or(f64::NAN);
+            outputs.push(Output { value, scale: softening::scale(value, tol) });
+        }
+        self.left.push(left);
         self.last = Some(model);
         self.points.push((segments.to_vec(), point));
         Ok(outputs)
@@ -143,12 +178,22 @@ impl<'a> Search<'a> {
         Ok((model, point))
     }
 
-    /// The mesh that came out, with its equilibrium.
-    fn ended(mut self, order: ModelOrder) -> Result<(ModelOrder, OperatingPoint), AnalysisError> {
+    /// Whether this mesh and twice its segments, where that was looked at, are on one side of their limit.
+    fn is_sure(&self, order: &ModelOrder) -> bool {
+        let of = |segments: &[usize]| self.points.iter().position(|(known, _)| known == segments).map(|k| self.left[k]);
+        let twice = doubling::twice(&self.compiled.options, order).and_then(|twice| of(&twice.segments));
+        of(&order.segments).zip(twice).is_none_or(|(here, twice)| softening::agree(here, twice))
+    }
+
+    /// The mesh that came out, with its equilibrium. Where nothing says on which side of its limit that is, nothing tells its error.
+    fn ended(mut self, mut order: ModelOrder) -> Result<(ModelOrder, OperatingPoint), AnalysisError> {
         let mut found = self.points.iter().position(|(segments, _)| *segments == order.segments);
         if found.is_none() {
             self.follow(&order.segments)?;
             found = self.points.len().checked_sub(1);
+        }
+        if !self.is_sure(&order) {
+            order.estimated_error = None;
         }
         let point = found.map(|k| self.points.swap_remove(k).1);
         let lost = || AnalysisError::NotConverged { detail: "no mesh has an equilibrium".into() };
@@ -209,9 +254,9 @@ pub fn static_fitted(
     Ok((fitted, result, curves))
 }
 
-/// What an equilibrium is warned of beside its mesh, as a device comes to it.
-pub(crate) fn told_still(fitted: &Compiled, point: OperatingPoint) -> Vec<Diagnostic> {
-    told_of_static(fitted, point).1
+/// What an equilibrium is warned of beside its mesh, as a device comes to it, each with how much it tells of: a share that grows [1], or 1.
+pub(crate) fn told_still(fitted: &Compiled, point: OperatingPoint) -> Vec<(Diagnostic, f64)> {
+    told_with_sizes(fitted, point).1
 }
 
 /// What a state in motion is warned of that an equilibrium is, too, where it is seen at once.
@@ -219,8 +264,14 @@ pub(crate) fn told_moving(fitted: &Compiled, point: &OperatingPoint) -> Vec<Diag
     of_fingers(fitted, point).into_iter().chain(of_heat(fitted, point)).collect()
 }
 
-/// What an equilibrium is warned of beside its mesh: what a linear model leaves out, and gaps in too few pieces.
+/// What an equilibrium is warned of beside its mesh: what a linear model leaves out, gaps in too few pieces, and combs and temperatures beyond
+/// their range.
 pub(super) fn told_of_static(fitted: &Compiled, point: OperatingPoint) -> (OperatingPoint, Vec<Diagnostic>) {
+    let (point, told) = told_with_sizes(fitted, point);
+    (point, told.into_iter().map(|(warning, _)| warning).collect())
+}
+
+fn told_with_sizes(fitted: &Compiled, point: OperatingPoint) -> (OperatingPoint, Vec<(Diagnostic, f64)>) {
     let share = if fitted.options.linear { left_out(fitted, &point, &point.q) } else { None };
     let times = if fitted.structure.beam_gaps.is_empty() {
         OF_DEFLECTION
@@ -232,8 +283,12 @@ pub(super) fn told_of_static(fitted: &Compiled, point: OperatingPoint) -> (Opera
         OF_DEFLECTION.max(OF_PULL_IN * deflection_to_voltage(fitted, &point.q, &drive))
     };
     let points = [(point, times)];
-    let told = of_stress(fitted, share).into_iter().chain(of_pieces(fitted, &points));
-    let told = told.chain(of_fingers(fitted, &points[0].0)).chain(of_heat(fitted, &points[0].0)).collect();
+    let worst = worst_in_pieces(fitted, &points);
+    let sizes = (share.unwrap_or(1.0), worst.as_ref().map_or(1.0, |worst| worst.1));
+    let stress = of_stress(fitted, share).map(|warning| (warning, sizes.0));
+    let pieces = of_share_in_pieces(fitted, worst).map(|warning| (warning, sizes.1));
+    let others = of_fingers(fitted, &points[0].0).into_iter().chain(of_heat(fitted, &points[0].0));
+    let told = stress.into_iter().chain(pieces).chain(others.map(|warning| (warning, 1.0))).collect();
     let [(point, _)] = points;
     (point, told)
 }

@@ -7,32 +7,38 @@ use super::equilibrium;
 use super::frequencies::for_modes;
 use super::meshed::{chosen, laid};
 use super::warnings::{WARNING, beyond};
+use crate::budget::bounded;
 use crate::compile::Compiled;
 use crate::netlist::Diagnostic;
 use crate::refine::model_order::ModelOrder;
 
-/// Unknowns beyond which no other mesh is sought, and nothing compared: a circuit is not to wait for it.
+/// Unknowns of the finest mesh that is taken, and of the largest drawing for which one is sought: a circuit is not to wait for it. Meshes
+/// that it is compared with may have twice as many.
 const MOST: usize = 3000;
+
+/// How much looser the tolerance becomes where its mesh would be finer than that [1], and how often.
+const LOOSER: (f64, i32) = (10.0, 3);
 
 /// Modes that the mesh holds.
 const HELD: usize = 3;
 
 /// The model for a circuit, on a mesh that holds the tolerance for the equilibrium under the loads of the drawing, without any voltage, and for
-/// the three lowest modes about it; no coarser anywhere than it was. Where segments or a band are given the mesh stays. A warning says where
-/// one of the two may be off by more than the tolerance. What voltages do is not known here.
+/// the three lowest modes about it; no coarser anywhere than it was. Where segments or a band are given the mesh stays; where that mesh would be too
+/// fine it is one that holds ten, a hundred or a thousand times the tolerance. A warning says where one of the two may be off by more than the
+/// tolerance. What voltages do is not known here.
 pub fn in_circuit(compiled: &Compiled) -> Compiled {
     let given = chosen(compiled) || compiled.options.band.is_some();
     let drawn = compiled.parts.system.model.unknowns();
     if drawn > MOST || compiled.order.segments.is_empty() {
         return compiled.clone();
     }
-    let finer = if given { None } else { sought(compiled).filter(|finer| finer.unknowns() <= MOST) };
+    let finer = if given { None } else { (0..=LOOSER.1).find_map(|k| within_most(compiled, LOOSER.0.powi(k))) };
     let sought = finer.as_ref().and_then(|finer| finer.order.estimated_error);
     let mut fitted = finer.unwrap_or_else(|| compiled.clone());
-    fitted.lowest = lowest(&fitted);
+    fitted.lowest = bounded(2 * MOST, || lowest(&fitted)).flatten();
     let (what, error) = match sought {
         Some(error) => ("the equilibrium without voltages or one of the lowest modes", error),
-        None => match worse(&fitted) {
+        None => match bounded(2 * MOST, || worse(&fitted)).flatten() {
             Some(worse) => worse,
             None => return fitted,
         },
@@ -54,6 +60,16 @@ pub fn twice(compiled: &Compiled, tol: f64) -> Result<Compiled, AnalysisError> {
     let mut finer = laid(compiled, ModelOrder { segments, estimated_error: None, ..compiled.order.clone() })?;
     finer.options.tol = tol;
     Ok(finer)
+}
+
+/// The model on the mesh that holds `looser` times the tolerance, where that is not too fine.
+fn within_most(compiled: &Compiled, looser: f64) -> Option<Compiled> {
+    let tol = compiled.options.tol;
+    let mut asked = compiled.clone();
+    asked.options.tol = looser * tol;
+    let mut found = bounded(2 * MOST, || sought(&asked)).flatten().filter(|finer| finer.unknowns() <= MOST)?;
+    found.options.tol = tol;
+    Some(found)
 }
 
 /// The model on the mesh for both; none where there is no such equilibrium or mode.

@@ -25,6 +25,7 @@ mod meshed;
 mod path;
 mod pull_in;
 mod seen;
+mod softening;
 mod swung;
 mod warnings;
 mod yielded;

@@ -59,6 +59,9 @@ pub fn path_fitted(
     Ok((fitted, result))
 }
 
+/// Share of the largest critical value below which one is taken for zero [1].
+const CROSSING: f64 = 1e-3;
+
 /// Paths on one mesh after the other.
 struct Search<'a, 'w> {
     compiled: &'a Compiled,
@@ -127,19 +130,23 @@ impl Search<'_, '_> {
         };
         let largest: Vec<f64> = found.signals.iter().map(|s| of_unit(&s.1)).collect();
         let mut outputs = Vec::new();
-        let mut at = |point: Option<(f64, usize)>| {
-            outputs.push(point.map_or(none, |(value, _)| output(value, way)));
+        let mut at = |point: Option<(f64, usize)>, least: f64| {
+            let scaled = |value: f64| Output { value, scale: value.abs().max(least).max(f64::MIN_POSITIVE) };
+            outputs.push(point.map_or(none, |(value, _)| scaled(value)));
             outputs.extend(found.signals.iter().zip(&largest).map(|(s, most)| match point {
                 Some((_, k)) => output(s.2[k], *most),
                 None => none,
             }));
         };
+        // who asks for a path to 1 mN wants the bifurcation at 1 µN, too
+        let critical = || found.folds.iter().chain(&found.bifurcations);
+        let least = CROSSING * critical().map(|c| c.value.abs()).fold(0.0, f64::max);
         for list in [&found.folds, &found.bifurcations] {
-            (0..MOST_EVENTS).for_each(|k| at(list.get(k).map(|c: &CriticalPoint| (c.value, c.point))));
+            (0..MOST_EVENTS).for_each(|k| at(list.get(k).map(|c: &CriticalPoint| (c.value, c.point)), least));
         }
         // elsewhere it ends nowhere in particular
         let ends = ENDS.contains(&found.end);
-        at(found.values.last().map(|value| (*value, found.values.len() - 1)).filter(|_| ends));
+        at(found.values.last().map(|value| (*value, found.values.len() - 1)).filter(|_| ends), SMALL * way);
         outputs.extend(found.last.iter().flat_map(|(_, m)| {
             let of_node = m.x.hypot(m.y).max(SMALL * moved).max(f64::MIN_POSITIVE);
             let shift = |value| Output { value, scale: of_node };

@@ -60,11 +60,16 @@ pub(super) fn of_stress(compiled: &Compiled, share: Option<f64>) -> Option<Diagn
 /// Where a gap along beams has too few pieces at one of these equilibria, whose results are off by so many times the share of its
 /// distance that is left out.
 pub(super) fn of_pieces(compiled: &Compiled, points: &[(OperatingPoint, f64)]) -> Option<Diagnostic> {
+    of_share_in_pieces(compiled, worst_in_pieces(compiled, points))
+}
+
+/// The gap that leaves out most at one of these equilibria, and how far it may be off [1].
+pub(super) fn worst_in_pieces(compiled: &Compiled, points: &[(OperatingPoint, f64)]) -> Option<(String, f64)> {
     let one = |(point, times): &(OperatingPoint, f64)| {
         let (name, share) = gap_pieces::left_out(compiled, &point.q, &point.volts)?;
         Some((name.to_owned(), times * share))
     };
-    of_share_in_pieces(compiled, points.iter().filter_map(one).max_by(|a, b| a.1.total_cmp(&b.1)))
+    points.iter().filter_map(one).max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 /// Where the fingers of a comb go through its other side at an equilibrium.

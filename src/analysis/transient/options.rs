@@ -68,6 +68,9 @@ pub(crate) fn check(options: &TransientOptions<'_>) -> Result<(), AnalysisError>
     if !(options.tol.is_finite() && options.tol > 0.0 && options.tol < 1.0) {
         return bad("tol", format!("{} is not a relative error between 0 and 1", options.tol));
     }
+    if let Some(step) = options.step.filter(|step| *step > options.stop) {
+        return bad("step", format!("{step} s is longer than the run, which takes {} s", options.stop));
+    }
     if let Some(step) = options.step
         && !(step.is_finite() && step > 0.0 && options.stop / step < 1e9)
     {

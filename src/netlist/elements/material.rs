@@ -77,9 +77,22 @@ impl Site<'_, '_> {
             viscosity,
             fluid,
             thermal_expansion: self.number_or("thermalexpansion", 0.0)?,
-            ambient_temperature: self.number_or("ambienttemperature", 0.0)?,
+            ambient_temperature: self.ambient()?,
             stress,
         })
+    }
+
+    /// Ambient temperature [K]; 0, so that temperatures are rises, when there is none.
+    fn ambient(&mut self) -> Result<f64, Reported> {
+        let ambient = self.number_or("ambienttemperature", 0.0)?;
+        if ambient < 0.0 {
+            return Err(self.out_of_range("ambienttemperature", ambient, "an absolute temperature, zero or positive"));
+        }
+        if ambient > MOLTEN {
+            let span = self.span_of("ambienttemperature");
+            self.drawing.note_number(Fact::OddRise, span, ambient);
+        }
+        Ok(ambient)
     }
 
     /// Density [kg/m³]; 0, with a warning, when there is none.

@@ -1,0 +1,70 @@
+//! A part of a computation that is given up where it takes too much.
+
+use super::{Allowance, Budget, Shared, Stopped, current, unwind, within};
+use std::sync::Arc;
+use std::sync::atomic::AtomicUsize;
+
+impl Budget {
+    /// The same allowance unused, for a part of the computation: stopped together with it.
+    #[must_use]
+    pub fn part(&self) -> Self {
+        self.part_with(Allowance::clone)
+    }
+
+    fn part_with(&self, of: impl FnOnce(&Allowance) -> Allowance) -> Self {
+        let Shared { allowance, order, .. } = &*self.0;
+        Self(Arc::new(Shared { allowance: of(allowance), used: AtomicUsize::new(0), order: Arc::clone(order) }))
+    }
+}
+
+/// Runs `job` with models of at most `unknowns`, as a part of this thread's budget whose bytes are those of the part alone; none where the
+/// unknowns or the bytes do not suffice. Where the whole computation has to stop, this does not return.
+pub fn bounded<T>(unknowns: usize, job: impl FnOnce() -> T) -> Option<T> {
+    let of = |allowance: &Allowance| Allowance { unknowns: unknowns.min(allowance.unknowns), ..allowance.clone() };
+    let part = match current() {
+        Some(budget) => budget.part_with(of),
+        None => Budget::new(of(&Allowance::default())),
+    };
+    match within(&part, job) {
+        Ok(value) => Some(value),
+        Err(
+            Stopped::Unknowns { .. } | Stopped::Bytes { .. } | Stopped::OwnerBytes { .. } | Stopped::ModeWork { .. },
+        ) => None,
+        Err(why) => unwind(why),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{lay_out, unknowns};
+    use super::*;
+
+    /// What is beyond the bound is given up and the rest goes on, with a budget and without; the part's bytes are its own.
+    #[test]
+    fn too_much_is_given_up() {
+        assert_eq!(bounded(10, || unknowns(11)), None);
+        assert_eq!(bounded(10, || unknowns(10)), Some(()));
+        let whole = Budget::new(Allowance { bytes: 100, unknowns: 5, ..Allowance::default() });
+        let went_on = within(&whole, || {
+            lay_out(60);
+            assert_eq!(bounded(10, || unknowns(6)), None, "the whole's own bound stays");
+            assert_eq!(bounded(10, || lay_out(101)), None);
+            assert_eq!(bounded(10, || lay_out(90)), Some(()));
+            whole.used()
+        });
+        assert!(went_on.is_ok_and(|used| used == 60));
+    }
+
+    /// A computation that is cancelled stops as a whole.
+    #[test]
+    fn cancelled_is_not_given_up() {
+        let whole = Budget::new(Allowance::default());
+        let stopped = within(&whole, || {
+            bounded(10, || {
+                whole.cancel();
+                super::super::check();
+            });
+        });
+        assert!(matches!(stopped, Err(Stopped::Cancelled)));
+    }
+}
