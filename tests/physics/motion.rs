@@ -114,7 +114,7 @@ fn drag_without_mass() {
 fn one_step_compared_with_itself() {
     let start = model(&OSCILLATOR.replace("F=0", "F=1u"), &CompileOptions::default());
     let compiled = model(OSCILLATOR, &CompileOptions::default());
-    let options = TransientOptions { step: Some(1e-3), ..options(6.3e-4, Some(&start)) };
+    let options = TransientOptions { step: Some(6e-4), ..options(6.3e-4, Some(&start)) };
     let mut run =
         |options: &TransientOptions<'_>, sample: &mut dyn FnMut(f64, &[f64]), watch: bimorph::analysis::Watch<'_>| {
             Ok((transient(&compiled, options, sample, watch)?, ()))

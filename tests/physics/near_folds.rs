@@ -203,8 +203,8 @@ fn beyond_a_buckling_load_nothing_stays_straight() {
         let (fitted, result, _) = static_fitted(compiled, &[]).unwrap();
         (node(&result, "m").y.abs(), fitted.order.estimated_error)
     };
-    let (mut straight, mut buckled) = (-52e6, -53e6);
-    for _ in 0..24 {
+    let (mut straight, mut buckled) = (-20e6, -100e6);
+    for _ in 0..32 {
         let between = 0.5 * (straight + buckled);
         let bends = deflection(&stressed("", between, &fine)).0 > 1e-9;
         *if bends { &mut buckled } else { &mut straight } = between;
