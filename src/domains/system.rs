@@ -96,6 +96,25 @@ impl System {
         self.model.project(r);
     }
 
+    /// The tangent at `here` less a share of that at `there`, held directions not removed; `r` is spoiled.
+    pub fn tangent_less(
+        &self,
+        here: (&[Pose], &Drive),
+        share: f64,
+        there: (&[Pose], &Drive),
+        tangent: &mut BlockMatrix<f64, 3>,
+        r: &mut [Pose],
+    ) {
+        tangent.clear();
+        for (factor, (q, drive)) in [(-share, there), (1.0, here)] {
+            forces::add_tangent(&self.model, q, &drive.rest(), tangent, r);
+            self.add_body_tangent(q, drive, tangent);
+            if factor != 1.0 {
+                tangent.diagonal.iter_mut().chain(&mut tangent.below).for_each(|block| *block *= factor);
+            }
+        }
+    }
+
     /// `out = (∂r/∂drive)·change` at `drive`, held directions removed.
     pub fn drive_force(&self, q: &[Pose], drive: &Drive, change: &Drive, out: &mut [Pose]) {
         out.fill(Pose::zeros());

@@ -171,7 +171,7 @@ fn read(file: &str, directory: Option<&Path>) -> Result<Bundle, OpenError> {
     }
 }
 
-/// Models kept for instances and analyses to share; the oldest makes room.
+/// Models kept for instances and analyses to share; the one that nobody asked for longest makes room.
 const KEPT: usize = 16;
 
 struct Kept {
@@ -185,8 +185,11 @@ static MODELS: Mutex<Vec<Kept>> = Mutex::new(Vec::new());
 /// The model of a netlist text under these options, compiled once, with what is known of its mesh among its warnings.
 fn compiled(file: &str, bundle: Bundle, options: &CompileOptions) -> Result<Arc<Compiled>, OpenError> {
     let mut models = MODELS.lock().unwrap_or_else(PoisonError::into_inner);
-    if let Some(kept) = models.iter().find(|k| k.bundle == bundle && k.options == *options) {
-        return Ok(Arc::clone(&kept.model));
+    if let Some(k) = models.iter().position(|k| k.bundle == bundle && k.options == *options) {
+        let kept = models.remove(k);
+        let model = Arc::clone(&kept.model);
+        models.push(kept);
+        return Ok(model);
     }
     let drawn = compile(&bundle, options).map_err(|source| OpenError::Compile { file: file.to_owned(), source })?;
     // once for all instances of it

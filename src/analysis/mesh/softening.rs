@@ -15,8 +15,8 @@
 use super::super::statics::OperatingPoint;
 use crate::compile::Compiled;
 use crate::domains::Drive;
+use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
-use crate::multibody::{BlockMatrix, Model};
 
 /// Share of the stiffness at rest below which it is looked at from mesh to mesh [1]. The coarsest mesh of a clamped beam bears an eighth too much.
 const SOFT: f64 = 0.5;
@@ -25,27 +25,37 @@ const KNOWN: f64 = 0.5;
 /// Inverse iterations at most, and the change of λ at which they end [1].
 const ROUNDS: (usize, f64) = (30, 1e-3);
 
-type Stiffness = BlockMatrix<f64, 3>;
-
 /// True where less than half of the stiffness at rest is left.
 pub(super) fn is_soft(compiled: &Compiled, point: &OperatingPoint) -> bool {
-    let Some((here, rest)) = stiffnesses(compiled, point) else { return false };
-    let mut left = here.clone();
-    for (left, rest) in left.diagonal.iter_mut().zip(&rest.diagonal).chain(left.below.iter_mut().zip(&rest.below)) {
-        *left -= rest * SOFT;
-    }
-    let model = &compiled.parts.system.model;
-    if left.factor(&model.pattern).is_ok_and(|inertia| inertia.negative == 0) {
+    let system = &compiled.parts.system;
+    if system.model.linear || system.bodies() == 0 || !point.free_motions.is_empty() {
+        // displacements are small by decree, or a direction is held that is free
         return false;
     }
-    let scale = compiled.parts.system.length_scale;
-    lowest(model, here, scale).zip(lowest(model, rest, scale)).is_some_and(|(here, rest)| here < SOFT * rest)
+    let (model, [here, rest]) = (&system.model, drives(compiled, point));
+    let (still, mut force) = (vec![Pose::zeros(); system.bodies()], vec![Pose::zeros(); system.bodies()]);
+    let mut tangent = BlockMatrix::new(&model.pattern);
+    system.tangent_less((&point.q, &here), SOFT, (&still, &rest), &mut tangent, &mut force);
+    model.project_matrix(&mut tangent);
+    if tangent.factor(&model.pattern).is_ok_and(|inertia| inertia.negative == 0) {
+        return false;
+    }
+    let at_rest = lowest(compiled, &still, &rest);
+    left(compiled, point).zip(at_rest).is_some_and(|(here, rest)| here < SOFT * rest)
 }
 
 /// λ of an equilibrium [rad²/s²], or [N/m] where nothing has mass; none where it cannot be told.
 pub(super) fn left(compiled: &Compiled, point: &OperatingPoint) -> Option<f64> {
-    let (here, _) = stiffnesses(compiled, point)?;
-    lowest(&compiled.parts.system.model, here, compiled.parts.system.length_scale)
+    let [here, _] = drives(compiled, point);
+    lowest(compiled, &point.q, &here)
+}
+
+/// What drives an equilibrium, and what is there at rest: no loads, no voltages.
+fn drives(compiled: &Compiled, point: &OperatingPoint) -> [Drive; 2] {
+    let electrics = &compiled.parts.system.electrics;
+    let (mut rise, mut here) = (point.rise.clone(), electrics.drive());
+    electrics.steady(&point.sources, &mut rise, &mut here);
+    [here, Drive { load: 0.0, ..electrics.drive() }]
 }
 
 /// Whether two meshes, the second twice as fine, agree on which side of the limit they are.
@@ -59,8 +69,13 @@ pub(super) fn scale(left: f64, tol: f64) -> f64 {
     KNOWN * left.abs() / (0.75 * 0.75 * tol)
 }
 
-/// λ of a stiffness, by inverse iteration; none where it is not positive.
-fn lowest(model: &Model, mut stiffness: Stiffness, length_scale: f64) -> Option<f64> {
+/// λ at a configuration, by inverse iteration; none where it is not positive.
+fn lowest(compiled: &Compiled, q: &[Pose], drive: &Drive) -> Option<f64> {
+    let (system, model) = (&compiled.parts.system, &compiled.parts.system.model);
+    let mut x = vec![Pose::zeros(); q.len()];
+    let mut stiffness = BlockMatrix::new(&model.pattern);
+    system.tangent(q, drive, &mut stiffness, &mut x);
+    model.project_matrix(&mut stiffness);
     stiffness.factor(&model.pattern).ok().filter(|inertia| inertia.negative == 0)?;
     let count = model.bodies.len();
     let massless = (0..count).all(|j| model.mass(j).x == 0.0);
@@ -68,8 +83,9 @@ fn lowest(model: &Model, mut stiffness: Stiffness, length_scale: f64) -> Option<
     let product =
         |x: &[Pose], y: &[Pose]| -> f64 { (0..count).map(|j| weight(j).component_mul(&x[j]).dot(&y[j])).sum() };
     // no symmetry of a part may hide its softest direction
-    let one = |j: usize| Pose::new(1.0, 1.0 + 0.37 * ((j * 7) % 5) as f64, 0.61 * ((j * 3) % 4) as f64 / length_scale);
-    let mut x: Vec<Pose> = (0..count).map(one).collect();
+    let one =
+        |j: usize| Pose::new(1.0, 1.0 + 0.37 * ((j * 7) % 5) as f64, 0.61 * ((j * 3) % 4) as f64 / system.length_scale);
+    x.iter_mut().enumerate().for_each(|(j, x)| *x = one(j));
     model.project(&mut x);
     let (mut before, mut lambda) = (x.clone(), f64::INFINITY);
     for _ in 0..ROUNDS.0 {
@@ -93,25 +109,4 @@ fn lowest(model: &Model, mut stiffness: Stiffness, length_scale: f64) -> Option<
         }
     }
     lambda.is_finite().then_some(lambda)
-}
-
-/// The tangent at the equilibrium and at rest, without loads and voltages; none where some direction is free, or displacements are small by decree.
-fn stiffnesses(compiled: &Compiled, point: &OperatingPoint) -> Option<(Stiffness, Stiffness)> {
-    let system = &compiled.parts.system;
-    if system.model.linear || system.bodies() == 0 || !point.free_motions.is_empty() {
-        return None;
-    }
-    let electrics = &system.electrics;
-    let (mut rise, mut drive) = (point.rise.clone(), electrics.drive());
-    electrics.steady(&point.sources, &mut rise, &mut drive);
-    let mut force = vec![Pose::zeros(); system.bodies()];
-    let mut at = |q: &[Pose], drive: &Drive| {
-        let mut tangent = BlockMatrix::new(&system.model.pattern);
-        system.tangent(q, drive, &mut tangent, &mut force);
-        system.model.project_matrix(&mut tangent);
-        tangent
-    };
-    let still = vec![Pose::zeros(); system.bodies()];
-    let rest = at(&still, &Drive { load: 0.0, ..electrics.drive() });
-    Some((at(&point.q, &drive), rest))
 }
