@@ -112,6 +112,23 @@ fn large_models_are_refused() {
     exhausted(&status, "unknowns");
 }
 
+/// A drawing that the server has room for is never refused for the mesh that it would have in a circuit: that stays within the limit, and is
+/// warned of. (Compile answered "at most 300, got at least 342".)
+#[test]
+fn meshes_of_circuits_fit_the_limit() {
+    let server =
+        start_with("127.0.0.1:0", Limits { unknowns: 300, ..Limits::default() }, |m| Box::new(LocalDevice::new(m)));
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/quarter_stage/quarter_stage.net");
+    let bundle = bimorph::netlist::Bundle::read(std::path::Path::new(path), &[]).expect("an example");
+    let bundle = Some(bimorph::service::convert::model::bundle_to_wire(&bundle));
+    let options = Some(proto::CompileOptions { tol: Some(1e-4), ..Default::default() });
+    let request = proto::CompileRequest { bundle, options };
+    let answer = block_on(async { server.client().await.compile(request).await }).expect("219 unknowns as drawn");
+    let model = answer.into_inner().model.expect("a model");
+    assert!((219..=300).contains(&model.unknowns), "{} unknowns", model.unknowns);
+    assert!(model.warnings.iter().any(|warning| warning.code == "W040"), "{:?}", model.warnings);
+}
+
 /// The model unused for longest goes first.
 #[test]
 fn the_oldest_model_goes_first() {

@@ -29,22 +29,31 @@ const HELD: usize = 3;
 pub fn in_circuit(compiled: &Compiled) -> Compiled {
     let given = chosen(compiled) || compiled.options.band.is_some();
     let drawn = compiled.parts.system.model.unknowns();
-    if drawn > MOST || compiled.order.segments.is_empty() {
+    if compiled.order.segments.is_empty() {
         return compiled.clone();
+    }
+    if drawn > MOST {
+        return warned(compiled.clone(), "a drawing of so many unknowns", None);
     }
     let finer = if given { None } else { (0..=LOOSER.1).find_map(|k| within_most(compiled, LOOSER.0.powi(k))) };
     let sought = finer.as_ref().and_then(|finer| finer.order.estimated_error);
     let mut fitted = finer.unwrap_or_else(|| compiled.clone());
     fitted.lowest = bounded(2 * MOST, || lowest(&fitted)).flatten();
-    let (what, error) = match sought {
-        Some(error) => ("the equilibrium without voltages or one of the lowest modes", error),
-        None => match bounded(2 * MOST, || worse(&fitted)).flatten() {
-            Some(worse) => worse,
-            None => return fitted,
-        },
-    };
+    let compared = if sought.is_some() { None } else { bounded(2 * MOST, || worse(&fitted)) };
+    match (sought, compared) {
+        (Some(error), _) => warned(fitted, "the equilibrium without voltages or one of the lowest modes", Some(error)),
+        (None, Some(Some((what, error)))) => warned(fitted, what, Some(error)),
+        // there is neither: whoever asks for one is told why
+        (None, Some(None)) => fitted,
+        // nothing that is fine enough to be compared with may be laid out
+        (None, None) => warned(fitted, "the equilibrium and the lowest modes", None),
+    }
+}
+
+/// With a warning of what may be off by more than the tolerance, or by nobody knows how much.
+fn warned(mut fitted: Compiled, what: &str, error: Option<f64>) -> Compiled {
     let help = "give the model `segments` or a `band`; `bimorph cosim --check` compares whole runs";
-    let told = beyond(fitted.options.tol, Some(error));
+    let told = beyond(fitted.options.tol, error);
     fitted.warnings.items.extend(told.map(|told| Diagnostic::warning(WARNING, format!("{what}: {told}"), help)));
     fitted
 }
@@ -85,7 +94,8 @@ fn sought(compiled: &Compiled) -> Option<Compiled> {
 
 /// Which of the two is further off on this mesh, and by how much; none where neither is known.
 fn worse(compiled: &Compiled) -> Option<(&'static str, f64)> {
-    let still = equilibrium::judged(compiled, &[]).ok().and_then(|(_, error)| error);
+    // an equilibrium whose error nothing tells may be off by anything
+    let still = equilibrium::judged(compiled, &[]).ok().map(|(_, error)| error.unwrap_or(f64::INFINITY));
     [("the equilibrium without voltages", still), ("the lowest mode", compiled.lowest.map(|lowest| lowest.error))]
         .into_iter()
         .filter_map(|(what, error)| Some((what, error?.abs())))
