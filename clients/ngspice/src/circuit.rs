@@ -14,6 +14,8 @@ const STATES: usize = 16;
 const DELTA: usize = 88;
 /// Offset of the order of integration, and after the largest order that of its method, three integers of four bytes [byte].
 const ORDER: usize = 232;
+/// Offset of the share of the last current in the trapezoidal rule [byte].
+const XMU: usize = 248;
 /// Number of Gear's method.
 const GEAR: i32 = 2;
 /// Offset of the right-hand side; after a solve, of the solution [byte].
@@ -78,7 +80,7 @@ impl Circuit {
         match (order, method) {
             (1, _) => Rule::First,
             (_, GEAR) => Rule::Gear,
-            _ => Rule::Trapezoidal,
+            _ => Rule::Trapezoidal(self.read(XMU)),
         }
     }
 

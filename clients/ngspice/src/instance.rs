@@ -218,7 +218,7 @@ impl Instance {
     /// step is differentiated from. False where there is nothing to move.
     pub fn settle(&mut self, volts: &[f64]) -> bool {
         let (answer, dq_dv, ports) = (&mut self.answer, &self.reply.dq_dv, volts.len());
-        if answer.step == 0.0 || answer.base.skipped != 0.0 || answer.charges.len() != ports {
+        if answer.step == 0.0 || answer.charges.len() != ports {
             return false;
         }
         for (n, row) in dq_dv.chunks_exact(ports.max(1)).enumerate() {

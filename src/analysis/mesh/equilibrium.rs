@@ -31,6 +31,11 @@ pub(super) const ROUNDING: f64 = 1e-12;
 /// Segments of all beams together up to which the side of a limit is sought.
 const MOST_NEAR_LIMIT: usize = 5000;
 
+/// How often twice the segments are tried where none is found.
+const TRIES: usize = 1;
+/// Share of the path beyond which a fold that it passed is looked for anew on each mesh: the one before may have passed it by mistake.
+const NEAR_THE_END: f64 = 0.9;
+
 /// The mesh for the equilibrium at these voltages, from `segments` upwards, and the equilibrium on it.
 pub(super) fn order(
     compiled: &Compiled,
@@ -40,18 +45,18 @@ pub(super) fn order(
     if chosen(compiled) {
         return estimated(compiled, voltages, segments);
     }
-    let (mut segments, mut lost) = (segments, None);
+    let (mut segments, mut lost, mut tries) = (segments, None, 0);
     loop {
         let mut search = Search::new(compiled, voltages);
         let from = segments.clone();
         let order = match doubling::fit(&compiled.structure, &compiled.options, segments, &mut |s| search.follow(s)) {
             // a leg in one piece may bear nothing that one in two does
-            Err(error @ AnalysisError::NoEquilibrium { .. }) if lost.is_none() => {
+            Err(error @ AnalysisError::NoEquilibrium { .. }) if tries < TRIES => {
                 segments = doubling::doubled(&compiled.options, &from, |_| true);
-                if segments == from {
-                    return Err(error);
+                if segments == from || segments.iter().sum::<usize>() > MOST_NEAR_LIMIT {
+                    return Err(lost.unwrap_or(error));
                 }
-                lost = Some(error);
+                (lost, tries) = (lost.or(Some(error)), tries + 1);
                 continue;
             }
             Err(error) => return Err(lost.unwrap_or(error)),
@@ -157,6 +162,11 @@ impl<'a> Search<'a> {
             let value = left.unwrap_or(f64::NAN);
             outputs.push(Output { value, scale: softening::scale(value, tol) });
         }
+        let passed = point.path.fold.filter(|share| *share > NEAR_THE_END).map(|share| 1.0 - share);
+        outputs.push(match passed {
+            Some(value) => Output { value, scale: softening::scale(value, tol) },
+            None => Output { value: 1.0, scale: f64::INFINITY },
+        });
         self.left.push(left);
         self.last = Some(model);
         self.points.push((segments.to_vec(), point));
@@ -169,6 +179,9 @@ impl<'a> Search<'a> {
         let linear = model.parts.system.model.linear;
         let point = match (&self.last, self.points.last(), self.known.take()) {
             (_, None, Some(known)) => (known, true),
+            (Some(_), Some((_, point)), _) if point.path.fold.is_some_and(|share| share > NEAR_THE_END) => {
+                (operating_point(&model, self.voltages)?, true)
+            }
             (Some(before), Some((_, point)), _) => {
                 let start = carried(&model.structure, &before.parts, &model.parts, &point.q, linear);
                 operating_point_near(&model, self.voltages, start)?
