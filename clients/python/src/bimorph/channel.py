@@ -68,11 +68,14 @@ class _Connection:
         self.stub: Any = service_pb2_grpc.BimorphStub(self._channel)
         self.compared = False
         """Whether the server's version was looked at."""
+        # When nobody has it any more. A method ``__del__`` would let another thread find it in ``_connections`` while it closes.
+        weakref.finalize(self, _close, self._channel, self._pid)
 
-    def __del__(self) -> None:
-        # A channel of another process is left alone: closing it here could hang.
-        if self._pid == os.getpid() and self._channel is not None:
-            self._channel.close()
+
+def _close(channel: Any, pid: int) -> None:
+    # A channel of another process is left alone: closing it here could hang.
+    if pid == os.getpid():
+        channel.close()
 
 
 _connections: weakref.WeakValueDictionary[tuple[str, Access], _Connection] = weakref.WeakValueDictionary()
