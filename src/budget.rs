@@ -148,7 +148,12 @@ pub fn within<T>(budget: &Budget, job: impl FnOnce() -> T) -> Result<T, Stopped>
     if budget.0.allowance.purse.is_some() {
         HELD.with(|held| held.borrow().as_ref().map(Held::settle));
     }
+    let told = HELD.with(|held| held.borrow().as_ref().map_or(Duration::ZERO, |held| held.cpu_told.get()));
     drop(restore);
+    if budget.0.allowance.purse.is_some() {
+        // of what a part told the purse the whole does not tell it again
+        HELD.with(|held| held.borrow().iter().for_each(|whole| whole.cpu_told.set(whole.cpu_told.get() + told)));
+    }
     outcome.or_else(|payload| match payload.downcast::<Stop>() {
         Ok(stop) => Err(stop.0),
         Err(panic) => resume_unwind(panic),

@@ -36,8 +36,9 @@ pub fn bounded<T>(unknowns: usize, job: impl FnOnce() -> T) -> Option<T> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{lay_out, unknowns};
+    use super::super::{Purse, lay_out, thread_cpu, unknowns};
     use super::*;
+    use std::time::Duration;
 
     /// What is beyond the bound is given up and the rest goes on, with a budget and without; the part's bytes are its own.
     #[test]
@@ -53,6 +54,21 @@ mod tests {
             whole.used()
         });
         assert!(went_on.is_ok_and(|used| used == 60));
+    }
+
+    /// The processor time of a part is taken from its owner once: of 75 ms, 50 leave some.
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn time_is_taken_once() {
+        let purse = Arc::new(Purse::new(None, Some(Duration::from_millis(75))));
+        let whole = Budget::new(Allowance { purse: Some(Arc::clone(&purse)), ..Allowance::default() });
+        let used = || thread_cpu().expect("a clock of the thread");
+        let spun = within(&whole, || {
+            let start = used();
+            bounded(10, || while used() - start < Duration::from_millis(50) {})
+        });
+        assert_eq!(spun, Ok(Some(())));
+        assert_eq!(purse.solvent(), Ok(()));
     }
 
     /// A computation that is cancelled stops as a whole.

@@ -8,8 +8,8 @@
 //! ```
 //! and a parabola with that d leaves the line over the next step H by |d|·H²/4 in the middle. Where a curve turns from one
 //! side to the other d vanishes; there its own change d′ counts, |d′|·H³/4, and more of it where the circuit gives a force for a displacement or
-//! differentiates a charge: steps that become longer and shorter twice a cycle would pump what a spring of the circuit holds, and damp a tank of a charge and an
-//! inductor (a parametric resonance). A ringing that is faster than the steps shows in d by its height: where that may be seen, the steps become short
+//! differentiates a charge: steps that become longer and shorter twice a cycle would pump what a spring of the circuit holds (a parametric
+//! resonance), and a current that is off by the square of its step would breathe with them. A ringing that is faster than the steps shows in d by its height: where that may be seen, the steps become short
 //! enough to follow it.
 
 use serde::{Deserialize, Serialize};
@@ -18,8 +18,8 @@ use serde::{Deserialize, Serialize};
 /// [1]: 0.2 % at the default, 28 points for a cycle of a full swing, which then stays within 0.5 %.
 const SHARE: f64 = 2.0;
 
-/// The same of a charge [1]. Nobody looks at it but at its change: with even steps the formula of the plug-in keeps that within 0.5 % of its
-/// range, again with 28 points a cycle.
+/// The same of a charge [1]. Nobody looks at it but at its change: with even steps the trapezoidal rule keeps that within 0.2 % of its range,
+/// with 28 points a cycle. (Without them an oscillator that its own current drives takes 43 points a cycle where it takes 36.)
 const SHARE_DIFFERENTIATED: f64 = 3.6;
 
 /// How the circuit's steps follow a quantity.

@@ -71,6 +71,15 @@ impl Continuation {
             let longest = self.options.longest.max(self.options.growth * here.s.abs());
             step = step.min(longest / here.ds.abs().max(1e-3));
             let Some((next, cost)) = self.advance(family, &here, &mut step) else { break PathEnd::Lost };
+            // what is critical beyond the last s is none of this path
+            if next.s >= self.options.target
+                && let Some(last) = self.land(family, &traced, &next)
+                && last.negative == here.negative
+                && here.ds * next.ds > 0.0
+            {
+                traced.points.push(last);
+                break PathEnd::Arrived;
+            }
             let lost = next.negative > here.negative;
             let branched = self.note(family, &here, &next, step, &mut traced);
             if lost && self.options.stop_at_loss {
@@ -79,8 +88,8 @@ impl Continuation {
             let arrived = next.s >= self.options.target && branched.is_none();
             here = branched.unwrap_or(next);
             if arrived {
-                let last = self.land(family, &traced, here);
-                traced.points.push(last);
+                let last = self.land(family, &traced, &here);
+                traced.points.push(last.unwrap_or_else(|| point(&here)));
                 break PathEnd::Arrived;
             }
             traced.points.push(point(&here));
@@ -145,9 +154,9 @@ impl Continuation {
         branch
     }
 
-    /// The point at the last s exactly, from the two points around it.
-    fn land(&mut self, family: &mut Blend, traced: &Traced, past: Place) -> PathPoint {
-        let Some(before) = traced.points.last() else { return point(&past) };
+    /// The point at the last s exactly, from the two points around it; none where none is found.
+    fn land(&mut self, family: &mut Blend, traced: &Traced, past: &Place) -> Option<PathPoint> {
+        let before = traced.points.last()?;
         let share = if past.s > before.s { (self.options.target - before.s) / (past.s - before.s) } else { 1.0 };
         let mut guess = past.clone();
         for (q, before) in guess.q.iter_mut().zip(&before.q) {
@@ -156,10 +165,8 @@ impl Continuation {
         guess.s = self.options.target;
         let zeros = vec![Pose::zeros(); guess.q.len()];
         let plane = Plane { from: &guess, dq: &zeros, ds: 1.0, distance: 0.0 };
-        match self.correct(family, &plane, guess.clone()) {
-            Ok((place, _)) => PathPoint { s: self.options.target, ..point(&place) },
-            Err(_) => point(&past),
-        }
+        let (place, _) = self.correct(family, &plane, guess.clone()).ok()?;
+        Some(PathPoint { s: self.options.target, ..point(&place) })
     }
 }
 

@@ -77,6 +77,20 @@ fn column() {
     close(*straight.signals[1].2.last().unwrap(), -1.2 * EULER * L / (E * W * W), 1e-6);
 }
 
+/// A path to 0.99 or 0.9999 of the load at which it bifurcates ends there, straight. (It ended on the bent branch, at more than was asked for.)
+#[test]
+fn ends_before_a_bifurcation() {
+    let at = |force: f64| scene("column/column.net", &[("F", force)], &fine());
+    let whole = follow(&at(0.0), Growing::Parameter(&at(1.2 * EULER)), 1.2 * EULER, &[], Branch::Plus);
+    for share in [0.99, 0.9999] {
+        let to = share * whole.bifurcations[0].value;
+        let path = follow(&at(0.0), Growing::Parameter(&at(to)), to, &["middle.y"], Branch::Plus);
+        assert_eq!((path.end, path.bifurcations.len(), path.negative.last()), ("arrived", 0, Some(&0)), "{share}");
+        close(*path.values.last().unwrap(), to, 1e-12);
+        assert!(path.signals[0].2.iter().all(|y| y.abs() < 1e-12));
+    }
+}
+
 /// The mesh of a path holds the tolerance without being told how fine it must be: Euler's load and the bend at 1.2 times that, each against
 /// the same on 128 segments; the estimate is within the tolerance and no smaller than a third of the error. `--linear`, which cannot
 /// buckle, says so.

@@ -31,8 +31,6 @@ pub(super) const ROUNDING: f64 = 1e-12;
 /// Segments of all beams together up to which the side of a limit is sought.
 const MOST_NEAR_LIMIT: usize = 5000;
 
-/// How often twice the segments are tried where none is found.
-const TRIES: usize = 1;
 /// Share of the path beyond which a fold that it passed is looked for anew on each mesh: the one before may have passed it by mistake.
 const NEAR_THE_END: f64 = 0.9;
 
@@ -45,18 +43,18 @@ pub(super) fn order(
     if chosen(compiled) {
         return estimated(compiled, voltages, segments);
     }
-    let (mut segments, mut lost, mut tries) = (segments, None, 0);
+    let (mut segments, mut lost) = (segments, None);
     loop {
         let mut search = Search::new(compiled, voltages);
         let from = segments.clone();
         let order = match doubling::fit(&compiled.structure, &compiled.options, segments, &mut |s| search.follow(s)) {
             // a leg in one piece may bear nothing that one in two does
-            Err(error @ AnalysisError::NoEquilibrium { .. }) if tries < TRIES => {
+            Err(error @ AnalysisError::NoEquilibrium { .. }) if lost.is_none() => {
                 segments = doubling::doubled(&compiled.options, &from, |_| true);
                 if segments == from || segments.iter().sum::<usize>() > MOST_NEAR_LIMIT {
-                    return Err(lost.unwrap_or(error));
+                    return Err(error);
                 }
-                (lost, tries) = (lost.or(Some(error)), tries + 1);
+                lost = Some(error);
                 continue;
             }
             Err(error) => return Err(lost.unwrap_or(error)),
@@ -117,6 +115,19 @@ pub(super) fn judged(
     Ok((point, order.estimated_error))
 }
 
+/// An equilibrium on a mesh.
+struct Looked {
+    segments: Vec<usize>,
+    point: OperatingPoint,
+    /// The stiffness that is left; none where that is much on the first mesh.
+    left: Option<f64>,
+}
+
+/// How far beyond its fold an equilibrium is, as a share of the way, where that is little: the mesh may have passed it by mistake.
+fn beyond(point: &OperatingPoint) -> Option<f64> {
+    point.path.fold.filter(|share| *share > NEAR_THE_END).map(|share| 1.0 - share)
+}
+
 /// Equilibria on one mesh after the other.
 struct Search<'a> {
     compiled: &'a Compiled,
@@ -124,9 +135,7 @@ struct Search<'a> {
     /// The last model.
     last: Option<Cow<'a, Compiled>>,
     /// Its equilibrium, after those of all before.
-    points: Vec<(Vec<usize>, OperatingPoint)>,
-    /// The stiffness that is left at each of them; none where that is much on the first mesh.
-    left: Vec<Option<f64>>,
+    points: Vec<Looked>,
     /// The first equilibrium, and that of another mesh next to it, where they have been found before.
     known: Option<OperatingPoint>,
     finer: Option<(Compiled, OperatingPoint)>,
@@ -134,7 +143,7 @@ struct Search<'a> {
 
 impl<'a> Search<'a> {
     fn new(compiled: &'a Compiled, voltages: &'a PortVoltages) -> Self {
-        Self { compiled, voltages, last: None, points: Vec::new(), left: Vec::new(), known: None, finer: None }
+        Self { compiled, voltages, last: None, points: Vec::new(), known: None, finer: None }
     }
 
     /// A mesh with the estimate of its error and its equilibrium.
@@ -145,44 +154,43 @@ impl<'a> Search<'a> {
 
     /// The equilibrium on a mesh, next to that of the mesh before.
     fn follow(&mut self, segments: &[usize]) -> Result<Vec<Output>, AnalysisError> {
-        let (model, (mut point, from_rest)) = match self.finer.take_if(|(finer, _)| finer.order.segments == segments) {
+        let anew = self.points.last().is_some_and(|before| beyond(&before.point).is_some());
+        let known = self.finer.take_if(|(finer, _)| finer.order.segments == segments);
+        let (model, (mut point, from_rest)) = match known.filter(|_| !anew) {
             Some((finer, point)) => (Cow::Owned(finer), (point, false)),
-            None => self.solve(segments)?,
+            None => self.solve(segments, anew)?,
         };
-        if let (false, Some((_, before))) = (from_rest, self.points.last()) {
+        if let (false, Some(Looked { point: before, .. })) = (from_rest, self.points.last()) {
             // the way from rest is that of the mesh before
             point.path.fold = point.path.fold.or(before.path.fold);
             point.path.iterations += before.path.iterations;
         }
+        let left = match self.points.first() {
+            None => softening::left_of_soft(&model, &point),
+            Some(first) => first.left.and_then(|_| softening::left(&model, &point)),
+        };
+        let limit = |value: Option<f64>| {
+            let value = value.unwrap_or(f64::NAN);
+            Output { value, scale: softening::scale(value, self.compiled.options.tol) }
+        };
         let mut outputs = outputs(&model, &point);
-        let near = if self.left.is_empty() { softening::is_soft(&model, &point) } else { self.left[0].is_some() };
-        let left = if near { softening::left(&model, &point) } else { None };
-        let tol = self.compiled.options.tol;
-        if near {
-            let value = left.unwrap_or(f64::NAN);
-            outputs.push(Output { value, scale: softening::scale(value, tol) });
-        }
-        let passed = point.path.fold.filter(|share| *share > NEAR_THE_END).map(|share| 1.0 - share);
-        outputs.push(match passed {
-            Some(value) => Output { value, scale: softening::scale(value, tol) },
-            None => Output { value: 1.0, scale: f64::INFINITY },
-        });
-        self.left.push(left);
+        outputs.extend([limit(left), limit(beyond(&point))]);
         self.last = Some(model);
-        self.points.push((segments.to_vec(), point));
+        self.points.push(Looked { segments: segments.to_vec(), point, left });
         Ok(outputs)
     }
 
-    /// A model and its equilibrium, computed, and whether from rest.
-    fn solve(&mut self, segments: &[usize]) -> Result<(Cow<'a, Compiled>, (OperatingPoint, bool)), AnalysisError> {
+    /// A model and its equilibrium, computed, from rest if it is to be found anew, and whether it is from rest.
+    fn solve(
+        &mut self,
+        segments: &[usize],
+        anew: bool,
+    ) -> Result<(Cow<'a, Compiled>, (OperatingPoint, bool)), AnalysisError> {
         let model = meshed(self.compiled, segments)?;
         let linear = model.parts.system.model.linear;
         let point = match (&self.last, self.points.last(), self.known.take()) {
             (_, None, Some(known)) => (known, true),
-            (Some(_), Some((_, point)), _) if point.path.fold.is_some_and(|share| share > NEAR_THE_END) => {
-                (operating_point(&model, self.voltages)?, true)
-            }
-            (Some(before), Some((_, point)), _) => {
+            (Some(before), Some(Looked { point, .. }), _) if !anew => {
                 let start = carried(&model.structure, &before.parts, &model.parts, &point.q, linear);
                 operating_point_near(&model, self.voltages, start)?
             }
@@ -193,14 +201,16 @@ impl<'a> Search<'a> {
 
     /// Whether this mesh and twice its segments, where that was looked at, are on one side of their limit.
     fn is_sure(&self, order: &ModelOrder) -> bool {
-        let of = |segments: &[usize]| self.points.iter().position(|(known, _)| known == segments).map(|k| self.left[k]);
+        let of = |segments: &[usize]| {
+            self.points.iter().find(|looked| looked.segments == segments).map(|looked| looked.left)
+        };
         let twice = doubling::twice(&self.compiled.options, order).and_then(|twice| of(&twice.segments));
         of(&order.segments).zip(twice).is_none_or(|(here, twice)| softening::agree(here, twice))
     }
 
     /// The mesh that came out, with its equilibrium. Where nothing says on which side of its limit that is, nothing tells its error.
     fn ended(mut self, mut order: ModelOrder) -> Result<(ModelOrder, OperatingPoint), AnalysisError> {
-        let mut found = self.points.iter().position(|(segments, _)| *segments == order.segments);
+        let mut found = self.points.iter().position(|looked| looked.segments == order.segments);
         if found.is_none() {
             self.follow(&order.segments)?;
             found = self.points.len().checked_sub(1);
@@ -208,7 +218,7 @@ impl<'a> Search<'a> {
         if !self.is_sure(&order) {
             order.estimated_error = None;
         }
-        let point = found.map(|k| self.points.swap_remove(k).1);
+        let point = found.map(|k| self.points.swap_remove(k).point);
         let lost = || AnalysisError::NotConverged { detail: "no mesh has an equilibrium".into() };
         Ok((order, point.ok_or_else(lost)?))
     }

@@ -59,8 +59,8 @@ pub fn path_fitted(
     Ok((fitted, result))
 }
 
-/// Share of the largest critical value below which one is taken for zero [1].
-const CROSSING: f64 = 1e-3;
+/// Share of the largest critical value below which one is taken for zero, and of the whole way [1].
+const CROSSING: [f64; 2] = [1e-3, 1e-6];
 
 /// Paths on one mesh after the other.
 struct Search<'a, 'w> {
@@ -140,7 +140,7 @@ impl Search<'_, '_> {
         };
         // who asks for a path to 1 mN wants the bifurcation at 1 µN, too
         let critical = || found.folds.iter().chain(&found.bifurcations);
-        let least = CROSSING * critical().map(|c| c.value.abs()).fold(0.0, f64::max);
+        let least = CROSSING[0] * critical().map(|c| c.value.abs()).fold(CROSSING[1] / CROSSING[0] * way, f64::max);
         for list in [&found.folds, &found.bifurcations] {
             (0..MOST_EVENTS).for_each(|k| at(list.get(k).map(|c: &CriticalPoint| (c.value, c.point)), least));
         }

@@ -3,10 +3,10 @@
 //! A coarse mesh bears a little more than the structure does. Just beyond a buckling load a straight part is stable on it, and on twice the
 //! segments, too, with the same displacements: nothing that is compared tells. What tells is the stiffness that is left,
 //! ```text
-//! λ = min over x of xᵀ·K·x / xᵀ·M·x,      K at the equilibrium, M the masses of the bodies,
+//! k = xᵀ·K·x / max |x_j|²,      λ = min over x of xᵀ·K·x / xᵀ·M·x,      K at the equilibrium, M the masses of the bodies,
 //! ```
-//! the square of the lowest natural frequency, which goes to zero there. On a mesh that bears too much by ε of the load, where the part buckles at a
-//! share δ less than this load, it is ε + δ; on twice the segments ε falls to a sixteenth or, where it comes of stretching, to a quarter. While the
+//! in the softest motion x, that of the lowest frequency √λ: it goes to zero there. On a mesh that bears too much by ε of the load, where the part buckles at a
+//! share δ less than this load, it goes with ε + δ; on twice the segments ε falls to a sixteenth or, where it comes of stretching, to a quarter. While the
 //! side of the limit is not known, ε > |δ|, the two are further apart than [`KNOWN`] times the smaller.
 //!
 //! Looked at is what has less than half of its stiffness left: xᵀ·K·x < ½·xᵀ·K₀·x for some x, with K₀ at rest, which the pivots of K − ½·K₀ tell
@@ -22,38 +22,38 @@ use crate::multibody::planar::Pose;
 /// Share of the stiffness at rest below which it is looked at from mesh to mesh [1]. The coarsest mesh of a clamped beam bears an eighth too much.
 const SOFT: f64 = 0.5;
 /// Share of what is left that may differ between a mesh and twice its segments [1]: what falls slowly with them is not taken for what
-/// has settled (a column in one piece has 1.25 times the λ on two segments that it has on four, and none on eight).
+/// has settled (a column in one piece has 1.25 times the stiffness on two segments that it has on four, and none on eight).
 const KNOWN: f64 = 0.2;
 /// Inverse iterations at most, and the change of λ at which they end [1].
 const ROUNDS: (usize, f64) = (30, 1e-3);
 
-/// True where less than half of the stiffness at rest is left.
-pub(super) fn is_soft(compiled: &Compiled, point: &OperatingPoint) -> bool {
-    let system = &compiled.parts.system;
+/// [`left`] of an equilibrium that has less than half of its stiffness left; none of others.
+pub(super) fn left_of_soft(compiled: &Compiled, point: &OperatingPoint) -> Option<f64> {
+    let (system, pattern) = (&compiled.parts.system, &compiled.parts.system.model.pattern);
     if system.model.linear || system.bodies() == 0 || !point.free_motions.is_empty() {
         // displacements are small by decree, or a direction is held that is free
-        return false;
+        return None;
     }
     let [here, rest, without] = drives(compiled, point);
     let still = vec![Pose::zeros(); system.bodies()];
+    let (mut force, mut tangent) = (still.clone(), BlockMatrix::new(pattern));
     let pulled = here.volts.iter().any(|v| *v != 0.0);
-    let falls_short = |(q, drive): (&[Pose], &Drive)| {
-        let mut force = still.clone();
-        let mut tangent = BlockMatrix::new(&system.model.pattern);
+    let references = [(&still, &rest), (&point.q, &without)];
+    references.into_iter().take(1 + usize::from(pulled)).find_map(|(q, drive)| {
         system.tangent_less((&point.q, &here), SOFT, (q, drive), &mut tangent, &mut force);
         system.model.project_matrix(&mut tangent);
-        if tangent.factor(&system.model.pattern).is_ok_and(|inertia| inertia.negative == 0) {
-            return false;
+        if tangent.factor(pattern).is_ok_and(|inertia| inertia.negative == 0) {
+            return None;
         }
-        left(compiled, point).zip(lowest(compiled, q, drive)).is_some_and(|(here, there)| here < SOFT * there)
-    };
-    falls_short((&still, &rest)) || (pulled && falls_short((&point.q, &without)))
+        let (here, there) = (lowest(compiled, &point.q, &here)?, lowest(compiled, q, drive)?);
+        (here.lambda < SOFT * there.lambda).then_some(here.left)
+    })
 }
 
-/// λ of an equilibrium [rad²/s²], or [N/m] where nothing has mass; none where it cannot be told.
+/// The stiffness that is left at an equilibrium [N/m]; none where it cannot be told.
 pub(super) fn left(compiled: &Compiled, point: &OperatingPoint) -> Option<f64> {
     let [here, ..] = drives(compiled, point);
-    lowest(compiled, &point.q, &here)
+    lowest(compiled, &point.q, &here).map(|lowest| lowest.left)
 }
 
 /// What drives an equilibrium, what is there at rest, without loads and voltages, and the first without voltages.
@@ -70,14 +70,22 @@ pub(super) fn agree(coarse: Option<f64>, fine: Option<f64>) -> bool {
     coarse.zip(fine).is_none_or(|(coarse, fine)| (coarse - fine).abs() <= KNOWN * fine)
 }
 
-/// What λ is compared by, at a tolerance: beyond it where two meshes do not agree.
+/// What of the stiffness is left, or how far beyond a fold an equilibrium is, is compared by this at a tolerance: beyond it where two meshes do not agree.
 pub(super) fn scale(left: f64, tol: f64) -> f64 {
     // a comparison divides by ¾ of the scale and allows ¾ of the tolerance
     KNOWN * left.abs() / (0.75 * 0.75 * tol)
 }
 
-/// λ at a configuration, by inverse iteration; none where it is not positive.
-fn lowest(compiled: &Compiled, q: &[Pose], drive: &Drive) -> Option<f64> {
+/// The softest motion, for its masses.
+struct Lowest {
+    /// xᵀ·K·x / xᵀ·M·x [rad²/s²], or [N/m] over bodies that are alike where nothing has mass.
+    lambda: f64,
+    /// xᵀ·K·x / max |x_j|² [N/m].
+    left: f64,
+}
+
+/// The softest motion at a configuration, by inverse iteration; none where the stiffness is not positive.
+fn lowest(compiled: &Compiled, q: &[Pose], drive: &Drive) -> Option<Lowest> {
     let (system, model) = (&compiled.parts.system, &compiled.parts.system.model);
     let mut x = vec![Pose::zeros(); q.len()];
     let mut stiffness = BlockMatrix::new(&model.pattern);
@@ -115,5 +123,7 @@ fn lowest(compiled: &Compiled, q: &[Pose], drive: &Drive) -> Option<f64> {
             break;
         }
     }
-    lambda.is_finite().then_some(lambda)
+    let most = x.iter().map(|x| x.x * x.x + x.y * x.y).fold(0.0, f64::max);
+    let left = lambda * product(&x, &x) / most;
+    left.is_finite().then_some(Lowest { lambda, left })
 }
