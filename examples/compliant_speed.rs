@@ -14,7 +14,9 @@ use bimorph::domains::{Drive, System};
 use bimorph::equations::Joints;
 use bimorph::multibody::planar::Pose;
 use bimorph::multibody::relative::JointMatrix;
-use bimorph::multibody::relative::kinematics::Placed;
+use bimorph::multibody::relative::columns::Four;
+use bimorph::multibody::relative::dynamics::Stresses;
+use bimorph::multibody::relative::placed::{Eights, Placed};
 use bimorph::multibody::{BlockMatrix, forces};
 use std::hint::black_box;
 use std::sync::Arc;
@@ -70,28 +72,29 @@ fn report(name: &str, count: usize, units: usize, topology: &Topology) {
 /// The same in joint coordinates, loops closed by springs: nanoseconds of a tangent with its factorization, and of a residual with a solve.
 fn by_springs(system: &System, q: &[Pose], drive: &Drive) -> (f64, f64) {
     let joints = Joints::elastic(system).unwrap_or_else(|e| panic!("{e}"));
-    let Joints { tree, closures } = &joints;
+    let Joints { tree, closures, .. } = &joints;
     let mut s = q.to_vec();
     tree.coordinates_at(q, &mut s);
-    let (mut placed, mut w) = (Placed::new(tree), JointMatrix::new(tree));
-    let (mut r, mut share, mut poses) = (q.to_vec(), q.to_vec(), q.to_vec());
+    let (mut placed, mut stresses, mut w) = (Placed::new(tree), Stresses::new(tree), JointMatrix::new(tree));
+    let given = Eights::at_rest(&s);
+    let (mut r, mut share, mut right, mut moved) =
+        (q.to_vec(), q.to_vec(), vec![Four::ZERO; q.len()], vec![Four::ZERO; q.len() + 1]);
     let factor = median(|| {
-        placed.put(tree, black_box(&s));
-        placed.poses(&mut poses);
-        closures.tangent(&poses, drive, &mut w.bodies, &mut r);
+        placed.place(tree, black_box(&given));
+        closures.tangent(&placed.at, drive, &mut w.bodies, &mut r);
         forces::add_inertia(&system.model, 1e16, 1e8, &mut w.bodies);
-        w.factor(tree, placed.maps(), 1.0, None, Err).unwrap_or_else(|e| panic!("{e:?}"));
+        w.factor(tree, &placed, 1.0, None).unwrap_or_else(|e| panic!("{e:?}"));
     });
     let solve = median(|| {
-        placed.put(tree, black_box(&s));
-        placed.poses(&mut poses);
-        closures.residual(&poses, drive, &mut r);
+        placed.place(tree, black_box(&given));
+        closures.residual(&placed.at, drive, &mut r);
         placed.gather(tree, &mut r, &mut share);
-        for ((share, link), s) in share.iter_mut().zip(&tree.links).zip(&s) {
-            *share += link.stress(s, &drive.rest());
+        stresses.fill(tree, &given, &drive.rest());
+        for (j, (right, share)) in right.iter_mut().zip(&share).enumerate() {
+            *right = Four::from(share + stresses.of(j));
         }
-        r.fill(Pose::zeros());
-        w.solve(tree, &mut r, &mut share);
+        moved.fill(Four::ZERO);
+        w.solve(&mut moved, &mut right);
     });
     (factor, solve)
 }

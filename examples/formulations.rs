@@ -6,6 +6,8 @@
 //! `deviation` is the largest distance of the bodies from a compliant run at a hundredth of the tolerance, at the end, as a
 //! share of the largest displacement. Wall-clock time, the least of nine runs, both formulations in turn; scheme Es in both.
 //!
+//! `rcr, stiff along for SHARE`: joints that hold no more than that of the strain energy along their axes, all together, are rigid there.
+//!
 //! Then plates on flexure pivots, joints that only turn (scheme a2): whole runs, explicit in joint coordinates, and the distance
 //! of the end of the row from a compliant run at 1e-7 in the same joints. The last lines are compliant with joints elastic in every
 //! direction (e4): what they differ by from those that only turn is part of their deviation.
@@ -13,11 +15,14 @@
 use bimorph::analysis::integrator::Integrator;
 use bimorph::analysis::transient::{TransientOptions, transient};
 use bimorph::compile::{CompileOptions, Formulation, Scheme, compile};
-use bimorph::domains::{Ramp, System};
+use bimorph::domains::{Drive, Ramp, System};
 use bimorph::equations::{Bodies, Joints};
 use bimorph::multibody::planar::Pose;
+use bimorph::multibody::relative::Tree;
+use bimorph::multibody::{BlockMatrix, BodyId};
 use bimorph::netlist::{Bundle, Setting};
 use bimorph::solve::equilibrium::{Equilibrium, EquilibriumOptions};
+use bimorph::solve::frequency::eigen::lowest_modes;
 use bimorph::solve::path::SourcePath;
 use bimorph::solve::time::adaptive::{Adaptive, Control};
 use bimorph::solve::time::joint_rodas4::JointRodas4;
@@ -145,6 +150,68 @@ fn measure((file, set, start, volts, stop): &Scene<'_>, tol: f64) {
     let [bodies_run, joints_run] = best.map(Option::unwrap);
     print("compliant", system.model.unknowns(), bodies_run);
     print("rcr", n, joints_run);
+    let cases = energies(system, &[&at.q, &fine.q], &ramp, *stop);
+    for share in [1e-2, 1e-3] {
+        let locked = stiff_along(&cases, share);
+        let tree = Tree::new(&system.model, |k| [locked[k], false, false]);
+        let coordinates = tree.coordinates;
+        let locked = Arc::new(Joints::new(system, tree));
+        let run = || run(system, &ramp, &at, first, tol, || JointRodas4::new(Arc::clone(&locked), first, &[]));
+        let best = (0..9).map(|_| run()).min_by(|a, b| a.2.total_cmp(&b.2)).unwrap();
+        print(&format!("rcr, stiff along for {share:e}"), coordinates, best);
+    }
+}
+
+/// Share of the joints' strain energy that each one has along its axis, at some states of a run and in its six lowest modes.
+fn energies(system: &System, states: &[&Vec<Pose>], ramp: &Ramp<'_>, stop: f64) -> Vec<Vec<f64>> {
+    let model = &system.model;
+    let (rest, mut hot) = (system.electrics.drive(), system.electrics.drive());
+    ramp.at(stop, &mut hot);
+    let mut stiffness = BlockMatrix::new(&model.pattern);
+    let still = vec![Pose::zeros(); system.bodies()];
+    system.tangent(&still, &rest, &mut stiffness, &mut still.clone());
+    let modes = lowest_modes(system, (&still, &rest), &stiffness, 6).unwrap().shapes;
+    // small enough to be linear
+    let small = |shape: &Vec<Pose>| {
+        let size = 1e-9 / shape.iter().map(|x| x.xy().amax()).fold(0.0, f64::max);
+        shape.iter().map(|x| x * size).collect::<Vec<_>>()
+    };
+    let modes = modes.iter().map(|shape| (small(shape), &rest));
+    let cases = states.iter().map(|q| ((*q).clone(), &hot)).chain(modes);
+    let shares = |(q, drive): (Vec<Pose>, &Drive)| {
+        let pose = |id| match id {
+            BodyId::Free(k) => q[k],
+            BodyId::Ground => Pose::zeros(),
+        };
+        let energy = |k: usize| {
+            let joint = model.joint(k);
+            let second = [joint.second[(0, 0)], joint.second[(0, 1)], joint.second[(1, 1)]];
+            let mut e = joint.frame.kinematics(&pose(joint.a), &pose(joint.b), &second).strain;
+            e.x -= joint.expansion.map_or(0.0, |(group, length)| length * drive.expansion[group]);
+            let stress = joint.stiffness * e;
+            [stress.x * e.x, stress.dot(&e)]
+        };
+        let each: Vec<_> = (0..model.joints.len()).map(energy).collect();
+        let whole: f64 = each.iter().map(|e| e[1]).sum();
+        each.iter().map(|e| if whole > 0.0 { e[0].abs() / whole } else { 0.0 }).collect()
+    };
+    cases.map(shares).collect()
+}
+
+/// Joints that may be rigid along their axes: in ascending order of their largest share, while those of no case sum to more than `most`.
+fn stiff_along(cases: &[Vec<f64>], most: f64) -> Vec<bool> {
+    let largest = |k: usize| cases.iter().map(|case| case[k]).fold(0.0, f64::max);
+    let mut order: Vec<usize> = (0..cases[0].len()).collect();
+    order.sort_by(|a, b| largest(*a).total_cmp(&largest(*b)));
+    let (mut locked, mut sums) = (vec![false; order.len()], vec![0.0; cases.len()]);
+    for k in order {
+        sums.iter_mut().zip(cases).for_each(|(sum, case)| *sum += case[k]);
+        if sums.iter().any(|sum| *sum > most) {
+            break;
+        }
+        locked[k] = true;
+    }
+    locked
 }
 
 fn run<M: for<'a> Method<Bodies<'a>>>(

@@ -105,7 +105,7 @@ impl Ports {
             None => Arc::clone(joints),
             Some(system) => {
                 let closures = System { electrics: Arc::clone(&system.electrics), ..joints.closures.clone() };
-                Arc::new(Joints { tree: joints.tree.clone(), closures })
+                Arc::new(Joints { closures, ..Joints::clone(joints) })
             }
         }
     }

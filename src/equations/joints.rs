@@ -2,6 +2,9 @@
 //! gaps, loads, dampers) on the bodies.
 
 use crate::domains::System;
+use crate::multibody::Drag;
+use crate::multibody::planar::Pose;
+use crate::multibody::relative::loops::Loops;
 use crate::multibody::relative::{Tree, Unfit};
 
 /// A system on a tree. Immutable; shared by sessions.
@@ -11,6 +14,28 @@ pub struct Joints {
     pub tree: Tree,
     /// The system with the tree's joints taken out.
     pub closures: System,
+    /// The joints that close loops, for their forces.
+    pub(crate) loops: Loops,
+    /// Inertia and drag of the bodies, close together.
+    pub(crate) inertias: Vec<Inertia>,
+    /// Something drags on bodies or between them.
+    pub(crate) drags: bool,
+}
+
+/// What of a body resists its motion.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Inertia {
+    /// The mass matrix' diagonal.
+    mass: Pose,
+    drag: Drag,
+}
+
+impl Inertia {
+    /// The force of an acceleration and a rate.
+    #[inline(always)]
+    pub(crate) fn force(&self, acceleration: &Pose, rate: &Pose) -> Pose {
+        self.mass.component_mul(acceleration) + self.drag.force(rate)
+    }
 }
 
 impl Joints {
@@ -26,6 +51,13 @@ impl Joints {
     pub fn new(system: &System, tree: Tree) -> Self {
         let mut closures = system.clone();
         closures.model.joints.clone_from(&tree.closures);
-        Self { tree, closures }
+        let bodies = &closures.model.bodies;
+        Self {
+            inertias: bodies.iter().map(|body| Inertia { mass: body.mass_diagonal(), drag: body.drag }).collect(),
+            drags: bodies.iter().any(|b| b.drag.amount != 0.0) || !closures.model.dampers.is_empty(),
+            loops: Loops::new(&closures.model, &tree.closures),
+            tree,
+            closures,
+        }
     }
 }

@@ -124,7 +124,7 @@ fn add_joints<'a>(
 }
 
 /// `r +=` the moments of coupled joints.
-fn add_couplings(model: &Model, q: &[Pose], r: &mut [Pose]) {
+pub(crate) fn add_couplings(model: &Model, q: &[Pose], r: &mut [Pose]) {
     for coupling in &model.couplings {
         let (first, second) = (turn_between(q, coupling.first), turn_between(q, coupling.second));
         for ((a, b), moment) in [(coupling.first, second), (coupling.second, first)] {

@@ -5,8 +5,9 @@ use crate::model;
 use bimorph::compile::{CompileError, CompileOptions, Compiled, Formulation, Scheme, compile};
 use bimorph::equations::Joints;
 use bimorph::multibody::planar::Pose;
+use bimorph::multibody::relative::columns::Four;
 use bimorph::multibody::relative::geometric::{Geometric, fill};
-use bimorph::multibody::relative::kinematics::Placed;
+use bimorph::multibody::relative::placed::{Eights, Placed};
 use bimorph::multibody::relative::{JointMatrix, Parent, Tree, Unfit};
 use bimorph::netlist::Bundle;
 use bimorph::solve::equilibrium::{Equilibrium, EquilibriumOptions};
@@ -53,11 +54,9 @@ fn poses_lead_back_to_coordinates() {
     let mut seed = 5;
     let (q, v) = (coordinates(&tree, 1.0, &mut seed), coordinates(&tree, 1e6, &mut seed));
     let zeros = vec![Pose::zeros(); q.len()];
-    let mut placed = Placed::<f64>::new(&tree);
-    placed.move_on(&tree, &q, &v, &zeros);
-    let (mut x, mut rate, mut back) = (zeros.clone(), zeros.clone(), zeros.clone());
-    placed.poses(&mut x);
-    placed.rates(&mut rate);
+    let mut placed = Placed::new(&tree);
+    placed.place(&tree, &Eights::tiles(&q, &v, &zeros));
+    let (x, rate, mut back) = (placed.at.clone(), placed.rate.clone(), zeros);
     tree.coordinates_at(&x, &mut back);
     for (back, q) in back.iter().zip(&q) {
         let apart = back - q;
@@ -78,28 +77,23 @@ fn motion_is_the_derivative_of_place() {
     let tree = Tree::elastic(&compiled.parts.system.model).unwrap();
     let mut seed = 11;
     let [q, v, z] = [1.0, 1.0, 1.0].map(|size| coordinates(&tree, size, &mut seed));
-    let zeros = vec![Pose::zeros(); q.len()];
-    let mut placed = Placed::<f64>::new(&tree);
+    let mut placed = Placed::new(&tree);
     let mut at = |t: f64| {
         let q: Vec<Pose> = (0..q.len()).map(|j| q[j] + v[j] * t + z[j] * (0.5 * t * t)).collect();
-        placed.put(&tree, &q);
-        let mut x = zeros.clone();
-        placed.poses(&mut x);
-        x
+        placed.place(&tree, &Eights::at_rest(&q));
+        placed.at.clone()
     };
     let step = 1e-4;
     let (before, now, after) = (at(-step), at(0.0), at(step));
-    let mut placed = Placed::<f64>::new(&tree);
-    placed.move_on(&tree, &q, &v, &z);
-    let (mut rate, mut push) = (zeros.clone(), zeros.clone());
-    placed.rates(&mut rate);
-    placed.accelerations(&mut push);
+    let mut placed = Placed::new(&tree);
+    placed.place(&tree, &Eights::tiles(&q, &v, &z));
+    let (rate, push) = (&placed.rate, &placed.acceleration);
     let largest = |x: &[Pose]| x.iter().map(|x| x.xy().amax()).fold(0.0, f64::max);
     for j in 0..q.len() {
         let first = (after[j] - before[j]) / (2.0 * step) - rate[j];
         let second = (after[j] - now[j] * 2.0 + before[j]) / (step * step) - push[j];
-        assert!(first.xy().amax() < 1e-7 * largest(&rate) && first.z.abs() < 1e-9, "{first}");
-        assert!(second.xy().amax() < 1e-5 * largest(&push) && second.z.abs() < 1e-6, "{second}");
+        assert!(first.xy().amax() < 1e-7 * largest(rate) && first.z.abs() < 1e-9, "{first}");
+        assert!(second.xy().amax() < 1e-5 * largest(push) && second.z.abs() < 1e-6, "{second}");
     }
 }
 
@@ -112,9 +106,9 @@ fn factor_agrees_with_dense_elimination() {
     let tree = Tree::new(model, |k| [k % 3 == 0, false, false]);
     let (count, mut seed) = (tree.links.len(), 3);
     let q = coordinates(&tree, 1.0, &mut seed);
-    let mut placed = Placed::<f64>::new(&tree);
-    placed.put(&tree, &q);
-    let mut form = JointMatrix::<f64>::new(&tree);
+    let mut placed = Placed::new(&tree);
+    placed.place(&tree, &Eights::at_rest(&q));
+    let mut form = JointMatrix::new(&tree);
     let scale = Matrix3::from_diagonal(&nalgebra::Vector3::new(1.0, 1.0, 1e-6));
     for block in &mut form.bodies.diagonal {
         let raw = Matrix3::from_fn(|_, _| noise(&mut seed));
@@ -162,9 +156,12 @@ fn factor_agrees_with_dense_elimination() {
     let unit = DVector::from_iterator(free.len(), (0..free.len()).map(|i| dense[(i, i)].sqrt().recip()));
     let scaled = DMatrix::from_fn(free.len(), free.len(), |r, c| unit[r] * dense[(r, c)] * unit[c]);
     let expected = scaled.lu().solve(&flat.component_mul(&unit)).unwrap().component_mul(&unit);
-    form.factor(&tree, placed.maps(), 1e-6, None, Err).unwrap();
-    let (mut motions, mut x) = (wrench, right);
-    form.solve(&tree, &mut motions, &mut x);
+    form.factor(&tree, &placed, 1e-6, None).unwrap();
+    let fours = |from: Vec<Pose>| from.into_iter().chain([Pose::zeros()]).map(Four::from).collect::<Vec<_>>();
+    let (mut motions, mut x) = (fours(wrench), fours(right));
+    form.solve(&mut motions, &mut x);
+    let poses = |from: &[Four]| from[..count].iter().map(Four::pose).collect::<Vec<_>>();
+    let (motions, x) = (poses(&motions), poses(&x));
     let reach = expected.amax();
     let spread = expected.component_div(&unit).amax();
     for (k, &(j, i)) in free.iter().enumerate() {
@@ -185,7 +182,7 @@ fn newton_over_coordinates_is_quadratic() {
     let compiled =
         model(&loaded, &CompileOptions { scheme: Scheme::Es, segments: Some(3), ..CompileOptions::default() });
     let system = &compiled.parts.system;
-    let Joints { tree, closures } = &Joints::elastic(system).unwrap();
+    let Joints { tree, closures, .. } = &Joints::elastic(system).unwrap();
     let count = system.bodies();
     let (zeros, mut drive) = (vec![Pose::zeros(); count], system.electrics.drive());
     drive.load = 1.0;
@@ -195,25 +192,25 @@ fn newton_over_coordinates_is_quadratic() {
     Equilibrium::new(system, EquilibriumOptions::default()).follow(system, &path, &mut expected).unwrap();
     let reach = expected.iter().map(|x| x.xy().amax()).fold(0.0, f64::max);
     let run = |exact: bool| {
-        let (mut q, mut poses, mut force, mut share) = (zeros.clone(), zeros.clone(), zeros.clone(), zeros.clone());
-        let (mut placed, mut form) = (Placed::<f64>::new(tree), JointMatrix::<f64>::new(tree));
+        let (mut q, mut force, mut share) = (zeros.clone(), zeros.clone(), zeros.clone());
+        let (mut placed, mut form) = (Placed::new(tree), JointMatrix::new(tree));
         let mut brought = vec![Geometric::ZERO; count];
         let mut errors = Vec::new();
         for _ in 0..9 {
-            placed.put(tree, &q);
-            placed.poses(&mut poses);
-            let apart = poses.iter().zip(&expected).map(|(a, b)| (a - b).xy().amax()).fold(0.0, f64::max);
+            placed.place(tree, &Eights::at_rest(&q));
+            let apart = placed.at.iter().zip(&expected).map(|(a, b)| (a - b).xy().amax()).fold(0.0, f64::max);
             errors.push(apart / reach);
-            closures.tangent(&poses, &drive, &mut form.bodies, &mut force);
+            closures.tangent(&placed.at, &drive, &mut form.bodies, &mut force);
             placed.gather(tree, &mut force, &mut share);
             for ((share, link), q) in share.iter_mut().zip(&tree.links).zip(&q) {
                 *share += link.stress(q, &drive.rest());
             }
-            fill(tree, &placed, |j| &q[j], &force, &mut brought);
-            form.factor(tree, placed.maps(), 1.0, exact.then_some(&brought), Err).unwrap();
-            form.solve(tree, &mut zeros.clone(), &mut share);
-            for (q, share) in q.iter_mut().zip(&share) {
-                *q -= share;
+            fill(tree, &placed, |j| q[j], &force, &mut brought);
+            form.factor(tree, &placed, 1.0, exact.then_some(&brought)).unwrap();
+            let mut change: Vec<Four> = share.iter().map(|share| Four::from(*share)).collect();
+            form.solve(&mut vec![Four::ZERO; count + 1], &mut change);
+            for (q, change) in q.iter_mut().zip(&change) {
+                *q -= change.pose();
             }
         }
         errors

@@ -68,6 +68,14 @@ impl LanePlaced {
     }
 }
 
+impl<T: Number> LanePlaced<T> {
+    /// A body at `q` with the sine and cosine of half its rotation.
+    #[inline(always)]
+    pub fn turned(q: LanePose<T>, sin: T, cos: T) -> Self {
+        Self { q, turn: LaneTurn { sin, cos, less: sin * -2.0 * sin, whole: sin * 2.0 * cos } }
+    }
+}
+
 /// What joints of one section share.
 #[derive(Debug, Clone, Copy)]
 pub struct LaneSection<T = Eight> {

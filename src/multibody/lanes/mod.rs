@@ -33,7 +33,7 @@ pub use matrix::LaneMatrix;
 pub use model::LaneModel;
 pub use number::Number;
 pub use precise::{LanePrecise, PrecisePose};
-pub use wide::{Eight, Kernel, LANES, Wide, across, add, load, store};
+pub use wide::{Eight, Kernel, LANES, Wide, across, add, everywhere, load, store};
 
 /// Displacement, rate or force of a body in each variant: x, y, θ.
 pub type LanePose<T = Eight> = [T; 3];

@@ -243,6 +243,20 @@ pub fn across<K: Kernel>(kernel: K) {
     }
 }
 
+/// Runs a kernel in the widest instructions of the processor at hand, one number after the other where it has none.
+#[inline(always)]
+pub fn everywhere<K: Kernel>(kernel: K) {
+    match Arch::new() {
+        #[cfg(target_arch = "x86_64")]
+        Arch::V4(simd) => Simd::vectorize(simd, Over::<K, 1>(kernel)),
+        #[cfg(target_arch = "x86_64")]
+        Arch::V3(simd) => Simd::vectorize(simd, Over::<K, 2>(kernel)),
+        #[cfg(target_arch = "aarch64")]
+        Arch::Neon(simd) => Simd::vectorize(simd, Over::<K, 4>(kernel)),
+        _ => Simd::vectorize(pulp::Scalar::new(), Over::<K, LANES>(kernel)),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     //! Every operation has the bits of `f64` in every lane.

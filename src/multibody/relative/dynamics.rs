@@ -1,12 +1,15 @@
 //! Inverse dynamics: the forces that a motion would take, over the coordinates. Bodies give wrenches, the tree's springs act
 //! on the coordinates themselves, and one pass from the leaves to the root brings both together.
 
-use super::kinematics::{Coordinates, Map, Placed, triple};
-use super::number::Dual;
+use super::columns::Four;
+use super::kinematics::Triple;
+use super::placed::{Eights, Placed, place_of, tiles};
 use super::tree::{Link, Parent, Tree};
 use crate::multibody::forces::RestStrain;
+use crate::multibody::lanes::{Eight, Kernel, LanePose, STILL, Wide, everywhere, load, store};
 use crate::multibody::planar::{JointFrame, Pose};
 use nalgebra::Vector3;
+use pulp::{Arch, Simd, WithSimd};
 
 impl Link {
     /// Axial rest offset of the joint, or its change with `rest` [m].
@@ -22,151 +25,123 @@ impl Link {
     }
 }
 
-impl Placed<f64> {
-    /// Places the bodies at coordinates `q`.
-    pub fn put(&mut self, tree: &Tree, q: &[Pose]) {
-        let none = |_: usize| [0.0; 3];
-        self.place::<false>(tree, &Coordinates { at: |j: usize| triple(&q[j]), rate: none, acceleration: none });
-    }
-
-    /// Places the bodies at coordinates `q` with rates `v` and accelerations `z`.
-    pub fn move_on(&mut self, tree: &Tree, q: &[Pose], v: &[Pose], z: &[Pose]) {
-        let given = Coordinates {
-            at: |j: usize| triple(&q[j]),
-            rate: |j: usize| triple(&v[j]),
-            acceleration: |j: usize| triple(&z[j]),
-        };
-        self.place::<true>(tree, &given);
-    }
-
-    /// Places the bodies at a motion that is given body by body.
-    #[inline]
-    pub(crate) fn place_at<'a>(
-        &mut self,
-        tree: &Tree,
-        q: impl Fn(usize) -> &'a Pose,
-        v: impl Fn(usize) -> &'a Pose,
-        z: impl Fn(usize) -> &'a Pose,
-    ) {
-        let given = Coordinates {
-            at: |j: usize| triple(q(j)),
-            rate: |j: usize| triple(v(j)),
-            acceleration: |j: usize| triple(z(j)),
-        };
-        self.place::<true>(tree, &given);
-    }
-
-    /// Pose of body `j`.
-    #[inline(always)]
-    pub(crate) fn pose(&self, j: usize) -> Pose {
-        Pose::from(*self.at(j))
-    }
-
-    /// Rate of body `j`.
-    #[inline(always)]
-    pub(crate) fn speed(&self, j: usize) -> Pose {
-        Pose::from(*self.rate(j))
-    }
-
-    /// Acceleration of body `j`.
-    #[inline(always)]
-    pub(crate) fn pushed(&self, j: usize) -> Pose {
-        Pose::from(*self.acceleration(j))
-    }
-
-    /// Poses of the bodies.
-    pub fn poses(&self, out: &mut [Pose]) {
-        for (j, out) in out.iter_mut().enumerate() {
-            *out = Pose::from(*self.at(j));
-        }
-    }
-
-    /// Rates of the bodies.
-    pub fn rates(&self, out: &mut [Pose]) {
-        for (j, out) in out.iter_mut().enumerate() {
-            *out = Pose::from(*self.rate(j));
-        }
-    }
-
-    /// Accelerations of the bodies.
-    pub fn accelerations(&self, out: &mut [Pose]) {
-        for (j, out) in out.iter_mut().enumerate() {
-            *out = Pose::from(*self.acceleration(j));
-        }
-    }
-
-    /// How each body moves with its parent and its coordinates.
-    pub fn maps(&self) -> &[Map<f64>] {
-        &self.maps
-    }
-
+impl Placed {
     /// Sums wrenches over everything that hangs on each body: `wrench` becomes the sum, `out` its share in the coordinates.
     #[inline]
     pub fn gather(&self, tree: &Tree, wrench: &mut [Pose], out: &mut [Pose]) {
-        for (j, link) in tree.links.iter().enumerate() {
-            let map = &self.maps[j];
+        for (j, up) in tree.upward.iter().enumerate() {
+            let map = self.map(j);
             let f = triple(&wrench[j]);
-            out[j] = Pose::from(map.gather(link.sign, &f));
-            if let Parent::Body(p) = link.parent {
+            out[j] = Pose::from(map.gather(up.sign, &f));
+            if let Parent::Body(p) = up.parent {
                 wrench[p as usize] += Pose::from(map.pass(&f));
             }
         }
     }
 
+    /// Minus the force over the coordinates that wrenches on the bodies and the tree's springs leave: `wrench` becomes its sum over everything
+    /// that hangs on each body.
+    #[inline]
+    pub fn resist(&self, tree: &Tree, stresses: &Stresses, wrench: &mut [Pose], out: &mut [Four]) {
+        Arch::new().dispatch(Resist { placed: self, tree, stresses, wrench, out });
+    }
+
     /// Motion of the bodies with a change `s` of the coordinates.
     #[inline]
     pub fn spread(&self, tree: &Tree, s: &[Pose], out: &mut [Pose]) {
-        for (j, link) in tree.links.iter().enumerate().rev() {
+        for (j, up) in tree.upward.iter().enumerate().rev() {
             let s = &s[j];
-            out[j] = match link.parent {
+            out[j] = match up.parent {
                 Parent::Free => *s,
-                Parent::Ground => Pose::from(self.maps[j].apply(link.sign, &[0.0; 3], &triple(s))),
-                Parent::Body(p) => Pose::from(self.maps[j].apply(link.sign, &triple(&out[p as usize]), &triple(s))),
+                Parent::Ground => Pose::from(self.map(j).apply(up.sign, &[0.0; 3], &triple(s))),
+                Parent::Body(p) => Pose::from(self.map(j).apply(up.sign, &triple(&out[p as usize]), &triple(s))),
             };
         }
     }
 }
 
-impl Placed<Dual> {
-    /// Places the bodies at a motion and its change, given body by body.
-    pub(crate) fn place_with<'a>(
-        &mut self,
-        tree: &Tree,
-        q: impl Fn(usize) -> (&'a Pose, &'a Pose),
-        v: impl Fn(usize) -> (&'a Pose, &'a Pose),
-        z: impl Fn(usize) -> (&'a Pose, &'a Pose),
-    ) {
-        let given =
-            Coordinates { at: |j: usize| both(q(j)), rate: |j: usize| both(v(j)), acceleration: |j: usize| both(z(j)) };
-        self.place::<true>(tree, &given);
-    }
+struct Resist<'a> {
+    placed: &'a Placed,
+    tree: &'a Tree,
+    stresses: &'a Stresses,
+    wrench: &'a mut [Pose],
+    out: &'a mut [Four],
+}
 
-    /// Changes of pose, rate and acceleration of body `j`.
-    pub(crate) fn changes(&self, j: usize) -> (Pose, Pose, Pose) {
-        let change = |x: &[Dual; 3]| Pose::new(x[0].change, x[1].change, x[2].change);
-        (change(self.at(j)), change(self.rate(j)), change(self.acceleration(j)))
-    }
+impl WithSimd for Resist<'_> {
+    type Output = ();
 
-    /// Change of [`Placed::gather`]'s result where the wrenches `force` change by `wrench`, which becomes its sum.
-    pub(crate) fn gather_changes(&mut self, tree: &Tree, force: &[Pose], wrench: &[Pose], out: &mut [Pose]) {
-        self.sums.clear();
-        self.sums.extend(force.iter().zip(wrench).map(both));
-        for (j, link) in tree.links.iter().enumerate() {
-            let map = &self.maps[j];
-            let f = self.sums[j];
-            let share = map.gather(link.sign, &f);
-            out[j] = Pose::new(share[0].change, share[1].change, share[2].change);
-            if let Parent::Body(p) = link.parent {
-                for (to, f) in self.sums[p as usize].iter_mut().zip(map.pass(&f)) {
-                    *to += f;
-                }
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self { placed, tree, stresses, wrench, out } = self;
+        for ((j, up), out) in tree.upward.iter().enumerate().zip(out) {
+            let (map, f, stress) = (placed.map(j), triple(&wrench[j]), stresses.of(j));
+            let [u, g, p] = map.gather(up.sign, &f);
+            *out = Four([-(u + stress.x), -(g + stress.y), -(p + stress.z), 0.0]);
+            if let Parent::Body(p) = up.parent {
+                wrench[p as usize] += Pose::from(map.pass(&f));
             }
         }
     }
 }
 
-fn both((value, change): (&Pose, &Pose)) -> [Dual; 3] {
-    [0, 1, 2].map(|i| Dual { value: value[i], change: change[i] })
+/// Stresses of the tree's joints, eight bodies side by side.
+#[derive(Debug, Clone)]
+pub struct Stresses {
+    /// Axial rest offsets [m].
+    offsets: Vec<Eight>,
+    /// By coordinates.
+    out: Vec<LanePose>,
+}
+
+impl Stresses {
+    /// Storage for a tree.
+    pub fn new(tree: &Tree) -> Self {
+        let count = tiles(tree.links.len());
+        Self { offsets: vec![Eight::NONE; count], out: vec![STILL; count] }
+    }
+
+    /// Fills in the stresses at coordinates `at`.
+    #[inline]
+    pub fn fill(&mut self, tree: &Tree, at: &[Eights], rest: &RestStrain<'_>) {
+        for &j in &tree.offset {
+            let (tile, lane) = place_of(j as usize);
+            self.offsets[tile].0[lane] = tree.links[j as usize].offset(rest);
+        }
+        everywhere(Stress { stresses: self, tree, at });
+    }
+
+    /// Of the joint of body `j`.
+    #[inline(always)]
+    pub fn of(&self, j: usize) -> Pose {
+        let (tile, lane) = place_of(j);
+        let [u, g, p] = &self.out[tile];
+        Pose::new(u.0[lane], g.0[lane], p.0[lane])
+    }
+}
+
+struct Stress<'a> {
+    stresses: &'a mut Stresses,
+    tree: &'a Tree,
+    at: &'a [Eights],
+}
+
+impl Kernel for Stress<'_> {
+    #[inline(always)]
+    fn run<W: Wide>(self, simd: W::Simd) {
+        let Stresses { offsets, out } = self.stresses;
+        for (((at, offset), springs), out) in self.at.iter().zip(offsets).zip(&self.tree.springs).zip(out) {
+            let [u, g, p] = load::<W, 3>(simd, &at.q);
+            let u = u - W::load(simd, offset);
+            let [uu, ug, up, gg, gp, pp] = load::<W, 6>(simd, springs);
+            store([uu * u + ug * g + up * p, ug * u + gg * g + gp * p, up * u + gp * g + pp * p], out);
+        }
+    }
+}
+
+#[inline(always)]
+fn triple(x: &Pose) -> Triple<f64> {
+    [x.x, x.y, x.z]
 }
 
 impl Tree {

@@ -16,220 +16,195 @@
 //! Reference: R. Featherstone, "The calculation of robot dynamics using articulated-body inertias", Int. J. Robotics Research
 //! 2 (1983), for the branch; K. S. Anderson, J. H. Critchley (2003) for loops inside the recursion.
 
+use super::columns::{Columns, Four, in_fours};
 use super::geometric::Geometric;
 use super::kinematics::Map;
-use super::products::{gather, left, right, shift_columns, shift_rows, spread};
+use super::placed::Placed;
+use super::solve::{Factors, both_motions};
 use super::tree::{Link, Parent, Tree};
-use crate::multibody::factor::{Inertia, Scalar, ZeroPivot};
-use crate::multibody::planar::Block;
+use crate::multibody::factor::{Inertia, ZeroPivot};
+use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, Pattern};
-use nalgebra::{Matrix3, Vector3};
+use pulp::{Simd, WithSimd};
 
 /// A pivot smaller than this share of what it came from is taken for zero.
 const LOST: f64 = 1e-13;
 
 /// A form over joint coordinates, and its factors.
 #[derive(Debug, Clone)]
-pub struct JointMatrix<T: Scalar> {
-    /// Blocks over the bodies' motions; spoiled by factoring.
-    pub bodies: BlockMatrix<T, 3>,
-    /// H⁻¹ of each body.
-    inverse: Vec<Matrix3<T>>,
-    /// C_r·H⁻¹ of each block of the pattern, rows of the later body.
-    coupling: Vec<Matrix3<T>>,
+pub struct JointMatrix {
+    /// Blocks over the bodies' motions.
+    pub bodies: BlockMatrix<f64, 3>,
+    /// The same in the course of the elimination.
+    diagonal: Vec<Columns>,
+    below: Vec<Columns>,
+    /// The factors.
+    pub(super) factors: Factors,
     /// C_r of the column at hand.
-    column: Vec<Matrix3<T>>,
+    column: Vec<Columns>,
     /// For each block of a column, the block that takes over its motion with the column's parent; [`OWN`] where the row is
     /// the parent itself.
     heir: Vec<u32>,
-    maps: Vec<Map<f64>>,
+    pub(super) maps: Vec<Map<f64>>,
 }
 
 /// The parent's own diagonal.
 const OWN: u32 = u32::MAX;
 
-impl<T: Scalar> JointMatrix<T> {
+impl JointMatrix {
     /// Storage.
     pub fn new(tree: &Tree) -> Self {
         let pattern = &tree.pattern;
         let count = pattern.bodies();
         Self {
             bodies: BlockMatrix::new(pattern),
-            inverse: vec![Matrix3::zeros(); count],
-            coupling: vec![Matrix3::zeros(); pattern.off_blocks()],
+            diagonal: vec![Columns::ZERO; count],
+            below: vec![Columns::ZERO; pattern.off_blocks()],
+            factors: Factors::new(tree),
             column: Vec::with_capacity((0..count).map(|j| pattern.column(j).len()).max().unwrap_or(0)),
             heir: heirs(tree),
             maps: vec![Map::REST; count],
         }
     }
 
-    /// Factors the form of [`JointMatrix::bodies`] and the joints' blocks `scale`·K (+ `geometric`) at the configuration of
-    /// `maps`. Where a pivot vanishes, `vanished` decides: an error, or to hold the direction.
+    /// Factors the form of [`JointMatrix::bodies`] and the joints' blocks `scale`·K (+ `geometric`) where the bodies are
+    /// `placed`.
     ///
     /// # Errors
     /// [`ZeroPivot`].
     pub fn factor(
         &mut self,
         tree: &Tree,
-        maps: &[Map<f64>],
+        placed: &Placed,
         scale: f64,
         geometric: Option<&[Geometric]>,
-        mut vanished: impl FnMut(ZeroPivot) -> Result<(), ZeroPivot>,
     ) -> Result<Inertia, ZeroPivot> {
-        self.maps.copy_from_slice(maps);
+        for (j, map) in self.maps.iter_mut().enumerate() {
+            *map = placed.map(j);
+        }
+        in_fours(Eliminate { matrix: self, tree, scale, geometric })
+    }
+
+    #[inline(always)]
+    fn eliminate<S: Simd>(
+        &mut self,
+        simd: S,
+        tree: &Tree,
+        scale: f64,
+        geometric: Option<&[Geometric]>,
+    ) -> Result<Inertia, ZeroPivot> {
         let pattern = &tree.pattern;
         let mut inertia = Inertia::default();
+        let from = self.bodies.diagonal.iter().chain(&self.bodies.below);
+        for (to, from) in self.diagonal.iter_mut().chain(&mut self.below).zip(from) {
+            *to = Columns::of(from);
+        }
         for (j, link) in tree.links.iter().enumerate() {
-            let map = &maps[j];
-            let block = self.bodies.diagonal[j];
+            let map = self.maps[j];
+            let block = self.diagonal[j];
             let extra = geometric.map(|g| &g[j]);
-            let mut own = joint_block::<T>(link, scale, extra);
-            let (ds, free) = match &link.free {
-                Some(free) => (block * free.map(T::from_real), Some(free)),
-                None => (right(&block, map, link), None),
-            };
-            own += match free {
-                Some(free) => free.map(T::from_real) * ds,
-                None => left(&ds, map, link),
-            };
-            hold_locked(link, &mut own);
-            let inverse = invert(&own, &mut inertia, &mut |direction| vanished(ZeroPivot { body: j, direction }))?;
-            self.inverse[j] = inverse;
-            let column = pattern.column(j);
+            let along = Columns::motions(&map, link);
+            let share = along.transposed();
+            let ds = block.product(simd, &along);
+            let own = share.product(simd, &ds).plus(simd, &joint_block(simd, link, scale, extra));
+            let inverse = invert(simd, own, link, &mut inertia, j)?;
+            self.factors.keep(j, (&along, &share), &inverse);
             let parent = match link.parent {
                 Parent::Body(p) => Some(p as usize),
                 _ => None,
             };
-            if let Some(p) = parent {
-                self.hand_over(pattern, j, p, &block, map, extra);
-            }
+            let handed = parent.map(|p| self.hand_over(simd, pattern, (j, p), &block, &map, extra));
             let mut target = pattern.targets(j).iter();
             self.column.clear();
-            for (k, &row) in column.clone().zip(pattern.rows(j)) {
+            for (k, &row) in pattern.column(j).zip(pattern.rows(j)) {
                 let row = row as usize;
-                let below = self.bodies.below[k];
-                let mut c = match free {
-                    Some(free) => below * free.map(T::from_real),
-                    None => right(&below, map, link),
-                };
-                if parent == Some(row) {
-                    c += shift_rows(&ds, map);
+                let is_parent = parent == Some(row);
+                let below = &self.below[k];
+                let (mut c, mut to) = (Columns::ZERO, self.diagonal[row]);
+                if is_parent {
+                    to = to.plus(simd, handed.as_ref().unwrap_or(&Columns::ZERO));
+                    c = Columns::passing(&map).product(simd, &ds);
                     if let Some(g) = extra {
-                        for i in 0..3 {
-                            c[(2, i)] += T::from_real(g.cross[i]);
+                        for (column, cross) in c.0.iter_mut().zip(g.cross) {
+                            column.0[2] += cross;
                         }
                     }
                 }
-                clear_locked(link, &mut c);
-                let scaled = c * inverse;
-                for (other, &at) in self.column.iter().zip(target.by_ref()) {
-                    self.bodies.below[at as usize] -= scaled * other.transpose();
+                // along a tree nothing but the joint itself couples the two
+                if !is_parent || !below.is_zero() {
+                    c = c.plus(simd, &below.product(simd, &along));
                 }
-                self.bodies.diagonal[row] -= scaled * c.transpose();
-                self.coupling[k] = scaled;
+                let scaled = c.product(simd, &inverse);
+                for (other, &at) in self.column.iter().zip(target.by_ref()) {
+                    let to = &mut self.below[at as usize];
+                    *to = to.less(simd, &scaled.across(simd, other));
+                }
+                self.diagonal[row] = to.less(simd, &scaled.across(simd, &c));
+                self.factors.keep_coupling(simd, (j, k, is_parent), &map, &scaled);
                 self.column.push(c);
             }
         }
         Ok(inertia)
     }
 
-    /// What moves with the parent: the body's own share, and its couplings to other bodies.
+    /// Solves: `x` holds the right side over the coordinates and becomes the solution. `wrench` holds a right side over the
+    /// bodies' motions (zero where there is none), and becomes the bodies' motions; it has one entry more than there are bodies.
+    pub fn solve(&self, wrench: &mut [Four], x: &mut [Four]) {
+        self.factors.solve(wrench, x);
+    }
+
+    /// Motions of the bodies with two motions of the coordinates, at the configuration of the factor.
+    pub(crate) fn both_motions(&self, tree: &Tree, of: (&[Pose], &[Pose]), to: (&mut [Pose], &mut [Pose])) {
+        both_motions(tree, &self.maps, of, to);
+    }
+
+    /// What moves with the parent: the body's own share, which is returned, and its couplings to other bodies.
     #[inline(always)]
-    fn hand_over(
+    fn hand_over<S: Simd>(
         &mut self,
+        simd: S,
         pattern: &Pattern,
-        j: usize,
-        p: usize,
-        block: &Matrix3<T>,
+        (j, p): (usize, usize),
+        block: &Columns,
         map: &Map<f64>,
         extra: Option<&Geometric>,
-    ) {
-        let moved = shift_columns(block, map);
-        let mut own = shift_rows(&moved, map);
+    ) -> Columns {
+        let mut own = Columns::passing(map).product(simd, &block.shifted(simd, map));
         for (k, &row) in pattern.column(j).zip(pattern.rows(j)) {
-            let below = self.bodies.below[k];
-            // along a tree nothing but the joint itself couples the two
-            if below == Matrix3::zeros() {
+            let below = &self.below[k];
+            if below.is_zero() {
                 continue;
             }
-            let moved = shift_columns(&below, map);
+            let moved = below.shifted(simd, map);
             match self.heir[k] {
-                OWN => own += moved + moved.transpose(),
-                at => self.bodies.below[at as usize] += if row as usize > p { moved } else { moved.transpose() },
+                OWN => own = own.plus(simd, &moved).plus(simd, &moved.transposed()),
+                at => {
+                    let to = &mut self.below[at as usize];
+                    *to = to.plus(simd, &if row as usize > p { moved } else { moved.transposed() });
+                }
             }
         }
         if let Some(g) = extra {
-            own[(2, 2)] += T::from_real(g.turn);
+            own.0[2].0[2] += g.turn;
         }
-        self.bodies.diagonal[p] += own;
+        own
     }
+}
 
-    /// Motions of the bodies with coordinates' motions `s` and `t`, at the configuration of the factor. In one sweep: along a
-    /// beam each body waits for the one before it, and the second fills the time.
-    #[inline]
-    pub(crate) fn both_motions(
-        &self,
-        tree: &Tree,
-        (s, t): (&[Vector3<T>], &[Vector3<T>]),
-        (to_s, to_t): (&mut [Vector3<T>], &mut [Vector3<T>]),
-    ) {
-        for (j, link) in tree.links.iter().enumerate().rev() {
-            let map = &self.maps[j];
-            (to_s[j], to_t[j]) = match link.parent {
-                Parent::Free => (s[j], t[j]),
-                Parent::Ground => {
-                    let still = Vector3::zeros();
-                    (spread(map, link.sign, &still, &s[j]), spread(map, link.sign, &still, &t[j]))
-                }
-                Parent::Body(p) => {
-                    let p = p as usize;
-                    (spread(map, link.sign, &to_s[p], &s[j]), spread(map, link.sign, &to_t[p], &t[j]))
-                }
-            };
-        }
-    }
+/// The elimination, in the widest instructions of the processor at hand.
+struct Eliminate<'a> {
+    matrix: &'a mut JointMatrix,
+    tree: &'a Tree,
+    scale: f64,
+    geometric: Option<&'a [Geometric]>,
+}
 
-    /// Solves: `x` holds the right side over the coordinates and becomes the solution. `wrench` holds a right side over the
-    /// bodies' motions (zero where there is none), and becomes the bodies' motions.
-    pub fn solve(&self, tree: &Tree, wrench: &mut [Vector3<T>], x: &mut [Vector3<T>]) {
-        let pattern = &tree.pattern;
-        for (j, link) in tree.links.iter().enumerate() {
-            let map = &self.maps[j];
-            let f = wrench[j];
-            let mut right_side = x[j]
-                + match &link.free {
-                    Some(free) => free.map(T::from_real) * f,
-                    None => gather(map, link.sign, &f),
-                };
-            for i in 0..3 {
-                if !link.moving[i] {
-                    right_side[i] = T::zero();
-                }
-            }
-            if let Parent::Body(p) = link.parent {
-                let to = &mut wrench[p as usize];
-                to.x += f.x;
-                to.y += f.y;
-                to.z += f.z + T::from_real(map.lever[0]) * f.x + T::from_real(map.lever[1]) * f.y;
-            }
-            for (k, &row) in pattern.column(j).zip(pattern.rows(j)) {
-                wrench[row as usize] -= self.coupling[k] * right_side;
-            }
-            x[j] = self.inverse[j] * right_side;
-        }
-        for (j, link) in tree.links.iter().enumerate().rev() {
-            let map = &self.maps[j];
-            let mut s = x[j];
-            for (k, &row) in pattern.column(j).zip(pattern.rows(j)) {
-                s -= self.coupling[k].tr_mul(&wrench[row as usize]);
-            }
-            x[j] = s;
-            wrench[j] = match link.parent {
-                Parent::Free => s,
-                Parent::Ground => spread(map, link.sign, &Vector3::zeros(), &s),
-                Parent::Body(p) => spread(map, link.sign, &wrench[p as usize], &s),
-            };
-        }
+impl WithSimd for Eliminate<'_> {
+    type Output = Result<Inertia, ZeroPivot>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
+        self.matrix.eliminate(simd, self.tree, self.scale, self.geometric)
     }
 }
 
@@ -253,70 +228,66 @@ fn heirs(tree: &Tree) -> Vec<u32> {
 
 /// The joint's own block: springs and what its force brings.
 #[inline(always)]
-fn joint_block<T: Scalar>(link: &Link, scale: f64, extra: Option<&Geometric>) -> Matrix3<T> {
-    let [uu, ug, up, gg, gp, pp] = link.stiffness.0.map(|k| k * scale);
-    let mut own = Matrix3::new(uu, ug, up, ug, gg, gp, up, gp, pp);
-    if let Some(g) = extra {
-        own += g.own;
-    }
-    own.map(T::from_real)
+fn joint_block<S: Simd>(simd: S, link: &Link, scale: f64, extra: Option<&Geometric>) -> Columns {
+    let [uu, ug, up, gg, gp, pp] = link.stiffness.0;
+    let own = Columns([Four([uu, ug, up, 0.0]), Four([ug, gg, gp, 0.0]), Four([up, gp, pp, 0.0])]);
+    let own = own.scaled(simd, scale);
+    extra.map_or(own, |g| own.plus(simd, &Columns::of(&g.own)))
 }
 
-/// Gives locked directions the pivot 1 and no couplings.
+/// The inverse of a symmetric block over what moves, and the signs of its pivots.
 #[inline(always)]
-fn hold_locked<T: Scalar>(link: &Link, own: &mut Matrix3<T>) {
-    if let Some(free) = &link.free {
-        *own += (Block::identity() - **free).map(T::from_real);
+fn invert<S: Simd>(
+    simd: S,
+    mut a: Columns,
+    link: &Link,
+    inertia: &mut Inertia,
+    body: usize,
+) -> Result<Columns, ZeroPivot> {
+    if link.free.is_none() && link.moving == [true; 3] {
+        return inverse(&a, inertia, body);
     }
-    for i in 0..3 {
-        if !link.moving[i] {
-            for k in 0..3 {
-                own[(i, k)] = T::zero();
-                own[(k, i)] = T::zero();
-            }
-            own[(i, i)] = T::one();
+    // what does not move has a pivot of its own, and no inverse; a guide at an angle mixes it with what moves, so it is of that size
+    let (still, size) = match &link.free {
+        Some(free) => {
+            let size = a.0[0].0[0].abs() + a.0[1].0[1].abs();
+            (Columns::IDENTITY.less(simd, &Columns::of(free)), if size > 0.0 { size } else { 1.0 })
         }
-    }
-}
-
-#[inline(always)]
-fn clear_locked<T: Scalar>(link: &Link, c: &mut Matrix3<T>) {
-    for i in 0..3 {
-        if !link.moving[i] {
-            c.column_mut(i).fill(T::zero());
+        None => {
+            let held = |i: usize| if link.moving[i] { 0.0 } else { 1.0 };
+            let still =
+                [Four([held(0), 0.0, 0.0, 0.0]), Four([0.0, held(1), 0.0, 0.0]), Four([0.0, 0.0, held(2), 0.0])];
+            (Columns(still), 1.0)
         }
-    }
+    };
+    a = a.plus(simd, &still.scaled(simd, size));
+    Ok(inverse(&a, inertia, body)?.less(simd, &still.scaled(simd, 1.0 / size)))
 }
 
 /// The inverse of a symmetric block by its L·D·Lᵀ without exchanges, and the signs of its pivots.
 #[inline(always)]
-fn invert<T: Scalar>(
-    a: &Matrix3<T>,
-    inertia: &mut Inertia,
-    vanished: &mut impl FnMut(usize) -> Result<(), ZeroPivot>,
-) -> Result<Matrix3<T>, ZeroPivot> {
-    let mut pivot = |d: T, direction: usize, from: T, inertia: &mut Inertia| -> Result<T, ZeroPivot> {
-        let mut d = d;
-        if d.modulus() <= LOST * from.modulus() || !d.is_finite() {
-            vanished(direction)?;
-            d = from;
+fn inverse(a: &Columns, inertia: &mut Inertia, body: usize) -> Result<Columns, ZeroPivot> {
+    let mut pivot = |d: f64, direction: usize, from: f64| {
+        if d.abs() <= LOST * from.abs() || !d.is_finite() {
+            return Err(ZeroPivot { body, direction });
         }
-        if d.real() < 0.0 {
+        if d < 0.0 {
             inertia.negative += 1;
         }
-        Ok(T::one() / d)
+        Ok(1.0 / d)
     };
-    let r0 = pivot(a[(0, 0)], 0, a[(0, 0)], inertia)?;
-    let (l10, l20) = (a[(1, 0)] * r0, a[(2, 0)] * r0);
-    let r1 = pivot(a[(1, 1)] - l10 * a[(1, 0)], 1, a[(1, 1)], inertia)?;
-    let c21 = a[(2, 1)] - l20 * a[(1, 0)];
+    let [[a00, a10, a20, _], [_, a11, a21, _], [_, _, a22, _]] = a.0.map(|column| column.0);
+    let r0 = pivot(a00, 0, a00)?;
+    let (l10, l20) = (a10 * r0, a20 * r0);
+    let r1 = pivot(a11 - l10 * a10, 1, a11)?;
+    let c21 = a21 - l20 * a10;
     let l21 = c21 * r1;
-    let r2 = pivot(a[(2, 2)] - l20 * a[(2, 0)] - l21 * c21, 2, a[(2, 2)], inertia)?;
+    let r2 = pivot(a22 - l20 * a20 - l21 * c21, 2, a22)?;
     // L⁻ᵀ·D⁻¹·L⁻¹ with L⁻¹ = [1; −l10 1; m −l21 1]
     let m = l10 * l21 - l20;
     let (i22, i21, i20) = (r2, -l21 * r2, m * r2);
     let i11 = r1 - l21 * i21;
     let i10 = -l10 * r1 - l21 * i20;
     let i00 = r0 + l10 * l10 * r1 + m * i20;
-    Ok(Matrix3::new(i00, i10, i20, i10, i11, i21, i20, i21, i22))
+    Ok(Columns([Four([i00, i10, i20, 0.0]), Four([i10, i11, i21, 0.0]), Four([i20, i21, i22, 0.0])]))
 }

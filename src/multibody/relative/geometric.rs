@@ -4,7 +4,8 @@
 //! everything that hangs on body c. The last sum has four variables a joint, and its coefficients are those of the bias of
 //! [`super::kinematics`], which is the same second derivative.
 
-use super::kinematics::{Map, Placed, dot};
+use super::kinematics::{Map, dot};
+use super::placed::Placed;
 use super::tree::{Link, Parent, Tree};
 use crate::multibody::planar::Pose;
 use nalgebra::Matrix3;
@@ -28,15 +29,9 @@ impl Geometric {
 
 /// Fills in `out` at coordinates `q`, where the bodies have been placed; `force` holds the wrench on everything that hangs on
 /// each body, as [`Placed::gather`] leaves it. Arms and openings are taken from the maps: nothing is turned again.
-pub fn fill<'a>(
-    tree: &Tree,
-    placed: &Placed<f64>,
-    q: impl Fn(usize) -> &'a Pose,
-    force: &[Pose],
-    out: &mut [Geometric],
-) {
+pub fn fill(tree: &Tree, placed: &Placed, q: impl Fn(usize) -> Pose, force: &[Pose], out: &mut [Geometric]) {
     for (j, link) in tree.links.iter().enumerate() {
-        out[j] = if link.parent == Parent::Free { Geometric::ZERO } else { of(link, &placed.maps[j], q(j), &force[j]) };
+        out[j] = if link.parent == Parent::Free { Geometric::ZERO } else { of(link, &placed.map(j), &q(j), &force[j]) };
     }
 }
 

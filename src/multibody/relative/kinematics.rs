@@ -1,4 +1,4 @@
-//! Where the bodies are: poses, rates and accelerations from the coordinates, root to leaf.
+//! How a body hangs on its parent: pose, rate and acceleration less the parent's, and the map of motion.
 //!
 //! With m the parent, c the body, σ the sign of the joint, d = u·e₁(ψ) + g·e₂(ψ) the opening at the joint, ψ = β + (θ_m + θ_c)/2,
 //! u = e_u − [g p]Q[g p]ᵀ, r the turned arms, and t(·) a right angle's turn:
@@ -11,10 +11,11 @@
 //! ```
 //! The bias is the second derivative of the map from (θ_m, e_u, g, p) to x_c, twice along the rates: [`super::geometric`]
 //! takes its coefficients for the stiffness that a force brings.
+//!
+//! Rotations and their rates are sums along the tree; once they are known, no body waits for another here, so that eight of them go
+//! side by side ([`super::placed`]).
 
-use super::number::Number;
-use super::tree::{Link, Parent, Tree};
-use crate::multibody::planar::Pose;
+use crate::multibody::lanes::Number;
 
 /// A pair of numbers.
 pub(super) type Pair<T> = [T; 2];
@@ -40,15 +41,27 @@ pub struct Map<T> {
     pub(super) columns: [Pair<T>; 3],
 }
 
-impl<T: Number> Map<T> {
-    pub(super) const REST: Self = Self { lever: [T::ZERO; 2], columns: [[T::ZERO; 2]; 3] };
+impl Map<f64> {
+    pub(super) const REST: Self = Self { lever: [0.0; 2], columns: [[0.0; 2]; 3] };
+}
 
+impl<T: Number> Map<T> {
     /// The body's motion from the parent's and from the coordinates' motion `s`.
     #[inline(always)]
     pub(super) fn apply(&self, sign: f64, parent: &Triple<T>, s: &Triple<T>) -> Triple<T> {
+        let [x, y] = self.along(parent[2], s);
+        [parent[0] + x, parent[1] + y, parent[2] + s[2] * sign]
+    }
+
+    /// Displacement beyond the parent's with the parent's rotation and the coordinates' motion `s`.
+    #[inline(always)]
+    fn along(&self, turn: T, s: &Triple<T>) -> Pair<T> {
         let [u, g, p] = &self.columns;
-        let along = |i: usize| parent[i] + parent[2] * self.lever[i] + (u[i] * s[0] + g[i] * s[1] + p[i] * s[2]);
-        [along(0), along(1), parent[2] + s[2] * sign]
+        let mut out = self.lever;
+        for i in 0..2 {
+            out[i] = turn * self.lever[i] + (u[i] * s[0] + g[i] * s[1] + p[i] * s[2]);
+        }
+        out
     }
 
     /// Share of a wrench on the body in the coordinates.
@@ -66,176 +79,99 @@ impl<T: Number> Map<T> {
     }
 }
 
-/// Sine and cosine of half a rotation, and what follows.
+/// What does not move of a joint.
 #[derive(Debug, Clone, Copy)]
-struct Half<T> {
-    sin: T,
-    cos: T,
+pub(super) struct Shape<T> {
+    /// σ.
+    pub(super) sign: T,
+    /// Arms as drawn, of the parent and of the body [m].
+    pub(super) arms: [Pair<T>; 2],
+    /// Cosine and sine of the drawn angle of the joint's x axis.
+    pub(super) axis: Pair<T>,
+    /// Q over (g, p) as (gg, gp, pp).
+    pub(super) second: Triple<T>,
 }
 
-impl<T: Number> Half<T> {
-    #[inline(always)]
-    fn new(theta: T) -> Self {
-        let (sin, cos) = (theta * 0.5).sin_cos();
-        Self { sin, cos }
-    }
+/// How a body is turned, and turns.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Turned<T> {
+    /// Sine and cosine of half its rotation.
+    pub(super) half: Pair<T>,
+    /// Rate [rad/s].
+    pub(super) spin: T,
+    /// Rate of that [rad/s²].
+    pub(super) spin_rate: T,
+}
 
+impl<T: Number> Turned<T> {
     /// (R − 1)·v without cancellation.
     #[inline(always)]
-    fn swing(&self, v: Pair<f64>) -> Pair<T> {
-        let (less, whole) = (self.sin * self.sin * -2.0, self.sin * self.cos * 2.0);
+    fn swing(&self, v: Pair<T>) -> Pair<T> {
+        let [sin, cos] = self.half;
+        let (less, whole) = (sin * sin * -2.0, sin * cos * 2.0);
         [less * v[0] - whole * v[1], whole * v[0] + less * v[1]]
     }
 }
 
-/// A body on the way.
-#[derive(Debug, Clone, Copy)]
-struct Place<T> {
-    half: Half<T>,
-    at: Triple<T>,
-    rate: Triple<T>,
-    acceleration: Triple<T>,
-}
-
-impl<T: Number> Place<T> {
-    fn ground() -> Self {
-        let none = [T::ZERO; 3];
-        let half = Half { sin: T::ZERO, cos: T::constant(1.0) };
-        Self { half, at: none, rate: none, acceleration: none }
-    }
-}
-
-/// Where the bodies are, with the maps that their motion goes through. One entry for each body.
-#[derive(Debug, Clone)]
-pub struct Placed<T> {
-    places: Vec<Place<T>>,
-    /// Maps of the configuration.
-    pub(crate) maps: Vec<Map<T>>,
-    /// Sums of wrenches on the way to the root.
-    pub(super) sums: Vec<Triple<T>>,
-}
-
-/// What of a motion is to be placed.
-pub(super) struct Coordinates<F, G, H> {
-    /// Coordinates of body j.
-    pub(super) at: F,
+/// Coordinates, rates and accelerations of a joint.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Given<T> {
+    /// Coordinates.
+    pub q: Triple<T>,
     /// Their rates.
-    pub(super) rate: G,
+    pub v: Triple<T>,
     /// Their accelerations.
-    pub(super) acceleration: H,
+    pub z: Triple<T>,
 }
 
+/// A body less its parent, in x and y.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Hung<T> {
+    pub(super) map: Map<T>,
+    /// Displacement, rate and acceleration.
+    pub(super) beyond: [Pair<T>; 3],
+}
+
+/// A body with rotation `own` on a parent with rotation `parent`.
 #[inline(always)]
-pub(super) fn triple(x: &Pose) -> Triple<f64> {
-    [x.x, x.y, x.z]
-}
-
-impl<T: Number> Placed<T> {
-    /// Storage for a tree.
-    pub fn new(tree: &Tree) -> Self {
-        let count = tree.links.len();
-        Self { places: vec![Place::ground(); count], maps: vec![Map::REST; count], sums: Vec::with_capacity(count) }
-    }
-
-    /// Places every body. `MOVING`: with rates and accelerations.
-    #[inline(always)]
-    pub(super) fn place<const MOVING: bool>(
-        &mut self,
-        tree: &Tree,
-        given: &Coordinates<impl Fn(usize) -> Triple<T>, impl Fn(usize) -> Triple<T>, impl Fn(usize) -> Triple<T>>,
-    ) {
-        let ground = Place::ground();
-        for (j, link) in tree.links.iter().enumerate().rev() {
-            let parent = match link.parent {
-                Parent::Body(p) => &self.places[p as usize],
-                Parent::Ground => &ground,
-                Parent::Free => {
-                    let at = (given.at)(j);
-                    let place = &mut self.places[j];
-                    (place.half, place.at) = (Half::new(at[2]), at);
-                    if MOVING {
-                        (place.rate, place.acceleration) = ((given.rate)(j), (given.acceleration)(j));
-                    }
-                    let one = T::constant(1.0);
-                    self.maps[j].columns = [[one, T::ZERO], [T::ZERO, one], [T::ZERO; 2]];
-                    continue;
-                }
-            };
-            let (place, map) = hung::<T, MOVING>(link, parent, j, given);
-            self.places[j] = place;
-            self.maps[j] = map;
-        }
-    }
-
-    /// Pose of body `j`.
-    #[inline(always)]
-    pub(super) fn at(&self, j: usize) -> &Triple<T> {
-        &self.places[j].at
-    }
-
-    /// Rate of body `j`.
-    #[inline(always)]
-    pub(super) fn rate(&self, j: usize) -> &Triple<T> {
-        &self.places[j].rate
-    }
-
-    /// Acceleration of body `j`.
-    #[inline(always)]
-    pub(super) fn acceleration(&self, j: usize) -> &Triple<T> {
-        &self.places[j].acceleration
-    }
-}
-
-#[inline(always)]
-fn hung<T: Number, const MOVING: bool>(
-    link: &Link,
-    parent: &Place<T>,
-    j: usize,
-    given: &Coordinates<impl Fn(usize) -> Triple<T>, impl Fn(usize) -> Triple<T>, impl Fn(usize) -> Triple<T>>,
-) -> (Place<T>, Map<T>) {
-    let s = link.sign;
-    let [stretch, g, p] = (given.at)(j);
-    let theta = parent.at[2] + p * s;
-    let half = Half::new(theta);
-    let (swing_parent, swing) =
-        (parent.half.swing([link.arm_parent.x, link.arm_parent.y]), half.swing([link.arm.x, link.arm.y]));
+pub(super) fn hang<T: Number>(shape: &Shape<T>, parent: &Turned<T>, own: &Turned<T>, at: &Given<T>) -> Hung<T> {
+    let s = shape.sign;
+    let ([stretch, g, p], [arm_parent, arm]) = (at.q, shape.arms);
+    let (swing_parent, swing) = (parent.swing(arm_parent), own.swing(arm));
     // the frame turns with the mean of both
-    let cos = half.cos * parent.half.cos - half.sin * parent.half.sin;
-    let sin = half.sin * parent.half.cos + half.cos * parent.half.sin;
-    let e1 = [cos * link.axis.x - sin * link.axis.y, sin * link.axis.x + cos * link.axis.y];
+    let ([sin_m, cos_m], [sin_c, cos_c]) = (parent.half, own.half);
+    let cos = cos_c * cos_m - sin_c * sin_m;
+    let sin = sin_c * cos_m + cos_c * sin_m;
+    let e1 = [cos * shape.axis[0] - sin * shape.axis[1], sin * shape.axis[0] + cos * shape.axis[1]];
     let e2 = turn(e1);
-    let [gg, gp, pp] = link.second;
+    let [gg, gp, pp] = shape.second;
     let bent = [g * gg + p * gp, g * gp + p * pp];
     let u = stretch - (bent[0] * g + bent[1] * p);
     let d = [e1[0] * u + e2[0] * g, e1[1] * u + e2[1] * g];
     let t = turn(d);
-    let r_parent = [swing_parent[0] + T::constant(link.arm_parent.x), swing_parent[1] + T::constant(link.arm_parent.y)];
-    let r = [swing[0] + T::constant(link.arm.x), swing[1] + T::constant(link.arm.y)];
+    let r_parent = [swing_parent[0] + arm_parent[0], swing_parent[1] + arm_parent[1]];
+    let r = [swing[0] + arm[0], swing[1] + arm[1]];
     let tr = turn(r);
-    let each = |f: &dyn Fn(usize) -> T| [f(0), f(1)];
-    let lever = turn(each(&|i| r_parent[i] - r[i] + d[i] * s));
-    let columns = [
-        each(&|i| e1[i] * s),
-        each(&|i| (e2[i] - bent[0] * e1[i] * 2.0) * s),
-        each(&|i| t[i] * 0.5 - (tr[i] + bent[1] * e1[i] * 2.0) * s),
-    ];
-    let map = Map { lever, columns };
-    let along = |i: usize| parent.at[i] + (swing_parent[i] - swing[i] + d[i] * s);
-    let mut place = Place { half, at: [along(0), along(1), theta], rate: [T::ZERO; 3], acceleration: [T::ZERO; 3] };
-    if MOVING {
-        let (v, z) = ((given.rate)(j), (given.acceleration)(j));
-        place.rate = map.apply(s, &parent.rate, &v);
-        let (spin_parent, spin) = (parent.rate[2], place.rate[2]);
-        let frame = (spin_parent + spin) * 0.5;
-        let rate_u = v[0] - (bent[0] * v[1] + bent[1] * v[2]) * 2.0;
-        let curl = (v[1] * v[1] * gg + v[1] * v[2] * (2.0 * gp) + v[2] * v[2] * pp) * 2.0;
-        let (mixed_2, mixed_1) = (frame * rate_u * 2.0, frame * v[1] * 2.0 + curl);
-        let (squared_parent, squared, squared_frame) = (spin_parent * spin_parent, spin * spin, frame * frame);
-        place.acceleration = map.apply(s, &parent.acceleration, &z);
-        for i in 0..2 {
-            let joint = (mixed_2 * e2[i] - mixed_1 * e1[i] - squared_frame * d[i]) * s;
-            place.acceleration[i] += squared * r[i] - squared_parent * r_parent[i] + joint;
-        }
+    let lever = turn([r_parent[0] - r[0] + d[0] * s, r_parent[1] - r[1] + d[1] * s]);
+    let mut columns = [e1, e2, t];
+    let mut displaced = swing;
+    for i in 0..2 {
+        columns[0][i] = e1[i] * s;
+        columns[1][i] = (e2[i] - bent[0] * e1[i] * 2.0) * s;
+        columns[2][i] = t[i] * 0.5 - (tr[i] + bent[1] * e1[i] * 2.0) * s;
+        displaced[i] = swing_parent[i] - swing[i] + d[i] * s;
     }
-    (place, map)
+    let map = Map { lever, columns };
+    let (v, rate) = (at.v, map.along(parent.spin, &at.v));
+    let frame = (parent.spin + own.spin) * 0.5;
+    let rate_u = v[0] - (bent[0] * v[1] + bent[1] * v[2]) * 2.0;
+    let curl = (v[1] * v[1] * gg + v[1] * v[2] * gp * 2.0 + v[2] * v[2] * pp) * 2.0;
+    let (mixed_2, mixed_1) = (frame * rate_u * 2.0, frame * v[1] * 2.0 + curl);
+    let (squared_parent, squared, squared_frame) = (parent.spin * parent.spin, own.spin * own.spin, frame * frame);
+    let mut acceleration = map.along(parent.spin_rate, &at.z);
+    for i in 0..2 {
+        let joint = (mixed_2 * e2[i] - mixed_1 * e1[i] - squared_frame * d[i]) * s;
+        acceleration[i] += squared * r[i] - squared_parent * r_parent[i] + joint;
+    }
+    Hung { map, beyond: [displaced, rate, acceleration] }
 }

@@ -8,19 +8,27 @@
 //! | file | what it holds |
 //! |---|---|
 //! | [`tree`] | which body hangs on which, directions that move; closures |
-//! | [`number`] | `f64`, or a value with its derivative |
-//! | [`kinematics`] | poses, rates and accelerations, root → leaf, and the maps of motion |
-//! | `products` | products with those maps |
+//! | [`kinematics`] | how a body hangs on its parent, and the maps of motion |
+//! | [`placed`] | poses, rates and accelerations, root → leaf, eight bodies side by side |
+//! | [`number`] | a value with its derivative |
+//! | [`changes`] | the change of where bodies are, over those |
+//! | [`columns`] | blocks and vectors in registers |
 //! | [`dynamics`] | forces over the coordinates, leaf → root; coordinates of a pose |
+//! | [`loops`] | forces of the joints that close loops |
 //! | [`geometric`] | the stiffness that a force brings |
 //! | [`factor`] | factorization of a symmetric form over the coordinates, leaf → root |
+//! | [`solve`] | solves with its factors |
 
+pub mod changes;
+pub mod columns;
 pub mod dynamics;
 pub mod factor;
 pub mod geometric;
 pub mod kinematics;
+pub mod loops;
 pub mod number;
-mod products;
+pub mod placed;
+pub mod solve;
 pub mod tree;
 
 pub use factor::JointMatrix;

@@ -1,39 +1,8 @@
-//! Numbers that the kinematics run over: `f64`, or a value with its derivative, for the exact change of everything with one
-//! parameter.
+//! A value with its derivative: a number that the kinematics run over, for the exact change of everything with one parameter.
 
-use crate::multibody::sine::sin_cos;
-use std::ops::{Add, AddAssign, Mul, Neg, Sub};
-
-/// What the kinematics need of a number.
-pub trait Number:
-    Copy
-    + std::fmt::Debug
-    + Add<Output = Self>
-    + Sub<Output = Self>
-    + Mul<Output = Self>
-    + Mul<f64, Output = Self>
-    + Neg<Output = Self>
-    + AddAssign
-{
-    /// 0.
-    const ZERO: Self;
-    /// A constant.
-    fn constant(x: f64) -> Self;
-    /// Sine and cosine.
-    fn sin_cos(self) -> (Self, Self);
-}
-
-impl Number for f64 {
-    const ZERO: Self = 0.0;
-    #[inline(always)]
-    fn constant(x: f64) -> Self {
-        x
-    }
-    #[inline(always)]
-    fn sin_cos(self) -> (Self, Self) {
-        sin_cos(self)
-    }
-}
+use crate::multibody::lanes::Number;
+use crate::multibody::sine;
+use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 /// A value and its derivative with respect to one parameter.
 ///
@@ -94,15 +63,51 @@ impl AddAssign for Dual {
     }
 }
 
-impl Number for Dual {
-    const ZERO: Self = Self { value: 0.0, change: 0.0 };
+impl SubAssign for Dual {
     #[inline(always)]
-    fn constant(x: f64) -> Self {
+    fn sub_assign(&mut self, o: Self) {
+        *self = *self - o;
+    }
+}
+
+impl Div for Dual {
+    type Output = Self;
+    #[inline(always)]
+    fn div(self, o: Self) -> Self {
+        let value = self.value / o.value;
+        Self { value, change: (self.change - value * o.change) / o.value }
+    }
+}
+
+impl Add<f64> for Dual {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, o: f64) -> Self {
+        Self { value: self.value + o, change: self.change }
+    }
+}
+
+impl Number for Dual {
+    #[inline(always)]
+    fn like(self, x: f64) -> Self {
+        Self::constant(x)
+    }
+}
+
+impl Dual {
+    /// 0.
+    pub const ZERO: Self = Self::constant(0.0);
+
+    /// A constant.
+    #[inline(always)]
+    pub const fn constant(x: f64) -> Self {
         Self { value: x, change: 0.0 }
     }
+
+    /// Sine and cosine.
     #[inline(always)]
-    fn sin_cos(self) -> (Self, Self) {
-        let (s, c) = sin_cos(self.value);
+    pub fn sin_cos(self) -> (Self, Self) {
+        let (s, c) = sine::sin_cos(self.value);
         (Self { value: s, change: c * self.change }, Self { value: c, change: -s * self.change })
     }
 }

@@ -10,6 +10,8 @@
 //! Coordinates are the strains of the joints, (e_u, g, p) of [`planar`](crate::multibody::planar), in one slot of three for
 //! each body; a locked direction keeps its slot, with the value 0. The slot of a root holds its displacement and rotation.
 
+use super::kinematics::Shape;
+use crate::multibody::lanes::{Eight, LANES};
 use crate::multibody::planar::{Block, JointFrame, Pose, Symmetric};
 use crate::multibody::section::LaidJoint;
 use crate::multibody::{BodyId, Joint, Model, Pattern};
@@ -68,6 +70,21 @@ pub struct Tree {
     pub pattern: Pattern,
     /// Coordinates n.
     pub coordinates: usize,
+    /// What each body hangs on, once more, close together for whoever goes along the tree.
+    pub(super) upward: Vec<Upward>,
+    /// The tree's joints, eight side by side: what does not move, and springs as (uu, ug, up, gg, gp, pp).
+    pub(super) shapes: Vec<Shape<Eight>>,
+    pub(super) springs: Vec<[Eight; 6]>,
+    /// Bodies whose joints have rest offsets, and those of them that are heated.
+    pub(super) offset: Vec<u32>,
+    pub(crate) heated: Vec<u32>,
+}
+
+/// What a body hangs on, and the sign of the joint.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Upward {
+    pub(super) parent: Parent,
+    pub(super) sign: f64,
 }
 
 /// Why a model has no tree whose loops close by springs.
@@ -163,8 +180,44 @@ impl Tree {
         }
         let left = model.joints.iter().zip(&in_tree).filter(|(_, in_tree)| !**in_tree);
         let closures = left.map(|(joint, _)| *joint).collect();
-        let coordinates = links.iter().map(Link::freedom).sum();
-        Self { links, closures, pattern: Pattern::clone(&model.pattern), coordinates }
+        Self::laid(links, closures, Pattern::clone(&model.pattern))
+    }
+
+    fn laid(links: Vec<Link>, closures: Vec<LaidJoint>, pattern: Pattern) -> Self {
+        let upward = links.iter().map(|link| Upward { parent: link.parent, sign: link.sign }).collect();
+        let which = |is: fn(&Link) -> bool| (0..links.len()).filter(|&j| is(&links[j])).map(|j| j as u32).collect();
+        let tiles = || links.chunks(LANES);
+        Self {
+            coordinates: links.iter().map(Link::freedom).sum(),
+            upward,
+            shapes: tiles().map(shapes).collect(),
+            springs: tiles().map(|links| [0, 1, 2, 3, 4, 5].map(|i| lanes(links, |l| l.stiffness.0[i]))).collect(),
+            offset: which(|link| link.rest != 0.0 || link.expansion.is_some()),
+            heated: which(|link| link.expansion.is_some()),
+            links,
+            closures,
+            pattern,
+        }
+    }
+}
+
+/// A number of each link.
+fn lanes(links: &[Link], of: impl Fn(&Link) -> f64) -> Eight {
+    let mut lanes = Eight::NONE;
+    for (lane, link) in lanes.0.iter_mut().zip(links) {
+        *lane = of(link);
+    }
+    lanes
+}
+
+/// What does not move of the joints of up to eight links.
+fn shapes(links: &[Link]) -> Shape<Eight> {
+    let pair = |of: fn(&Link) -> Vector2<f64>| [lanes(links, |l| of(l).x), lanes(links, |l| of(l).y)];
+    Shape {
+        sign: lanes(links, |l| l.sign),
+        arms: [pair(|l| l.arm_parent), pair(|l| l.arm)],
+        axis: pair(|l| l.axis),
+        second: [0, 1, 2].map(|i| lanes(links, |l| l.second[i])),
     }
 }
 

@@ -28,10 +28,12 @@ use crate::equations::{Bodies, Joints};
 use crate::multibody::forces;
 use crate::multibody::planar::Pose;
 use crate::multibody::relative::JointMatrix;
+use crate::multibody::relative::columns::Four;
+use crate::multibody::relative::dynamics::Stresses;
 use crate::multibody::relative::geometric::{self, Geometric};
-use crate::multibody::relative::kinematics::Placed;
+use crate::multibody::relative::placed::{Placed, place_of};
 use ports::Ports;
-use stages::{STILL, Stages};
+use stages::Stages;
 use std::sync::Arc;
 
 /// Share of the shortest time at which accelerations are made consistent: directions without inertia follow their springs,
@@ -42,8 +44,9 @@ const CONSISTENT: f64 = 1e-3;
 #[derive(Debug, Clone)]
 pub struct JointRodas4 {
     joints: Arc<Joints>,
-    w: JointMatrix<f64>,
-    placed: Placed<f64>,
+    w: JointMatrix,
+    placed: Placed,
+    stresses: Stresses,
     geometric: Vec<Geometric>,
     /// Coordinates and rates, and accelerations (with nothing beside them); then the same of each sensitivity.
     carried: Vec<Motion>,
@@ -51,15 +54,13 @@ pub struct JointRodas4 {
     ports: Ports,
     /// ∂(bodies' motion)/∂(final voltage of a source), one for each source given to [`JointRodas4::new`].
     pub sensitivity: Vec<Motion>,
-    poses: Vec<Pose>,
     force: Vec<Pose>,
-    share: Vec<Pose>,
-    wrench: Vec<Pose>,
+    /// Right side of a stage over the coordinates, and over the bodies' motions; then what the solve has found.
+    right: Vec<Four>,
+    wrench: Vec<Four>,
     forcing: Vec<Pose>,
     drive: Drive,
     rate: Drive,
-    /// Something drags on bodies or between them.
-    drags: bool,
     /// The bodies have been placed at the argument of the stages.
     is_placed: bool,
     /// Accelerations are those of the motion to come.
@@ -73,26 +74,25 @@ impl JointRodas4 {
     /// Storage for a tree, with sensitivities to the final voltages of `sources`; `shortest` is about the shortest time in
     /// which something moves [s].
     pub fn new(joints: Arc<Joints>, shortest: f64, sources: &[usize]) -> Self {
-        let Joints { tree, closures } = &*joints;
+        let Joints { tree, closures, .. } = &*joints;
         let count = tree.links.len();
         let zeros = vec![Pose::zeros(); count];
-        let (electrics, model) = (&closures.electrics, &closures.model);
+        let electrics = &closures.electrics;
         Self {
             w: JointMatrix::new(tree),
             placed: Placed::new(tree),
+            stresses: Stresses::new(tree),
             geometric: vec![Geometric::ZERO; count],
             carried: vec![Motion::zeros(count); 2 + 2 * sources.len()],
             stages: Stages::new(count),
             ports: Ports::new(&joints, sources),
             sensitivity: vec![Motion::zeros(count); sources.len()],
-            poses: zeros.clone(),
             force: zeros.clone(),
-            share: zeros.clone(),
-            wrench: zeros.clone(),
+            right: vec![Four::ZERO; count],
+            wrench: vec![Four::ZERO; count + 1],
             forcing: zeros,
             drive: electrics.drive(),
             rate: electrics.drive(),
-            drags: model.bodies.iter().any(|b| b.drag.amount != 0.0) || !model.dampers.is_empty(),
             is_placed: false,
             resumed: false,
             shortest,
@@ -119,25 +119,24 @@ impl JointRodas4 {
         self.carried[2..].iter_mut().chain(&mut self.sensitivity).for_each(Motion::clear);
     }
 
-    /// Places the bodies at the argument of the stage at hand, unless that is where they are, and puts R into `share`. The
+    /// Places the bodies at the argument of the stage at hand, unless that is where they are, and puts −R into `right`. The
     /// first stage also begins W.
     fn residual(&mut self, first: bool, stays: bool) {
-        let Self { joints, w, placed, is_placed, stages, ports, poses, force, share, drive, .. } = self;
-        let Joints { tree, closures } = &**joints;
+        let Self { joints, w, placed, stresses, is_placed, stages, ports, force, right, drive, .. } = self;
+        let Joints { tree, closures, loops, inertias, .. } = &**joints;
         let model = &closures.model;
-        let argument = &stages.argument;
         if !(stays && *is_placed) {
-            placed.place_at(tree, |j| &argument[j].q, |j| &argument[j].v, |j| &argument[j].z);
+            placed.place(tree, &stages.argument);
             *is_placed = true;
         }
-        for (j, (poses, force)) in poses.iter_mut().zip(force.iter_mut()).enumerate() {
-            *poses = placed.pose(j);
-            let body = &model.bodies[j];
-            *force = body.mass_diagonal().component_mul(&placed.pushed(j)) + body.drag.force(&placed.speed(j));
+        let moving = placed.acceleration.iter().zip(&placed.rate);
+        for ((force, inertia), (push, speed)) in force.iter_mut().zip(inertias).zip(moving) {
+            *force = inertia.force(push, speed);
         }
         if !model.dampers.is_empty() {
-            forces::add_dampers(model, |k| placed.speed(k), force);
+            forces::add_dampers(model, |k| placed.rate[k], force);
         }
+        let poses = placed.at.as_slice();
         if first {
             closures.add_tangent(poses, drive, &mut w.bodies, force);
             if !ports.is_empty() {
@@ -145,54 +144,57 @@ impl JointRodas4 {
                 ports.tangent.below.copy_from_slice(&w.bodies.below);
             }
         } else if ports.is_empty() {
-            closures.add_residual(poses, drive, force);
+            loops.add_forces(placed, &drive.rest(), force);
+            forces::add_couplings(model, poses, force);
+            closures.add_body_forces(poses, drive, force);
+            model.project(force);
         } else {
             closures.add_tangent(poses, drive, &mut ports.tangent, force);
         }
         if !ports.is_empty() {
             ports.force.copy_from_slice(force);
         }
-        placed.gather(tree, force, share);
-        let rest = drive.rest();
-        for ((share, link), argument) in share.iter_mut().zip(&tree.links).zip(argument) {
-            *share += link.stress(&argument.q, &rest);
-        }
+        stresses.fill(tree, &stages.argument, &drive.rest());
+        placed.resist(tree, stresses, force, right);
         self.work.forces += 1;
     }
 
     fn factor(&mut self, gh: f64) -> Result<(), StepFailure> {
         let Self { joints, w, placed, geometric, stages, force, .. } = self;
         forces::add_inertia(&joints.closures.model, 1.0 / (gh * gh), 1.0 / gh, &mut w.bodies);
-        geometric::fill(&joints.tree, placed, |j| &stages.argument[j].q, force, geometric);
-        w.factor(&joints.tree, &placed.maps, 1.0, Some(geometric), Err)?;
+        let at = |j: usize| {
+            let (tile, lane) = place_of(j);
+            stages.argument[tile].of(lane)[0]
+        };
+        geometric::fill(&joints.tree, placed, at, force, geometric);
+        w.factor(&joints.tree, placed, 1.0, Some(geometric))?;
         self.work.factorizations += 1;
         Ok(())
     }
 
-    /// Completes the right side of stage `i` of a step of length `h` [s]: `share` holds R and becomes the joints' part,
-    /// `wrench` the bodies'.
+    /// Completes the right side of stage `i` of a step of length `h` [s]: `right` holds −R.
     fn inertia(&mut self, i: usize, h: f64) {
         let rate = GAMMA_I[i] * h;
-        let Self { joints, stages, wrench, forcing, share, drags, .. } = self;
-        let Joints { tree, closures } = &**joints;
-        let model = &closures.model;
+        let Self { joints, stages, right, wrench, forcing, force, .. } = self;
+        let Joints { tree, closures, inertias, drags, .. } = &**joints;
         stages.move_bodies(i, h, *drags);
-        for (j, body) in model.bodies.iter().enumerate() {
-            wrench[j] = body.mass_diagonal().component_mul(&stages.push[j]) - forcing[j] * rate;
-            if *drags {
-                wrench[j] += body.drag.force(&stages.drift[j]);
+        for ((j, inertia), (wrench, forcing)) in inertias.iter().enumerate().zip(wrench.iter_mut().zip(forcing)) {
+            *wrench = Four::from(inertia.force(&stages.push(j), &stages.drift(j)) - *forcing * rate);
+        }
+        if !closures.model.dampers.is_empty() {
+            force.fill(Pose::zeros());
+            forces::add_dampers(&closures.model, |k| stages.drift(k), force);
+            for (wrench, force) in wrench.iter_mut().zip(force) {
+                *wrench = Four::from(wrench.pose() + *force);
             }
         }
-        if !model.dampers.is_empty() {
-            forces::add_dampers(model, |k| stages.drift[k], wrench);
-        }
+        // ∂R/∂t of a heated joint is −K·ė₀
         let rest = self.rate.rest();
-        for (share, link) in share.iter_mut().zip(&tree.links) {
-            *share = -*share;
-            // ∂R/∂t of a heated joint is −K·ė₀
-            if link.expansion.is_some() {
-                *share += link.stiffness.column(0) * (rate * link.offset(&rest));
-            }
+        for &j in &tree.heated {
+            let link = &tree.links[j as usize];
+            let more = link.stiffness.column(0) * (rate * link.offset(&rest));
+            let right = &mut right[j as usize];
+            *right = Four::from(right.pose() + more);
         }
     }
 }
@@ -211,20 +213,16 @@ impl Method<Bodies<'_>> for JointRodas4 {
         let now = &mut self.carried[0];
         self.joints.tree.coordinates_at(&motion.q, &mut now.q);
         self.joints.tree.rates_at(&motion.q, &motion.v, &mut now.v);
-        for ((argument, q), v) in self.stages.argument.iter_mut().zip(&now.q).zip(&now.v) {
-            *argument = STILL;
-            (argument.q, argument.v) = (*q, *v);
-        }
+        self.carried[1].clear();
+        self.stages.begin_first(&self.carried[0], &self.carried[1]);
         self.residual(true, false);
         let gh = CONSISTENT * self.shortest;
         self.factor(gh)?;
-        let z = &mut self.carried[1].q;
-        for (x, r) in z.iter_mut().zip(&self.share) {
-            *x = -r;
+        self.wrench.fill(Four::ZERO);
+        self.w.solve(&mut self.wrench, &mut self.right);
+        for (z, x) in self.carried[1].q.iter_mut().zip(&self.right) {
+            *z = x.pose() / (gh * gh);
         }
-        self.wrench.fill(Pose::zeros());
-        self.w.solve(&self.joints.tree, &mut self.wrench, z);
-        z.iter_mut().for_each(|z| *z /= gh * gh);
         self.work.solves += 1;
         Ok(())
     }
@@ -251,14 +249,14 @@ impl Method<Bodies<'_>> for JointRodas4 {
             if i == 0 {
                 self.factor(gh)?;
                 self.stages.set_out(&self.joints.tree, &self.w, &self.carried[0], &self.carried[1]);
-                self.joints.closures.drive_force(&self.poses, &self.drive, &self.rate, &mut self.forcing);
-                self.ports.begin(&self.joints, ramp, s, &self.poses, (&self.drive, &self.rate));
+                self.joints.closures.drive_force(&self.placed.at, &self.drive, &self.rate, &mut self.forcing);
+                self.ports.begin(&self.joints, ramp, s, &self.placed.at, (&self.drive, &self.rate));
             }
             self.inertia(i, h);
-            self.w.solve(&self.joints.tree, &mut self.wrench, &mut self.share);
-            let stage = (&self.stages, self.poses.as_slice(), &self.drive);
+            self.w.solve(&mut self.wrench, &mut self.right);
+            let stage = (&self.stages, self.placed.at.as_slice(), &self.drive);
             let solves = self.ports.stage(&self.joints, ramp, (i, at, h, rate), stage, &self.w, &self.carried[2..]);
-            self.stages.keep(i, &self.share, &self.wrench);
+            self.stages.keep(i, &self.right, &self.wrench);
             self.work.solves += 1 + solves;
         }
         // stiffly accurate: the last argument plus its increment is the new value, the increment the error
@@ -266,10 +264,10 @@ impl Method<Bodies<'_>> for JointRodas4 {
         let (own, sensitivities) = self.carried.split_at_mut(2);
         if let [now, push] = own {
             self.stages.finish(h, now, push);
-            self.placed.move_on(&self.joints.tree, &now.q, &now.v, &push.q);
         }
-        self.placed.poses(&mut motion.q);
-        self.placed.rates(&mut motion.v);
+        self.placed.place(&self.joints.tree, &self.stages.argument);
+        motion.q.copy_from_slice(&self.placed.at);
+        motion.v.copy_from_slice(&self.placed.rate);
         self.ports.finish(&self.joints.tree, h, &self.stages, sensitivities, &mut self.sensitivity);
         Ok(())
     }

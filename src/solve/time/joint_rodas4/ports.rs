@@ -7,8 +7,9 @@ use super::stages::Stages;
 use crate::domains::{Drive, Ramp};
 use crate::equations::Joints;
 use crate::multibody::planar::Pose;
-use crate::multibody::relative::kinematics::Placed;
-use crate::multibody::relative::number::Dual;
+use crate::multibody::relative::changes::Changes;
+use crate::multibody::relative::columns::Four;
+use crate::multibody::relative::placed::place_of;
 use crate::multibody::relative::{JointMatrix, Tree};
 use crate::multibody::{BlockMatrix, Pattern, forces};
 use crate::solve::time::method::Motion;
@@ -24,15 +25,18 @@ pub(super) struct Ports {
     pub(super) force: Vec<Pose>,
     /// Change of ∂R/∂t with each voltage: bodies, then joints.
     forcing: Vec<(Vec<Pose>, Vec<Pose>)>,
-    placed: Placed<Dual>,
+    changes: Changes,
     share: Vec<Pose>,
     wrench: Vec<Pose>,
+    /// Right sides and what the solve has found, over the coordinates and the bodies' motions.
+    right: Vec<Four>,
+    moved: Vec<Four>,
     change: Drive,
 }
 
 impl Ports {
     pub(super) fn new(joints: &Joints, sources: &[usize]) -> Self {
-        let Joints { tree, closures } = joints;
+        let Joints { tree, closures, .. } = joints;
         let count = tree.links.len();
         let zeros = vec![Pose::zeros(); count];
         let nothing = Pattern::new(0, &[]);
@@ -43,9 +47,11 @@ impl Ports {
             tangent: BlockMatrix::new(if sources.is_empty() { &nothing } else { pattern }),
             force: zeros.clone(),
             forcing: sources.iter().map(|_| (zeros.clone(), zeros.clone())).collect(),
-            placed: Placed::new(tree),
+            changes: Changes::new(tree),
             share: zeros.clone(),
             wrench: zeros,
+            right: vec![Four::ZERO; count],
+            moved: vec![Four::ZERO; count + 1],
             change: closures.electrics.drive(),
         }
     }
@@ -64,7 +70,7 @@ impl Ports {
         poses: &[Pose],
         (drive, rate): (&Drive, &Drive),
     ) {
-        let Joints { tree, closures } = joints;
+        let Joints { tree, closures, .. } = joints;
         for ((bodies, springs), &source) in self.forcing.iter_mut().zip(&self.sources) {
             ramp.rate_sensitivity(s, source, &mut self.change);
             closures.drive_force(poses, drive, &self.change, bodies);
@@ -88,10 +94,10 @@ impl Ports {
         ramp: &Ramp<'_>,
         (i, s, h, rate): (usize, f64, f64, f64),
         (at, poses, drive): (&Stages, &[Pose], &Drive),
-        w: &JointMatrix<f64>,
+        w: &JointMatrix,
         start: &[Motion],
     ) -> u64 {
-        let Joints { tree, closures } = joints;
+        let Joints { tree, closures, .. } = joints;
         let model = &closures.model;
         for (p, &source) in self.sources.iter().enumerate() {
             let stages = &mut self.stages[p];
@@ -100,45 +106,44 @@ impl Ports {
             }
             stages.begin(i, h, &start[2 * p], &start[2 * p + 1]);
             let own = &stages.argument;
-            self.placed.place_with(
-                tree,
-                |j| (&at.argument[j].q, &own[j].q),
-                |j| (&at.argument[j].v, &own[j].v),
-                |j| (&at.argument[j].z, &own[j].z),
-            );
+            self.changes.place(tree, &at.argument, own);
             // change of the wrenches
             for (j, (wrench, poses)) in self.wrench.iter_mut().zip(&mut self.share).enumerate() {
                 let body = &model.bodies[j];
-                let (place, speed, push) = self.placed.changes(j);
+                let [place, speed, push] = self.changes.of(j);
                 *wrench = body.mass_diagonal().component_mul(&push) + body.drag.force(&speed);
                 *poses = place;
             }
             if !model.dampers.is_empty() {
-                forces::add_dampers(model, |k| self.placed.changes(k).1, &mut self.wrench);
+                forces::add_dampers(model, |k| self.changes.of(k)[1], &mut self.wrench);
             }
             self.tangent.multiply_add(&model.pattern, &self.share, &mut self.wrench);
             ramp.sensitivity(s, source, &mut self.change);
             closures.add_drive_force(poses, drive, &self.change, &mut self.wrench);
-            self.placed.gather_changes(tree, &self.force, &self.wrench, &mut self.share);
+            self.changes.gather(tree, &self.force, &self.wrench, &mut self.share);
             let rest = self.change.rest();
             let (forcing, springs) = &self.forcing[p];
             for (j, (share, link)) in self.share.iter_mut().zip(&tree.links).enumerate() {
-                let mut strain = own[j].q;
+                let (tile, lane) = place_of(j);
+                let [mut strain, ..] = own[tile].of(lane);
                 strain.x -= link.offset(&rest);
                 *share = -(*share + link.stiffness * strain) - springs[j] * rate;
             }
             // inertia and damping at the start of the step
             stages.move_bodies(i, h, true);
             for (j, body) in model.bodies.iter().enumerate() {
-                self.wrench[j] = body.mass_diagonal().component_mul(&stages.push[j])
-                    + body.drag.force(&stages.drift[j])
+                self.wrench[j] = body.mass_diagonal().component_mul(&stages.push(j))
+                    + body.drag.force(&stages.drift(j))
                     - forcing[j] * rate;
             }
             if !model.dampers.is_empty() {
-                forces::add_dampers(model, |k| stages.drift[k], &mut self.wrench);
+                forces::add_dampers(model, |k| stages.drift(k), &mut self.wrench);
             }
-            w.solve(tree, &mut self.wrench, &mut self.share);
-            stages.keep(i, &self.share, &self.wrench);
+            for (to, from) in self.right.iter_mut().zip(&self.share).chain(self.moved.iter_mut().zip(&self.wrench)) {
+                *to = Four::from(*from);
+            }
+            w.solve(&mut self.moved, &mut self.right);
+            stages.keep(i, &self.right, &self.moved);
         }
         self.sources.len() as u64
     }
@@ -149,15 +154,9 @@ impl Ports {
         for ((stages, carried), bodies) in self.stages.iter_mut().zip(carried.chunks_exact_mut(2)).zip(bodies) {
             let [now, push] = carried else { continue };
             stages.finish(h, now, push);
-            let own = &stages.argument;
-            self.placed.place_with(
-                tree,
-                |j| (&at.argument[j].q, &own[j].q),
-                |j| (&at.argument[j].v, &own[j].v),
-                |j| (&at.argument[j].z, &own[j].z),
-            );
+            self.changes.place(tree, &at.argument, &stages.argument);
             for (j, (q, v)) in bodies.q.iter_mut().zip(&mut bodies.v).enumerate() {
-                (*q, *v, _) = self.placed.changes(j);
+                [*q, *v, _] = self.changes.of(j);
             }
         }
     }

@@ -1,183 +1,273 @@
 //! What the six stages keep of one motion in joint coordinates, or of its derivative: the increments of the coordinates, and
-//! the motions of the bodies that belong to each. Everything else is a sum of these, see [`super::tableau`].
+//! the motions of the bodies that belong to each. Everything else is a sum of these, see [`super::tableau`], taken for eight bodies
+//! side by side.
 
 use super::tableau::TABLEAU;
+use crate::multibody::lanes::{Kernel, LanePose, STILL, Wide, add_scaled, everywhere, load, store};
 use crate::multibody::planar::Pose;
+use crate::multibody::relative::columns::Four;
+use crate::multibody::relative::kinematics::Given;
+use crate::multibody::relative::placed::{Eights, place_of, tiles};
 use crate::multibody::relative::{JointMatrix, Tree};
 use crate::solve::time::method::Motion;
 use crate::solve::time::rodas4::tableau::{A, GAMMA};
 
-/// Coordinates, rates and accelerations of one body's joint, or their changes.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Change {
-    pub(super) q: Pose,
-    pub(super) v: Pose,
-    pub(super) z: Pose,
-}
-
-pub(super) const STILL: Change =
-    Change { q: Pose::new(0.0, 0.0, 0.0), v: Pose::new(0.0, 0.0, 0.0), z: Pose::new(0.0, 0.0, 0.0) };
-
-const NONE: Pose = Pose::new(0.0, 0.0, 0.0);
+/// Increments of eight bodies in the stages.
+type Increments = [LanePose; 6];
 
 /// See the module.
 #[derive(Debug, Clone)]
 pub(super) struct Stages {
-    /// Increments of the coordinates in the stages, body by body.
-    increments: Vec<[Pose; 6]>,
+    /// Increments of the coordinates.
+    increments: Vec<Increments>,
     /// Motions of the bodies with them.
-    moved: Vec<[Pose; 6]>,
+    moved: Vec<Increments>,
+    /// Coordinates, rates and accelerations at the start of the step.
+    start: Vec<Eights>,
     /// Motions of the bodies with the rates and the accelerations at the start of the step.
-    rate: Vec<Pose>,
-    acceleration: Vec<Pose>,
+    rate: Vec<LanePose>,
+    acceleration: Vec<LanePose>,
     /// Where the stage at hand takes the forces; after the last one the end of the step.
-    pub(super) argument: Vec<Change>,
+    pub(super) argument: Vec<Eights>,
     /// Motion of the bodies with r₁/(γh) + r₂: what inertia acts on.
-    pub(super) push: Vec<Pose>,
+    push: Vec<LanePose>,
     /// Motion of the bodies with r₁: what damping acts on, where it was asked for.
-    pub(super) drift: Vec<Pose>,
+    drift: Vec<LanePose>,
+    /// Room for motions of the bodies.
+    room: [Vec<Pose>; 2],
 }
+
+const LAST: usize = 5;
 
 impl Stages {
     pub(super) fn new(count: usize) -> Self {
-        let zeros = vec![NONE; count];
+        let (tiles, room) = (tiles(count), vec![Pose::zeros(); count]);
+        let zeros = vec![STILL; tiles];
         Self {
-            increments: vec![[NONE; 6]; count],
-            moved: vec![[NONE; 6]; count],
+            increments: vec![[STILL; 6]; tiles],
+            moved: vec![[STILL; 6]; tiles],
+            start: vec![Eights::STILL; tiles],
             rate: zeros.clone(),
             acceleration: zeros.clone(),
-            argument: vec![STILL; count],
+            argument: vec![Eights::STILL; tiles],
             push: zeros.clone(),
             drift: zeros,
+            room: [room.clone(), room],
         }
     }
 
     /// Begins a step whose matrix has been factored: how the bodies move with rates `now.v` and accelerations `push.q`.
-    pub(super) fn set_out(&mut self, tree: &Tree, w: &JointMatrix<f64>, now: &Motion, push: &Motion) {
-        w.both_motions(tree, (&now.v, &push.q), (&mut self.rate, &mut self.acceleration));
+    pub(super) fn set_out(&mut self, tree: &Tree, w: &JointMatrix, now: &Motion, push: &Motion) {
+        let [rate, acceleration] = &mut self.room;
+        w.both_motions(tree, (&now.v, &push.q), (rate, acceleration));
+        for (j, (rate, acceleration)) in rate.iter().zip(&*acceleration).enumerate() {
+            set(&mut self.rate, j, rate);
+            set(&mut self.acceleration, j, acceleration);
+        }
+    }
+
+    /// The argument becomes the motion with coordinates and rates `now` and accelerations `push.q`. Tells whether that is what it was.
+    pub(super) fn begin_first(&mut self, now: &Motion, push: &Motion) -> bool {
+        for (j, ((q, v), z)) in now.q.iter().zip(&now.v).zip(&push.q).enumerate() {
+            let (tile, lane) = place_of(j);
+            self.start[tile].set(lane, [q, v, z]);
+        }
+        let same = self.argument == self.start;
+        self.argument.copy_from_slice(&self.start);
+        same
     }
 
     /// Where stage `i` of a step of length `h` [s] from coordinates and rates `now` and accelerations `push.q` takes the
     /// forces. Tells whether that is where the step before ended.
     pub(super) fn begin(&mut self, i: usize, h: f64, now: &Motion, push: &Motion) -> bool {
-        match i {
-            0 => self.begin_first(now, push),
-            1 => self.begin_stage::<1>(h, now, push),
-            2 => self.begin_stage::<2>(h, now, push),
-            3 => self.begin_stage::<3>(h, now, push),
-            4 => self.begin_stage::<4>(h, now, push),
-            _ => self.begin_stage::<5>(h, now, push),
+        if i == 0 {
+            return self.begin_first(now, push);
         }
-    }
-
-    fn begin_first(&mut self, now: &Motion, push: &Motion) -> bool {
-        let mut same = true;
-        let start = now.q.iter().zip(&now.v).zip(&push.q);
-        for (((q, v), z), argument) in start.zip(&mut self.argument) {
-            let at = Change { q: *q, v: *v, z: *z };
-            same &= *argument == at;
-            *argument = at;
-        }
-        same
-    }
-
-    fn begin_stage<const I: usize>(&mut self, h: f64, now: &Motion, push: &Motion) -> bool {
-        let (once, twice) = (1.0 / h, 1.0 / (h * h));
-        let rate = TABLEAU.rate[I].map(|c| c * once);
-        let acceleration = TABLEAU.acceleration[I].map(|c| c * twice);
-        let (p, t, a) = (TABLEAU.rate_start[I], TABLEAU.acceleration_start[I], TABLEAU.acceleration_rate[I] * once);
-        let start = now.q.iter().zip(&now.v).zip(&push.q);
-        for ((u, ((q, v), z)), argument) in self.increments.iter().zip(start).zip(&mut self.argument) {
-            let mut at = Change { q: *q, v: v * p, z: z * t + v * a };
-            for k in 0..I {
-                at.q += u[k] * A[I][k];
-                at.v += u[k] * rate[k];
-                at.z += u[k] * acceleration[k];
-            }
-            *argument = at;
-        }
+        everywhere(Sums { stages: self, task: Task::Begin(i), h });
         false
     }
 
     /// What inertia acts on in stage `i`, and damping where something `drags`.
     pub(super) fn move_bodies(&mut self, i: usize, h: f64, drags: bool) {
-        match i {
-            0 => self.move_in::<0>(h, drags),
-            1 => self.move_in::<1>(h, drags),
-            2 => self.move_in::<2>(h, drags),
-            3 => self.move_in::<3>(h, drags),
-            4 => self.move_in::<4>(h, drags),
-            _ => self.move_in::<5>(h, drags),
-        }
+        everywhere(Sums { stages: self, task: Task::Move(i, drags), h });
     }
 
-    fn move_in<const I: usize>(&mut self, h: f64, drags: bool) {
-        let (once, twice) = (1.0 / h, 1.0 / (h * h));
-        let pushed = TABLEAU.push[I].map(|c| c * twice);
-        let (t, s) = (TABLEAU.acceleration_start[I], TABLEAU.push_rate[I] * once);
-        let start = self.rate.iter().zip(&self.acceleration);
-        for ((u, (v, z)), push) in self.moved.iter().zip(start.clone()).zip(&mut self.push) {
-            let mut sum = z * t + v * s;
-            for k in 0..I {
-                sum += u[k] * pushed[k];
-            }
-            *push = sum;
-        }
-        if drags {
-            let lag = TABLEAU.lag[I].map(|c| c * once);
-            let p = TABLEAU.rate_start[I];
-            for ((u, (v, _)), drift) in self.moved.iter().zip(start).zip(&mut self.drift) {
-                let mut sum = v * p;
-                for k in 0..I {
-                    sum += u[k] * lag[k];
-                }
-                *drift = sum;
-            }
-        }
+    /// What inertia of body `j` acts on.
+    #[inline(always)]
+    pub(super) fn push(&self, j: usize) -> Pose {
+        get(&self.push, j)
+    }
+
+    /// What damping of body `j` acts on.
+    #[inline(always)]
+    pub(super) fn drift(&self, j: usize) -> Pose {
+        get(&self.drift, j)
     }
 
     /// Keeps what the solve of stage `i` found: the increments of the coordinates, and the motions of the bodies with them.
-    pub(super) fn keep(&mut self, i: usize, solved: &[Pose], moved: &[Pose]) {
-        let kept = self.increments.iter_mut().zip(&mut self.moved);
-        for ((u, bodies), (solved, moved)) in kept.zip(solved.iter().zip(moved)) {
-            (u[i], bodies[i]) = (*solved, *moved);
+    pub(super) fn keep(&mut self, i: usize, solved: &[Four], moved: &[Four]) {
+        for (j, (solved, moved)) in solved.iter().zip(moved).enumerate() {
+            let (tile, lane) = place_of(j);
+            let (u, bodies) = (&mut self.increments[tile][i], &mut self.moved[tile][i]);
+            for k in 0..3 {
+                (u[k].0[lane], bodies[k].0[lane]) = (solved.0[k], moved.0[k]);
+            }
         }
     }
 
     /// After the last stage: the argument becomes the end of the step.
     pub(super) fn finish(&mut self, h: f64, now: &mut Motion, push: &mut Motion) {
-        const LAST: usize = 5;
+        everywhere(Sums { stages: self, task: Task::Finish, h });
+        for (j, ((q, v), z)) in now.q.iter_mut().zip(&mut now.v).zip(&mut push.q).enumerate() {
+            let (tile, lane) = place_of(j);
+            [*q, *v, *z] = self.argument[tile].of(lane);
+        }
+    }
+
+    /// Motions of the bodies with the increments of the last stage, whose inertia has been moved with all that drags: of the coordinates, and
+    /// of the rates.
+    pub(super) fn last(&mut self, h: f64, displacements: &mut [Pose], rates: &mut [Pose]) {
+        everywhere(Sums { stages: self, task: Task::Drift(LAST), h });
+        let gh = GAMMA * h;
+        for (j, (displacement, rate)) in displacements.iter_mut().zip(rates).enumerate() {
+            let (tile, lane) = place_of(j);
+            let u = &self.moved[tile][LAST];
+            *displacement = Pose::new(u[0].0[lane], u[1].0[lane], u[2].0[lane]);
+            *rate = *displacement / gh - self.drift(j);
+        }
+    }
+}
+
+#[inline(always)]
+fn get(from: &[LanePose], j: usize) -> Pose {
+    let (tile, lane) = place_of(j);
+    let [x, y, z] = &from[tile];
+    Pose::new(x.0[lane], y.0[lane], z.0[lane])
+}
+
+#[inline(always)]
+fn set(to: &mut [LanePose], j: usize, pose: &Pose) {
+    let (tile, lane) = place_of(j);
+    for i in 0..3 {
+        to[tile][i].0[lane] = pose[i];
+    }
+}
+
+/// A sum over the stages.
+#[derive(Debug, Clone, Copy)]
+enum Task {
+    /// The argument of a stage.
+    Begin(usize),
+    /// What inertia acts on in a stage, and damping.
+    Move(usize, bool),
+    /// What damping acts on.
+    Drift(usize),
+    /// The end of the step.
+    Finish,
+}
+
+struct Sums<'a> {
+    stages: &'a mut Stages,
+    task: Task,
+    h: f64,
+}
+
+impl Kernel for Sums<'_> {
+    #[inline(always)]
+    fn run<W: Wide>(self, simd: W::Simd) {
+        let Self { stages, task, h } = self;
+        match task {
+            Task::Begin(1) => stages.begin_stage::<W, 1>(simd, h),
+            Task::Begin(2) => stages.begin_stage::<W, 2>(simd, h),
+            Task::Begin(3) => stages.begin_stage::<W, 3>(simd, h),
+            Task::Begin(4) => stages.begin_stage::<W, 4>(simd, h),
+            Task::Begin(_) => stages.begin_stage::<W, 5>(simd, h),
+            Task::Move(i, drags) => {
+                stages.push_stage::<W>(simd, i, h);
+                if drags {
+                    stages.drift_stage::<W>(simd, i, h);
+                }
+            }
+            Task::Drift(i) => stages.drift_stage::<W>(simd, i, h),
+            Task::Finish => stages.finish_step::<W>(simd, h),
+        }
+    }
+}
+
+/// `sum + Σ c_k·u_k` over the first stages.
+#[inline(always)]
+fn sum<W: Wide>(simd: W::Simd, mut sum: LanePose<W>, u: &[LanePose], c: &[f64]) -> LanePose<W> {
+    for (u, c) in u.iter().zip(c) {
+        add_scaled(&mut sum, &load(simd, u), W::splat(simd, *c));
+    }
+    sum
+}
+
+/// `x·a + y·b`.
+#[inline(always)]
+fn both<W: Wide>(simd: W::Simd, (x, a): (&LanePose<W>, f64), (y, b): (&LanePose<W>, f64)) -> LanePose<W> {
+    let (a, b) = (W::splat(simd, a), W::splat(simd, b));
+    [x[0] * a + y[0] * b, x[1] * a + y[1] * b, x[2] * a + y[2] * b]
+}
+
+impl Stages {
+    #[inline(always)]
+    fn begin_stage<W: Wide, const I: usize>(&mut self, simd: W::Simd, h: f64) {
+        let (once, twice) = (1.0 / h, 1.0 / (h * h));
+        let rate = TABLEAU.rate[I].map(|c| c * once);
+        let acceleration = TABLEAU.acceleration[I].map(|c| c * twice);
+        let (p, t, a) = (TABLEAU.rate_start[I], TABLEAU.acceleration_start[I], TABLEAU.acceleration_rate[I] * once);
+        for ((u, start), argument) in self.increments.iter().zip(&self.start).zip(&mut self.argument) {
+            let Given { q, v, z } = start.load::<W>(simd);
+            let mut at = Given { q, v: v.map(|v| v * p), z: both(simd, (&z, t), (&v, a)) };
+            for k in 0..I {
+                let u = load::<W, 3>(simd, &u[k]);
+                add_scaled(&mut at.q, &u, W::splat(simd, A[I][k]));
+                add_scaled(&mut at.v, &u, W::splat(simd, rate[k]));
+                add_scaled(&mut at.z, &u, W::splat(simd, acceleration[k]));
+            }
+            argument.store(at);
+        }
+    }
+
+    #[inline(always)]
+    fn push_stage<W: Wide>(&mut self, simd: W::Simd, i: usize, h: f64) {
+        let (once, twice) = (1.0 / h, 1.0 / (h * h));
+        let pushed = TABLEAU.push[i].map(|c| c * twice);
+        let (t, s) = (TABLEAU.acceleration_start[i], TABLEAU.push_rate[i] * once);
+        for (((u, v), z), push) in self.moved.iter().zip(&self.rate).zip(&self.acceleration).zip(&mut self.push) {
+            let start = both::<W>(simd, (&load(simd, z), t), (&load(simd, v), s));
+            store(sum(simd, start, &u[..i], &pushed), push);
+        }
+    }
+
+    #[inline(always)]
+    fn drift_stage<W: Wide>(&mut self, simd: W::Simd, i: usize, h: f64) {
+        let lag = TABLEAU.lag[i].map(|c| c / h);
+        let p = TABLEAU.rate_start[i];
+        for ((u, v), drift) in self.moved.iter().zip(&self.rate).zip(&mut self.drift) {
+            let v = load::<W, 3>(simd, v);
+            store(sum(simd, v.map(|v| v * p), &u[..i], &lag), drift);
+        }
+    }
+
+    #[inline(always)]
+    fn finish_step<W: Wide>(&mut self, simd: W::Simd, h: f64) {
         let (once, twice) = (1.0 / h, 1.0 / (h * h));
         let (lag, pushed) = (TABLEAU.lag[LAST].map(|c| c * once), TABLEAU.push[LAST].map(|c| c * twice));
         let (p, t, s) = (TABLEAU.rate_start[LAST], TABLEAU.acceleration_start[LAST], TABLEAU.push_rate[LAST] * once);
         let gh = GAMMA * h;
-        for (j, (u, argument)) in self.increments.iter().zip(&mut self.argument).enumerate() {
-            let (v, z) = (now.v[j], push.q[j]);
-            let (mut rate, mut acceleration) = (v * p, z * t + v * s);
-            for k in 0..LAST {
-                rate += u[k] * lag[k];
-                acceleration += u[k] * pushed[k];
+        for ((u, start), argument) in self.increments.iter().zip(&self.start).zip(&mut self.argument) {
+            let Given { v, z, .. } = start.load::<W>(simd);
+            let rate = sum(simd, v.map(|v| v * p), &u[..LAST], &lag);
+            let acceleration = sum(simd, both(simd, (&z, t), (&v, s)), &u[..LAST], &pushed);
+            let (mut end, u) = (argument.load::<W>(simd), load::<W, 3>(simd, &u[LAST]));
+            for i in 0..3 {
+                end.q[i] += u[i];
+                end.v[i] += u[i] * (1.0 / gh) - rate[i];
+                end.z[i] += u[i] * (1.0 / (gh * gh)) - acceleration[i];
             }
-            argument.q += u[LAST];
-            argument.v += u[LAST] / gh - rate;
-            argument.z += u[LAST] / (gh * gh) - acceleration;
-            (now.q[j], now.v[j], push.q[j]) = (argument.q, argument.v, argument.z);
-        }
-    }
-
-    /// Motions of the bodies with the increments of the last stage: of the coordinates, and of the rates.
-    pub(super) fn last(&self, h: f64, displacements: &mut [Pose], rates: &mut [Pose]) {
-        const LAST: usize = 5;
-        let (once, gh) = (1.0 / h, GAMMA * h);
-        let lag = TABLEAU.lag[LAST].map(|c| c * once);
-        let p = TABLEAU.rate_start[LAST];
-        let out = displacements.iter_mut().zip(rates);
-        for ((u, v), (displacement, rate)) in self.moved.iter().zip(&self.rate).zip(out) {
-            let mut sum = v * p;
-            for k in 0..LAST {
-                sum += u[k] * lag[k];
-            }
-            (*displacement, *rate) = (u[LAST], u[LAST] / gh - sum);
+            argument.store(end);
         }
     }
 }
