@@ -22,7 +22,7 @@ use super::look::{Seen, look, mechanics};
 use super::order_error::OrderError;
 use super::rigid_beams::stiffen;
 use crate::discretize::{DiscretizeError, order};
-use crate::options::CompileOptions;
+use crate::options::{CompileOptions, Scheme};
 use crate::structure::Structure;
 
 /// Largest kh of a segment at the edge of the band.
@@ -68,6 +68,9 @@ pub fn choose_for(structure: &Structure, options: &CompileOptions, aim: &Aim) ->
         let Some(error) = &now.error else {
             if holds.is_some() {
                 break;
+            }
+            if now.modes > 0 && options.scheme == Scheme::Es {
+                return by_another_scheme(structure, options, aim);
             }
             // modes of so few segments may not be told apart: with more they are
             let finer: Vec<usize> = segments.iter().map(|&n| options.scheme.segments(2 * n)).collect();
@@ -115,6 +118,19 @@ pub fn choose_for(structure: &Structure, options: &CompileOptions, aim: &Aim) ->
         stiffen(structure, &bare, options, aim, &groups, &elastic, &mut order)?;
     }
     Ok(order)
+}
+
+/// The segments that E4 takes for half of the tolerance, where Es has no estimate of its own: with as many it is off by once to twice as
+/// much, by the same power. Whoever takes them compares them with twice as many.
+fn by_another_scheme(
+    structure: &Structure,
+    options: &CompileOptions,
+    aim: &Aim,
+) -> Result<ModelOrder, DiscretizeError> {
+    let finer = CompileOptions { scheme: Scheme::E4, tol: 0.5 * options.tol, ..options.clone() };
+    let tolerances = aim.tolerances.iter().map(|tol| 0.5 * tol).collect();
+    let order = choose_for(structure, &finer, &Aim { tolerances, ..aim.clone() })?;
+    Ok(ModelOrder { estimated_error: None, ..order })
 }
 
 /// The fewest segments for which every mode is predicted to hold.

@@ -2,6 +2,7 @@
 //! differences.
 
 use crate::model;
+use bimorph::analysis::mesh::modes_fitted;
 use bimorph::compile::{CompileError, CompileOptions, Compiled, Formulation, Scheme, compile};
 use bimorph::equations::Joints;
 use bimorph::multibody::planar::Pose;
@@ -13,6 +14,7 @@ use bimorph::netlist::Bundle;
 use bimorph::solve::equilibrium::{Equilibrium, EquilibriumOptions};
 use bimorph::solve::path::SourcePath;
 use nalgebra::{DMatrix, DVector, Matrix3};
+use std::path::Path;
 
 /// Two arms between anchors and a yoke, bent by a beam across: trees, loops, a root of its own.
 const FRAME: &str = "
@@ -243,5 +245,21 @@ fn a_scheme_without_rotary_inertia_is_refused() {
     assert!(refused.option == "scheme" && refused.to_string().contains("es, which is taken"), "{refused}");
     for (formulation, scheme) in [(Formulation::Compliant, Scheme::E4), (Formulation::Rcr, Scheme::Es)] {
         assert_eq!(compiled(formulation, Scheme::Auto).map(|c| c.options.scheme), Ok(scheme));
+    }
+}
+
+/// At calibrated junctions Es has no estimate of its own; its mesh is that of the tolerance all the same: at most 1.3 times the unknowns of
+/// E4, and the lowest frequency of the quarter stage (72,404 Hz; `--segments 32`) within it. (It had eight times as many.)
+#[test]
+fn es_takes_as_many_segments_as_the_tolerance_wants() {
+    let bundle = Bundle::read(Path::new("examples/quarter_stage/quarter_stage.net"), &[]).unwrap();
+    for tol in [1e-2, 1e-3] {
+        let [e4, es] = [Scheme::E4, Scheme::Es].map(|scheme| {
+            let compiled = compile(&bundle, &CompileOptions { scheme, tol, ..CompileOptions::default() }).unwrap();
+            let (fitted, found, _) = modes_fitted(&compiled, 3, &[]).unwrap();
+            assert!((found.frequencies_hz[0] / 72_404.0 - 1.0).abs() <= tol, "{scheme:?} {tol}");
+            fitted.parts.system.model.unknowns()
+        });
+        assert!(10 * es <= 13 * e4, "{tol}: {es} for {e4}");
     }
 }

@@ -33,6 +33,8 @@ pub use matrix::LaneMatrix;
 pub use model::LaneModel;
 pub use number::Number;
 pub use precise::{LanePrecise, PrecisePose};
+#[cfg(test)]
+pub(crate) use wide::one_by_one;
 pub use wide::{Eight, Kernel, LANES, Wide, across, add, everywhere, load, store};
 
 /// Displacement, rate or force of a body in each variant: x, y, θ.

@@ -257,6 +257,12 @@ pub fn everywhere<K: Kernel>(kernel: K) {
     }
 }
 
+/// Runs a kernel as a processor without vector instructions does.
+#[cfg(test)]
+pub(crate) fn one_by_one<K: Kernel>(kernel: K) {
+    Simd::vectorize(pulp::Scalar::new(), Over::<K, LANES>(kernel));
+}
+
 #[cfg(test)]
 mod tests {
     //! Every operation has the bits of `f64` in every lane.

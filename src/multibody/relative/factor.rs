@@ -107,7 +107,8 @@ impl JointMatrix {
             let share = along.transposed();
             let ds = block.product(simd, &along);
             let own = share.product(simd, &ds).plus(simd, &joint_block(simd, link, scale, extra));
-            let inverse = invert(simd, own, link, &mut inertia, j)?;
+            let size = block.0[0].0[0].abs() + block.0[1].0[1].abs();
+            let inverse = invert(simd, (own, size), link, &mut inertia, j)?;
             self.factors.keep(j, (&along, &share), &inverse);
             let parent = match link.parent {
                 Parent::Body(p) => Some(p as usize),
@@ -192,11 +193,11 @@ impl JointMatrix {
 }
 
 /// The elimination, in the widest instructions of the processor at hand.
-struct Eliminate<'a> {
-    matrix: &'a mut JointMatrix,
-    tree: &'a Tree,
-    scale: f64,
-    geometric: Option<&'a [Geometric]>,
+pub(super) struct Eliminate<'a> {
+    pub(super) matrix: &'a mut JointMatrix,
+    pub(super) tree: &'a Tree,
+    pub(super) scale: f64,
+    pub(super) geometric: Option<&'a [Geometric]>,
 }
 
 impl WithSimd for Eliminate<'_> {
@@ -235,11 +236,12 @@ fn joint_block<S: Simd>(simd: S, link: &Link, scale: f64, extra: Option<&Geometr
     extra.map_or(own, |g| own.plus(simd, &Columns::of(&g.own)))
 }
 
-/// The inverse of a symmetric block over what moves, and the signs of its pivots.
+/// The inverse of a symmetric block over what moves, and the signs of its pivots. `size` is that of the body's own block before what a
+/// guide holds was taken out of it: of a body that is held in every direction nothing is left but rounding.
 #[inline(always)]
 fn invert<S: Simd>(
     simd: S,
-    mut a: Columns,
+    (mut a, size): (Columns, f64),
     link: &Link,
     inertia: &mut Inertia,
     body: usize,
@@ -249,10 +251,7 @@ fn invert<S: Simd>(
     }
     // what does not move has a pivot of its own, and no inverse; a guide at an angle mixes it with what moves, so it is of that size
     let (still, size) = match &link.free {
-        Some(free) => {
-            let size = a.0[0].0[0].abs() + a.0[1].0[1].abs();
-            (Columns::IDENTITY.less(simd, &Columns::of(free)), if size > 0.0 { size } else { 1.0 })
-        }
+        Some(free) => (Columns::IDENTITY.less(simd, &Columns::of(free)), if size > 0.0 { size } else { 1.0 }),
         None => {
             let held = |i: usize| if link.moving[i] { 0.0 } else { 1.0 };
             let still =

@@ -134,10 +134,10 @@ impl Placed {
     }
 }
 
-struct Place<'a> {
-    placed: &'a mut Placed,
-    tree: &'a Tree,
-    given: &'a [Eights],
+pub(super) struct Place<'a> {
+    pub(super) placed: &'a mut Placed,
+    pub(super) tree: &'a Tree,
+    pub(super) given: &'a [Eights],
 }
 
 impl Kernel for Place<'_> {

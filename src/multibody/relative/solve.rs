@@ -109,10 +109,10 @@ fn spread(map: &Map<f64>, sign: f64, parent: &Pose, s: &Pose) -> Pose {
     Pose::new(along(0), along(1), parent.z + sign * s.z)
 }
 
-struct Solve<'a> {
-    factors: &'a Factors,
-    wrench: &'a mut [Four],
-    x: &'a mut [Four],
+pub(super) struct Solve<'a> {
+    pub(super) factors: &'a Factors,
+    pub(super) wrench: &'a mut [Four],
+    pub(super) x: &'a mut [Four],
 }
 
 impl WithSimd for Solve<'_> {

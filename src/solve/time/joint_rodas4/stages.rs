@@ -124,8 +124,7 @@ impl Stages {
         }
     }
 
-    /// Motions of the bodies with the increments of the last stage, whose inertia has been moved with all that drags: of the coordinates, and
-    /// of the rates.
+    /// Motions of the bodies with the increments of the last stage: of the coordinates, and of the rates.
     pub(super) fn last(&mut self, h: f64, displacements: &mut [Pose], rates: &mut [Pose]) {
         everywhere(Sums { stages: self, task: Task::Drift(LAST), h });
         let gh = GAMMA * h;
