@@ -30,8 +30,6 @@ pub mod number;
 pub mod placed;
 pub mod solve;
 pub mod tree;
-#[cfg(test)]
-mod widths;
 
 pub use factor::JointMatrix;
 pub use tree::{Link, Parent, Tree, Unfit};
