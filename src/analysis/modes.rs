@@ -12,6 +12,7 @@ use crate::multibody::BlockMatrix;
 use crate::multibody::forces::{add_damping, add_inertia};
 use crate::multibody::planar::Pose;
 use crate::refine::axial::axial_forces;
+use crate::refine::doubling;
 use crate::refine::order_error::{own_stiffness, relative_of_loaded_modes};
 use crate::solve::eigen::{Modes, RELIABLE, lowest_modes};
 use serde::Serialize;
@@ -67,8 +68,9 @@ pub fn modes(compiled: &Compiled, count: usize, voltages: &PortVoltages) -> Resu
     Ok(result)
 }
 
-/// The lowest mode about the equilibrium without voltages; none where its error is not known.
-pub(super) fn lowest(compiled: &Compiled) -> Option<LowestMode> {
+/// The lowest mode about the equilibrium without voltages; none where its error is not known. A scheme that has no estimate of its own is
+/// compared with `twice` the segments.
+pub(super) fn lowest(compiled: &Compiled, twice: impl FnOnce() -> Option<Compiled>) -> Option<LowestMode> {
     let (found, _, shapes) = shapeless(compiled, 1, &[]).ok()?;
     let (model, shape) = (&compiled.parts.system.model, shapes.first()?);
     let mut drag = vec![Pose::zeros(); shape.len()];
@@ -76,7 +78,14 @@ pub(super) fn lowest(compiled: &Compiled) -> Option<LowestMode> {
     let power: f64 = drag.iter().zip(shape).map(|(force, rate)| force.dot(rate)).sum();
     let frequency_hz = *found.frequencies_hz.first()?;
     let quality = TAU * frequency_hz * model.mass_product(shape, shape) / power.abs();
-    Some(LowestMode { frequency_hz, quality, error: (*found.errors.first()?)? })
+    let error = match *found.errors.first()? {
+        Some(error) => error,
+        None => {
+            let (finer, ..) = shapeless(&twice()?, 1, &[]).ok()?;
+            doubling::relative(frequency_hz, *finer.frequencies_hz.first()?)
+        }
+    };
+    Some(LowestMode { frequency_hz, quality, error })
 }
 
 /// True where modes are about an equilibrium that is not the drawing. As SUGAR has it, that is where voltages pull across gaps: its beams

@@ -38,7 +38,7 @@ pub fn in_circuit(compiled: &Compiled) -> Compiled {
     let finer = if given { None } else { (0..=LOOSER.1).find_map(|k| within_most(compiled, LOOSER.0.powi(k))) };
     let sought = finer.as_ref().and_then(|finer| finer.order.estimated_error);
     let mut fitted = finer.unwrap_or_else(|| compiled.clone());
-    fitted.lowest = bounded(2 * MOST, || lowest(&fitted)).flatten();
+    fitted.lowest = bounded(2 * MOST, || lowest(&fitted, || twice(&fitted, fitted.options.tol).ok())).flatten();
     let compared = if sought.is_some() { None } else { bounded(2 * MOST, || worse(&fitted)) };
     match (sought, compared) {
         (Some(error), _) => warned(fitted, "the equilibrium without voltages or one of the lowest modes", Some(error)),
