@@ -77,8 +77,7 @@ fn by_springs(system: &System, q: &[Pose], drive: &Drive) -> (f64, f64) {
     tree.coordinates_at(q, &mut s);
     let (mut placed, mut stresses, mut w) = (Placed::new(tree), Stresses::new(tree), JointMatrix::new(tree));
     let given = Eights::at_rest(&s);
-    let (mut r, mut share, mut right, mut moved) =
-        (q.to_vec(), q.to_vec(), vec![Four::ZERO; q.len()], vec![Four::ZERO; q.len() + 1]);
+    let (mut r, mut right, mut moved) = (q.to_vec(), vec![Four::ZERO; q.len()], vec![Four::ZERO; q.len() + 1]);
     let factor = median(|| {
         placed.place(tree, black_box(&given));
         closures.tangent(&placed.at, drive, &mut w.bodies, &mut r);
@@ -88,11 +87,8 @@ fn by_springs(system: &System, q: &[Pose], drive: &Drive) -> (f64, f64) {
     let solve = median(|| {
         placed.place(tree, black_box(&given));
         closures.residual(&placed.at, drive, &mut r);
-        placed.gather(tree, &mut r, &mut share);
         stresses.fill(tree, &given, &drive.rest());
-        for (j, (right, share)) in right.iter_mut().zip(&share).enumerate() {
-            *right = Four::from(share + stresses.of(j));
-        }
+        placed.resist(tree, &stresses, &mut r, &mut right);
         moved.fill(Four::ZERO);
         w.solve(&mut moved, &mut right);
     });

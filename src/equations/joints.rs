@@ -17,20 +17,20 @@ pub struct Joints {
     /// The joints that close loops, for their forces.
     pub(crate) loops: Loops,
     /// Inertia and drag of the bodies, close together.
-    pub(crate) inertias: Vec<Inertia>,
+    pub(crate) inertias: Vec<BodyInertia>,
     /// Something drags on bodies or between them.
     pub(crate) drags: bool,
 }
 
 /// What of a body resists its motion.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Inertia {
+pub(crate) struct BodyInertia {
     /// The mass matrix' diagonal.
     mass: Pose,
     drag: Drag,
 }
 
-impl Inertia {
+impl BodyInertia {
     /// The force of an acceleration and a rate.
     #[inline(always)]
     pub(crate) fn force(&self, acceleration: &Pose, rate: &Pose) -> Pose {
@@ -53,7 +53,7 @@ impl Joints {
         closures.model.joints.clone_from(&tree.closures);
         let bodies = &closures.model.bodies;
         Self {
-            inertias: bodies.iter().map(|body| Inertia { mass: body.mass_diagonal(), drag: body.drag }).collect(),
+            inertias: bodies.iter().map(|body| BodyInertia { mass: body.mass_diagonal(), drag: body.drag }).collect(),
             drags: bodies.iter().any(|b| b.drag.amount != 0.0) || !closures.model.dampers.is_empty(),
             loops: Loops::new(&closures.model, &tree.closures),
             tree,

@@ -7,6 +7,7 @@ use bimorph::compile::{CompileError, CompileOptions, Compiled, Formulation, Sche
 use bimorph::equations::Joints;
 use bimorph::multibody::planar::Pose;
 use bimorph::multibody::relative::columns::Four;
+use bimorph::multibody::relative::dynamics::Stresses;
 use bimorph::multibody::relative::geometric::{Geometric, fill};
 use bimorph::multibody::relative::placed::{Eights, Placed};
 use bimorph::multibody::relative::{JointMatrix, Parent, Tree, Unfit};
@@ -194,8 +195,8 @@ fn newton_over_coordinates_is_quadratic() {
     Equilibrium::new(system, EquilibriumOptions::default()).follow(system, &path, &mut expected).unwrap();
     let reach = expected.iter().map(|x| x.xy().amax()).fold(0.0, f64::max);
     let run = |exact: bool| {
-        let (mut q, mut force, mut share) = (zeros.clone(), zeros.clone(), zeros.clone());
-        let (mut placed, mut form) = (Placed::new(tree), JointMatrix::new(tree));
+        let (mut q, mut force, mut change) = (zeros.clone(), zeros.clone(), vec![Four::ZERO; count]);
+        let (mut placed, mut stresses, mut form) = (Placed::new(tree), Stresses::new(tree), JointMatrix::new(tree));
         let mut brought = vec![Geometric::ZERO; count];
         let mut errors = Vec::new();
         for _ in 0..9 {
@@ -203,16 +204,13 @@ fn newton_over_coordinates_is_quadratic() {
             let apart = placed.at.iter().zip(&expected).map(|(a, b)| (a - b).xy().amax()).fold(0.0, f64::max);
             errors.push(apart / reach);
             closures.tangent(&placed.at, &drive, &mut form.bodies, &mut force);
-            placed.gather(tree, &mut force, &mut share);
-            for ((share, link), q) in share.iter_mut().zip(&tree.links).zip(&q) {
-                *share += link.stress(q, &drive.rest());
-            }
+            stresses.fill(tree, &Eights::at_rest(&q), &drive.rest());
+            placed.resist(tree, &stresses, &mut force, &mut change);
             fill(tree, &placed, |j| q[j], &force, &mut brought);
             form.factor(tree, &placed, 1.0, exact.then_some(&brought)).unwrap();
-            let mut change: Vec<Four> = share.iter().map(|share| Four::from(*share)).collect();
             form.solve(&mut vec![Four::ZERO; count + 1], &mut change);
             for (q, change) in q.iter_mut().zip(&change) {
-                *q -= change.pose();
+                *q += change.pose();
             }
         }
         errors

@@ -228,37 +228,34 @@ impl<K: Kernel, const M: usize> WithSimd for Over<K, M> {
     }
 }
 
+/// Runs a kernel in the widest instructions of the processor at hand; `alone` has it where the processor has none.
+#[inline(always)]
+fn widest<K: Kernel>(kernel: K, alone: impl FnOnce(K)) {
+    match Arch::new() {
+        #[cfg(target_arch = "x86_64")]
+        Arch::V4(simd) => Simd::vectorize(simd, Over::<K, 1>(kernel)),
+        #[cfg(target_arch = "x86_64")]
+        Arch::V3(simd) => Simd::vectorize(simd, Over::<K, 2>(kernel)),
+        #[cfg(target_arch = "aarch64")]
+        Arch::Neon(simd) => Simd::vectorize(simd, Over::<K, 4>(kernel)),
+        _ => alone(kernel),
+    }
+}
+
 /// Runs a kernel in the widest instructions of the processor at hand. It is not compiled for a processor without any: that copy would
 /// be the largest, and never run.
 #[inline(always)]
 pub fn across<K: Kernel>(kernel: K) {
-    match Arch::new() {
-        #[cfg(target_arch = "x86_64")]
-        Arch::V4(simd) => Simd::vectorize(simd, Over::<K, 1>(kernel)),
-        #[cfg(target_arch = "x86_64")]
-        Arch::V3(simd) => Simd::vectorize(simd, Over::<K, 2>(kernel)),
-        #[cfg(target_arch = "aarch64")]
-        Arch::Neon(simd) => Simd::vectorize(simd, Over::<K, 4>(kernel)),
-        _ => {}
-    }
+    widest(kernel, |_| {});
 }
 
-/// Runs a kernel in the widest instructions of the processor at hand, one number after the other where it has none.
+/// The same, one number after the other where the processor has no vector instructions.
 #[inline(always)]
 pub fn everywhere<K: Kernel>(kernel: K) {
-    match Arch::new() {
-        #[cfg(target_arch = "x86_64")]
-        Arch::V4(simd) => Simd::vectorize(simd, Over::<K, 1>(kernel)),
-        #[cfg(target_arch = "x86_64")]
-        Arch::V3(simd) => Simd::vectorize(simd, Over::<K, 2>(kernel)),
-        #[cfg(target_arch = "aarch64")]
-        Arch::Neon(simd) => Simd::vectorize(simd, Over::<K, 4>(kernel)),
-        _ => Simd::vectorize(pulp::Scalar::new(), Over::<K, LANES>(kernel)),
-    }
+    widest(kernel, one_by_one);
 }
 
 /// Runs a kernel as a processor without vector instructions does.
-#[cfg(test)]
 pub(crate) fn one_by_one<K: Kernel>(kernel: K) {
     Simd::vectorize(pulp::Scalar::new(), Over::<K, LANES>(kernel));
 }

@@ -74,7 +74,7 @@ impl Changes {
         self.places[j].moved.map(|x| Pose::new(x[0].change, x[1].change, x[2].change))
     }
 
-    /// Change of what [`gather`](super::placed::Placed::gather) finds where the wrenches `force` change by `wrench`.
+    /// Change of the share that wrenches on the bodies have in the coordinates, where the wrenches `force` change by `wrench`.
     pub(crate) fn gather(&mut self, tree: &Tree, force: &[Pose], wrench: &[Pose], out: &mut [Pose]) {
         self.sums.clear();
         self.sums.extend(force.iter().zip(wrench).map(both));

@@ -2,7 +2,7 @@
 //! on the coordinates themselves, and one pass from the leaves to the root brings both together.
 
 use super::columns::Four;
-use super::kinematics::Triple;
+use super::kinematics::triple;
 use super::placed::{Eights, Placed, place_of, tiles};
 use super::tree::{Link, Parent, Tree};
 use crate::multibody::forces::RestStrain;
@@ -26,19 +26,6 @@ impl Link {
 }
 
 impl Placed {
-    /// Sums wrenches over everything that hangs on each body: `wrench` becomes the sum, `out` its share in the coordinates.
-    #[inline]
-    pub fn gather(&self, tree: &Tree, wrench: &mut [Pose], out: &mut [Pose]) {
-        for (j, up) in tree.upward.iter().enumerate() {
-            let map = self.map(j);
-            let f = triple(&wrench[j]);
-            out[j] = Pose::from(map.gather(up.sign, &f));
-            if let Parent::Body(p) = up.parent {
-                wrench[p as usize] += Pose::from(map.pass(&f));
-            }
-        }
-    }
-
     /// Minus the force over the coordinates that wrenches on the bodies and the tree's springs leave: `wrench` becomes its sum over everything
     /// that hangs on each body.
     #[inline]
@@ -137,11 +124,6 @@ impl Kernel for Stress<'_> {
             store([uu * u + ug * g + up * p, ug * u + gg * g + gp * p, up * u + gp * g + pp * p], out);
         }
     }
-}
-
-#[inline(always)]
-fn triple(x: &Pose) -> Triple<f64> {
-    [x.x, x.y, x.z]
 }
 
 impl Tree {

@@ -28,7 +28,7 @@ impl Geometric {
 }
 
 /// Fills in `out` at coordinates `q`, where the bodies have been placed; `force` holds the wrench on everything that hangs on
-/// each body, as [`Placed::gather`] leaves it. Arms and openings are taken from the maps: nothing is turned again.
+/// each body, as [`Placed::resist`] leaves it. Arms and openings are taken from the maps: nothing is turned again.
 pub fn fill(tree: &Tree, placed: &Placed, q: impl Fn(usize) -> Pose, force: &[Pose], out: &mut [Geometric]) {
     for (j, link) in tree.links.iter().enumerate() {
         out[j] = if link.parent == Parent::Free { Geometric::ZERO } else { of(link, &placed.map(j), &q(j), &force[j]) };

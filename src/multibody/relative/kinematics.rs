@@ -16,11 +16,17 @@
 //! side by side ([`super::placed`]).
 
 use crate::multibody::lanes::Number;
+use crate::multibody::planar::Pose;
 
 /// A pair of numbers.
 pub(super) type Pair<T> = [T; 2];
 /// Three numbers: of the plane, or of a joint.
 pub(super) type Triple<T> = [T; 3];
+
+#[inline(always)]
+pub(super) fn triple(x: &Pose) -> Triple<f64> {
+    [x.x, x.y, x.z]
+}
 
 #[inline(always)]
 fn turn<T: Number>(v: Pair<T>) -> Pair<T> {

@@ -32,9 +32,7 @@ impl Loops {
 
     /// `r +=` their forces on the bodies.
     pub fn add_forces(&self, placed: &Placed, rest: &RestStrain<'_>, r: &mut [Pose]) {
-        for joints in &self.0 {
-            everywhere(Forces { joints, placed, rest, r });
-        }
+        everywhere(Forces { loops: &self.0, placed, rest, r });
     }
 }
 
@@ -65,7 +63,7 @@ impl Eightfold {
 }
 
 struct Forces<'a> {
-    joints: &'a Eightfold,
+    loops: &'a [Eightfold],
     placed: &'a Placed,
     rest: &'a RestStrain<'a>,
     r: &'a mut [Pose],
@@ -74,20 +72,22 @@ struct Forces<'a> {
 impl Kernel for Forces<'_> {
     #[inline(always)]
     fn run<W: Wide>(self, simd: W::Simd) {
-        let Self { joints, placed, rest, r } = self;
-        let mut offsets = joints.rest;
-        (W::load(simd, &offsets) * rest.built_in).store(&mut offsets);
-        for &(k, group, length) in &joints.expansion {
-            offsets.0[k] += length * rest.expansion[group];
+        let Self { loops, placed, rest, r } = self;
+        for joints in loops {
+            let mut offsets = joints.rest;
+            (W::load(simd, &offsets) * rest.built_in).store(&mut offsets);
+            for &(k, group, length) in &joints.expansion {
+                offsets.0[k] += length * rest.expansion[group];
+            }
+            let (a, b) = (place::<W>(simd, placed, &joints.bodies[0]), place::<W>(simd, placed, &joints.bodies[1]));
+            let section = joints.section.load::<W>(simd);
+            let (arm_a, arm_b) = (load(simd, &joints.arms[0]), load(simd, &joints.arms[1]));
+            let k = kinematics(&section, (&arm_a, &arm_b), &a, &b);
+            let [u, g, p] = k.strain;
+            let (force_a, force_b) = k.forces(&section.stress(&[u - W::load(simd, &offsets), g, p]));
+            add::<W>(force_a, &joints.bodies[0], r);
+            add::<W>(force_b, &joints.bodies[1], r);
         }
-        let (a, b) = (place::<W>(simd, placed, &joints.bodies[0]), place::<W>(simd, placed, &joints.bodies[1]));
-        let section = joints.section.load::<W>(simd);
-        let (arm_a, arm_b) = (load(simd, &joints.arms[0]), load(simd, &joints.arms[1]));
-        let k = kinematics(&section, (&arm_a, &arm_b), &a, &b);
-        let [u, g, p] = k.strain;
-        let (force_a, force_b) = k.forces(&section.stress(&[u - W::load(simd, &offsets), g, p]));
-        add::<W>(force_a, &joints.bodies[0], r);
-        add::<W>(force_b, &joints.bodies[1], r);
     }
 }
 

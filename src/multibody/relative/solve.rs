@@ -11,7 +11,7 @@
 //! Along a beam each body waits for the one before it, and one product is all that it waits for.
 
 use super::columns::{Columns, Four, in_fours};
-use super::kinematics::Map;
+use super::kinematics::{Map, triple};
 use super::tree::{Link, Parent, Tree};
 use crate::multibody::planar::Pose;
 use pulp::{Simd, WithSimd};
@@ -101,14 +101,6 @@ impl Factors {
     }
 }
 
-/// X·V + S·s.
-#[inline(always)]
-fn spread(map: &Map<f64>, sign: f64, parent: &Pose, s: &Pose) -> Pose {
-    let [u, g, p] = &map.columns;
-    let along = |i: usize| parent[i] + map.lever[i] * parent.z + (u[i] * s.x + g[i] * s.y + p[i] * s.z);
-    Pose::new(along(0), along(1), parent.z + sign * s.z)
-}
-
 pub(super) struct Solve<'a> {
     pub(super) factors: &'a Factors,
     pub(super) wrench: &'a mut [Four],
@@ -154,17 +146,12 @@ pub(super) fn both_motions(
     (to_s, to_t): (&mut [Pose], &mut [Pose]),
 ) {
     for (j, link) in tree.links.iter().enumerate().rev() {
-        let map = &maps[j];
+        let moved = |parent: &Pose, s: &Pose| Pose::from(maps[j].apply(link.sign, &triple(parent), &triple(s)));
+        let still = Pose::zeros();
         (to_s[j], to_t[j]) = match link.parent {
             Parent::Free => (s[j], t[j]),
-            Parent::Ground => {
-                let still = Pose::zeros();
-                (spread(map, link.sign, &still, &s[j]), spread(map, link.sign, &still, &t[j]))
-            }
-            Parent::Body(p) => {
-                let p = p as usize;
-                (spread(map, link.sign, &to_s[p], &s[j]), spread(map, link.sign, &to_t[p], &t[j]))
-            }
+            Parent::Ground => (moved(&still, &s[j]), moved(&still, &t[j])),
+            Parent::Body(p) => (moved(&to_s[p as usize], &s[j]), moved(&to_t[p as usize], &t[j])),
         };
     }
 }
