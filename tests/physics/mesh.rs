@@ -205,8 +205,7 @@ fn meshes_of_circuits_have_no_cliff() {
 }
 
 /// A circuit knows how far off the lowest frequency of its mesh is, in both formulations: what a motion that rings is told by. Within a factor
-/// of three of the error against 32 segments a beam, as far as that is a hundredth of the tolerance. (With `rcr`, whose scheme has no estimate of its own, nothing was told: the
-/// demonstration's current was 8 % off at 1e-3.)
+/// of three of the error against 32 segments a beam. (With `rcr`, whose scheme has no estimate of its own, nothing was told.)
 #[test]
 fn circuits_know_the_error_of_their_lowest_mode() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/bank/bank.net");
