@@ -133,7 +133,7 @@ impl Ac {
         let drawn = self.model.compile()?;
         let bar = progress::bar("ac");
         let advice = "fewer --points, a larger --tol, or --by-modes cost less";
-        let result = harmonic_fitted(&drawn, &options, &mut progress::watch_with(&bar, advice));
+        let result = harmonic_fitted(&drawn, &options, &mut progress::watch(&bar, advice));
         bar.finish_and_clear();
         let (compiled, result) = result?;
         warn_of_mesh(&drawn, &compiled);

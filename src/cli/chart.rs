@@ -111,6 +111,9 @@ struct Document<'a> {
     context: Context<'a>,
 }
 
+/// What makes a chart cheaper.
+const CHEAPER: &str = "fewer --tols or --methods, or a shorter --stop, cost less";
+
 /// Methods that are charted when none are named: all but the explicit one, which needs millions of steps on stiff parts.
 const METHODS: [&str; 6] = ["rodas4", "avf", "midpoint", "tr-bdf2", "generalized-alpha", "radau5"];
 
@@ -131,7 +134,7 @@ impl Chart {
         let compiled = self.model.compile()?;
         let (bundle, options) = (self.model.bundle()?, self.model.options()?);
         let bar = progress::bar("chart");
-        let result = chart(&bundle, &options, &spec, &mut progress::watch(&bar));
+        let result = chart(&bundle, &options, &spec, &mut progress::watch(&bar, CHEAPER));
         bar.finish_and_clear();
         let result = result?;
         let first = result.points.iter().find_map(|p| p.failed.as_ref());

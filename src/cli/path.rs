@@ -141,10 +141,10 @@ impl PathCommand {
         let bar = progress::bar("path");
         if request.signals.is_empty() {
             request.signals = busiest::every(first);
-            let found = trace(first, &request, &mut progress::watch_with(&bar, CHEAPER))?;
+            let found = trace(first, &request, &mut progress::watch(&bar, CHEAPER))?;
             request.signals = busiest::busiest(&found.signals);
         }
-        let result = path_fitted(first, &request, &mut progress::watch_with(&bar, CHEAPER));
+        let result = path_fitted(first, &request, &mut progress::watch(&bar, CHEAPER));
         bar.finish_and_clear();
         let (fitted, result) = result?;
         warn_of_mesh(first, &fitted);

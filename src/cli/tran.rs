@@ -246,7 +246,7 @@ impl Tran {
         options: &TransientOptions<'_>,
     ) -> Result<(TransientResult, Option<JointReport>), Failure> {
         let bar = progress::bar("transient");
-        let watch = &mut progress::watch(&bar);
+        let watch = &mut progress::watch(&bar, self.cheaper(options.method));
         let result = match self.solver {
             SolverChoice::Frame => {
                 frame(compiled).and_then(|frame| frame_transient(compiled, &frame, options, watch)).map(|r| (r, None))
@@ -265,6 +265,17 @@ impl Tran {
         };
         bar.finish_and_clear();
         Ok(result?)
+    }
+
+    /// Options that make the run cheaper.
+    fn cheaper(&self, method: Integrator) -> &'static str {
+        match (self.step, method) {
+            (Some(_), _) => "a longer --step or a shorter --stop costs less",
+            (None, Integrator::Rk45) => {
+                "--method tr-bdf2 has steps as long as --tol allows; a shorter --stop costs less"
+            }
+            _ => "ten times the --tol takes a tenth to a half of the steps; a shorter --stop costs less",
+        }
     }
 
     fn integrator(&self, compiled: &Compiled) -> Result<Integrator, Failure> {
