@@ -1,0 +1,1 @@
+"""Random planar frames, and an independent frame solver to compare the command with (scripts/random-frames)."""
