@@ -5,11 +5,14 @@
 //! | `run` | one run, from its files to its raw file |
 //! | `find` | where ngspice and the plug-in are |
 //! | `scratch` | the folder of a run, and what ngspice reads at its start |
+//! | `includes` | the files that a deck includes: where `.model` lines stand |
 //! | `heard` | what ngspice says, and whether the run was good |
 //! | `error` | why it was not |
 //! | [`around`] | a deck around the circuit of a netlist |
+//! | `printed` | the `.print` lines of such a deck |
 //! | [`check`] | a run compared with a finer one |
 //! | [`finer`] | the finer deck |
+//! | `oscillation` | frequency and amplitude of what oscillates in both |
 //! | [`compare`] | how far two results are apart |
 
 pub mod around;
@@ -19,6 +22,9 @@ mod error;
 mod find;
 pub mod finer;
 mod heard;
+mod includes;
+mod oscillation;
+mod printed;
 mod run;
 mod scratch;
 mod spice_names;

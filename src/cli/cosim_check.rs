@@ -4,7 +4,7 @@ use super::failure::Failure;
 use super::output::print;
 use super::report::columns;
 use bimorph::cosim::check::Checked;
-use bimorph::cosim::compare::{Plot, Printed};
+use bimorph::cosim::compare::{Oscillation, Plot, Printed, Vector};
 use bimorph::results::plot::axis::quantity;
 use serde::Serialize;
 use std::path::Path;
@@ -42,9 +42,9 @@ pub(crate) fn print_check(deck: &Path, checked: &Checked, json: bool, quiet: boo
         text += &format!("\n{}", columns(&["printed", "as it is", "finer", "difference"], &rows));
     }
     let worst = (checked.plots.iter().flat_map(|plot| plot.vectors.iter().map(move |v| (plot, v))))
-        .max_by(|(_, a), (_, b)| a.largest.total_cmp(&b.largest));
+        .max_by(|(_, a), (_, b)| a.counts().total_cmp(&b.counts()));
     if let Some((plot, vector)) = worst {
-        text += &format!("\nlargest: {} of {} in {}\n", share(vector.largest), vector.name, plot.name);
+        text += &format!("\nlargest: {} of {} in {}\n", share(vector.counts()), vector.name, plot.name);
     }
     print(&text)
 }
@@ -56,12 +56,34 @@ fn table(plot: &Plot) -> String {
         "frequency" => quantity(x, "Hz"),
         _ => quantity(x, ""),
     };
-    let rows: Vec<Vec<String>> = (plot.vectors.iter())
+    let rows: Vec<Vec<String>> = (plot.vectors.iter().filter(|v| v.oscillation.is_none()))
         .map(|v| vec![v.name.clone(), quantity(v.range, &v.unit), share(v.largest), share(v.rms), place(v.at)])
         .collect();
     let [points, finer] = plot.points;
     let header = ["vector", "range", "largest", "rms", if plot.axis.is_empty() { "" } else { "at" }];
-    format!("\n{}, {points} points against {finer}\n{}", plot.name, columns(&header, &rows))
+    let table = if rows.is_empty() { String::new() } else { columns(&header, &rows) };
+    format!("\n{}, {points} points against {finer}\n{table}{}", plot.name, oscillators(plot))
+}
+
+/// What oscillates, whose phase counts for nothing.
+fn oscillators(plot: &Plot) -> String {
+    let row = |v: &Vector| {
+        let Oscillation { frequency: [f, _], amplitude: [a, _], difference } = v.oscillation?;
+        let of = |value: f64, unit: &str, off: f64| [quantity(value, unit), share(off)];
+        Some(
+            [vec![v.name.clone()], of(f, "Hz", difference[0]).to_vec(), of(a, &v.unit, difference[1]).to_vec()]
+                .concat(),
+        )
+    };
+    let rows: Vec<Vec<String>> = plot.vectors.iter().filter_map(row).collect();
+    if rows.is_empty() {
+        return String::new();
+    }
+    let header = ["oscillates", "frequency", "difference", "amplitude", "difference"];
+    format!(
+        "of what oscillates over the second half, frequency and amplitude in place of the phase\n{}",
+        columns(&header, &rows)
+    )
 }
 
 fn share(difference: f64) -> String {

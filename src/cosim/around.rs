@@ -4,6 +4,7 @@
 //! ([`Structure::without_circuit`]); the rest of the circuit stands beside it. Ports of the netlist are held at a voltage by a source
 //! each, as they are in every analysis, unless the netlist's circuit touches them and no voltage is given.
 
+use super::printed::{prints, scale};
 use super::spice_names::{Names, swept};
 use crate::structure::{CircuitElement, CircuitKind, NodeId, Structure};
 use std::collections::{BTreeMap, HashSet};
@@ -164,6 +165,11 @@ pub fn around(structure: &Structure, wanted: &Around) -> Result<String, AroundEr
     for analysis in &wanted.analyses {
         let _ = writeln!(text, "{}", swept(analysis, &called));
     }
+    let monitored = shown.iter().map(|(node, _)| node.as_str());
+    let at_ports = alone.ports.iter().filter_map(|port| nodes.get(&net(port.plus))).map(String::as_str);
+    let at_ports: Vec<&str> = monitored.chain(at_ports.filter(|node| *node != "0")).collect();
+    let given: Vec<&str> = called.values().map(String::as_str).filter(|name| name.starts_with("v_")).collect();
+    text += &prints(&wanted.analyses, &at_ports, &given);
     text.push_str(".end\n");
     Ok(text)
 }
@@ -243,16 +249,6 @@ fn line(
     })
 }
 
-/// Volts per unit of a signal: a micrometre, a milliradian, a kelvin, a femtocoulomb, a femtofarad or a micronewton is a volt.
-fn scale(signal: &str) -> f64 {
-    match signal.rsplit_once('.').map_or("", |(_, quantity)| quantity) {
-        "x" | "y" | "gap" | "F" => 1e6,
-        "rz" => 1e3,
-        "q" | "C" => 1e15,
-        _ => 1.0,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -311,6 +307,7 @@ mod tests {
                 "+ tol=1e-4",
                 "+ )",
                 ".op",
+                ".print op v(m_x) v(m) i(v_bias)",
                 ".end",
             ]
         );

@@ -4,6 +4,8 @@
 //! through its nearest points; the difference is what lies outside of that. A corner of a source, which both runs have a point at, and
 //! a smooth curve are thus treated alike.
 
+pub use super::oscillation::Oscillation;
+use super::oscillation::common;
 use crate::results::table::{Samples, Table};
 use serde::Serialize;
 
@@ -28,6 +30,15 @@ pub struct Vector {
     pub rms: f64,
     /// Where the largest is: value of the axis.
     pub at: f64,
+    /// Frequencies and amplitudes, where the differences are those of phase of an oscillator.
+    pub oscillation: Option<Oscillation>,
+}
+
+impl Vector {
+    /// The largest difference that counts [1]: of an oscillator that of its frequency or amplitude, not that of its phase.
+    pub fn counts(&self) -> f64 {
+        self.oscillation.map_or(self.largest, |o| o.difference[0].max(o.difference[1]))
+    }
 }
 
 /// How far apart the vectors of a plot are.
@@ -104,7 +115,14 @@ fn plot(a: &Table, b: &Table) -> Result<Plot, String> {
         let worst = (0..differences.len()).max_by(|&i, &j| differences[i].total_cmp(&differences[j])).unwrap_or(0);
         let squares: f64 = differences.iter().map(|d| d * d).sum();
         let relative = |d: f64| if range > 0.0 { d / range } else { d };
+        let oscillation = match (&column.samples, &other.samples) {
+            (Samples::Real(v), Samples::Real(w)) if a.plot_name.starts_with("Transient") => {
+                common((&x, v), (&y, w), relative(differences[worst]))
+            }
+            _ => None,
+        };
         vectors.push(Vector {
+            oscillation,
             name: column.name.clone(),
             unit: column.unit.clone(),
             range,

@@ -131,7 +131,7 @@ pub fn measuring(deck: &str, raw: &Path) -> Option<String> {
 }
 
 /// Lines with their continuations (`+`) put behind them; comments and empty lines between them stand before.
-fn logical_lines(deck: &str) -> Vec<String> {
+pub(super) fn logical_lines(deck: &str) -> Vec<String> {
     let (mut lines, mut last): (Vec<String>, Option<usize>) = (Vec::new(), None);
     for (number, line) in deck.lines().enumerate() {
         let text = line.trim_start();

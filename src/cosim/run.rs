@@ -11,7 +11,8 @@
 use super::error::{CosimError, io};
 use super::find::{find_ngspice, find_plugin};
 use super::heard::{judge, listen};
-use super::scratch::{Scratch, initialise};
+use super::includes::Included;
+use super::scratch::{Initial, Scratch, initialise, user_settings};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -87,7 +88,15 @@ pub(super) fn run_whatever(options: &CosimOptions, keep_going: &dyn Fn() -> bool
     let scratch = Scratch::new()?;
     let folder = deck.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let folder = folder.canonicalize().map_err(|source| CosimError::Deck { path: deck.clone(), source })?;
-    initialise(&scratch.0, &plugin, options.text.as_ref().map(|_| folder.as_path()))?;
+    let user = user_settings();
+    let settings = user.as_ref().and_then(|path| std::fs::read_to_string(path).ok()).unwrap_or_default();
+    let included = Included::of(&String::from_utf8_lossy(&text), &folder, &settings);
+    let start = Initial {
+        user: user.as_deref(),
+        limited: included.mentions(&["convstep", "convabsstep"]),
+        includes: options.text.as_ref().map(|_| folder.as_path()),
+    };
+    initialise(&scratch.0, &plugin, &start)?;
     let run_deck = match &options.text {
         Some(text) => {
             let copy = scratch.0.join(deck.file_name().unwrap_or(deck.as_os_str()));
@@ -106,6 +115,11 @@ pub(super) fn run_whatever(options: &CosimOptions, keep_going: &dyn Fn() -> bool
     let mut command = Command::new(&ngspice);
     command.arg("-b").env("SPICE_USERINIT_DIR", &scratch.0).env("BIMORPH_FAILURE", &failure).stdin(Stdio::null());
     command.env("BIMORPH_DECK_DIR", &folder);
+    let models: Vec<String> = included.models().map(|(name, at)| format!("{name}\t{}", at.display())).collect();
+    command.env("BIMORPH_MODEL_FOLDERS", models.join("\n"));
+    if let Ok(folders) = std::env::join_paths(&included.sourcepath) {
+        command.env("BIMORPH_SOURCEPATH", folders);
+    }
     if let Some(share) = options.tolerance_share {
         command.env("BIMORPH_TOL_SHARE", share.to_string());
     }

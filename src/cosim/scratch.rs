@@ -17,9 +17,26 @@ impl Scratch {
     }
 }
 
-/// Writes the initialisation file. The plug-in is linked under a plain name: ngspice splits paths at blanks; so is the folder in which
-/// the includes of a deck are looked for that is run as a copy.
-pub(super) fn initialise(folder: &Path, plugin: &Path, includes: Option<&Path>) -> Result<(), CosimError> {
+/// What the initialisation file of a run says beside loading the plug-in.
+pub(super) struct Initial<'a> {
+    /// The user's own initialisation file.
+    pub(super) user: Option<&'a Path>,
+    /// Whether the deck sets ngspice's limit on the change of a code model's inputs itself. Otherwise it is lifted: derivatives of parts are exact,
+    /// and the limit of 25 % or 0.1 V an iteration doubles the iterations of a large swing.
+    pub(super) limited: bool,
+    /// The folder where includes are looked up, where the deck is run as a copy.
+    pub(super) includes: Option<&'a Path>,
+}
+
+/// The user's initialisation file, as ngspice looks it up.
+pub(super) fn user_settings() -> Option<PathBuf> {
+    let home = std::env::var_os("HOME").map(PathBuf::from);
+    let places = [Some(PathBuf::from(".")), home].into_iter().flatten();
+    places.filter_map(|d| d.join(".spiceinit").canonicalize().ok()).next()
+}
+
+/// Writes the initialisation file. The plug-in is linked under a plain name: ngspice splits paths at blanks; so is the folder of the includes.
+pub(super) fn initialise(folder: &Path, plugin: &Path, start: &Initial<'_>) -> Result<(), CosimError> {
     let link = folder.join("bimorph.cm");
     #[cfg(unix)]
     let linked = std::os::unix::fs::symlink(plugin, &link);
@@ -27,13 +44,14 @@ pub(super) fn initialise(folder: &Path, plugin: &Path, includes: Option<&Path>) 
     let linked = std::fs::copy(plugin, &link).map(|_| ());
     linked.map_err(io(|| format!("cannot write {}", link.display())))?;
     let mut lines = String::from("* read by ngspice at its start\n");
-    let home = std::env::var_os("HOME").map(PathBuf::from);
-    let user = [Some(PathBuf::from(".")), home].into_iter().flatten().map(|d| d.join(".spiceinit"));
-    if let Some(user) = user.filter_map(|p| p.canonicalize().ok()).next() {
+    if !start.limited {
+        lines += "option convstep=1e9 convabsstep=1e9\n";
+    }
+    if let Some(user) = start.user {
         lines += &format!("source {}\n", user.display());
     }
     lines += &format!("codemodel {}\n", link.display());
-    if let Some(includes) = includes {
+    if let Some(includes) = start.includes {
         lines += &format!("set sourcepath = ( {} $sourcepath )\n", plain(includes, folder)?.display());
     }
     let path = folder.join(".spiceinit");

@@ -67,6 +67,8 @@ pub(crate) mod code {
     pub(crate) const OK: c_int = 0;
     /// Ends an analysis where no better code exists.
     pub(crate) const PANIC: c_int = 1;
+    /// Of a test of convergence: another iteration.
+    pub(crate) const UNSETTLED: c_int = 1;
     /// There is no such parameter.
     pub(crate) const BADPARM: c_int = 7;
     /// A parameter value cannot be used.
@@ -85,8 +87,6 @@ pub(crate) mod slot {
     pub(crate) const TRUNC: usize = 9;
     pub(crate) const DELETE: usize = 11;
     pub(crate) const MODEL_DELETE: usize = 12;
-    pub(crate) const ANALOG_ALLOC: usize = 23;
-    pub(crate) const ANALOG_GET_PTR: usize = 24;
     pub(crate) const ANALOG_INTEGRATE: usize = 25;
     pub(crate) const MESSAGE_SEND: usize = 35;
 }

@@ -11,6 +11,15 @@ pub(crate) const PORTS: usize = 0;
 /// Monitors.
 pub(crate) const MONITORS: usize = 1;
 
+/// Doubles of an instance within every state vector of the circuit.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Reserved {
+    /// Place of the first.
+    pub(crate) first: usize,
+    /// How many.
+    pub(crate) doubles: usize,
+}
+
 /// A host's string as text.
 ///
 /// # Safety
@@ -138,14 +147,21 @@ impl Call<'_> {
         self.tail.conn as usize
     }
 
-    /// First call of the instance in an analysis.
-    pub(crate) fn init(&self) -> bool {
-        self.told.init != 0
-    }
-
     /// A sweep, whose points follow each other's branch; an operating point starts from rest.
     pub(crate) fn sweep(&self) -> bool {
         self.circuit.sweep()
+    }
+
+    /// Address of the job that is being run.
+    pub(crate) fn job(&self) -> usize {
+        self.circuit.job()
+    }
+
+    /// The memory of an instance for a point, where the host has allocated it: 0 for the present point, 1 for the last accepted one.
+    pub(crate) fn memory(&self, point: usize, memory: Reserved) -> Option<*mut f64> {
+        let vector = self.circuit.states(point);
+        // SAFETY: the host allocates every state that was added to its count at setup.
+        (!vector.is_null()).then(|| unsafe { vector.add(memory.first) })
     }
 
     /// What is asked, or why it cannot be told. The circuit's step and the difference of the two times are the same up to
@@ -195,7 +211,7 @@ impl Call<'_> {
     }
 
     /// Positive and negative node of a port.
-    fn nodes(&self, which: usize, n: usize) -> [i32; 2] {
+    pub(crate) fn nodes(&self, which: usize, n: usize) -> [i32; 2] {
         // SAFETY: a port's matrix data begin with its two nodes, set by the host.
         port_data::NODES.map(|at| unsafe { *self.port(which, n).add(self.matrix + at).cast::<i32>() })
     }
@@ -234,7 +250,7 @@ impl Call<'_> {
                     let first = self.circuit.first() && !given;
                     *self.input(n) = if first { 0.0 } else { self.circuit.loaded_at(self.given(n)) };
                     let kept = *self.port(PORTS, n).add(self.partial + 16).cast::<i32>();
-                    *self.circuit.states().add(kept as usize) = *self.input(n);
+                    *self.circuit.states(0).add(kept as usize) = *self.input(n);
                 }
                 into.push(*self.input(n));
             }

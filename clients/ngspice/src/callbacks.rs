@@ -9,7 +9,7 @@ use crate::circuit::Circuit;
 use crate::opening::open_all;
 use crate::question::Outcome;
 use crate::registry::{close, registry};
-use crate::respond::{respond, settle};
+use crate::respond::{moves, respond, settle};
 use crate::table::{DEVICE, LAYOUT};
 use crate::{host, noise, panics, told, trace};
 use std::ffi::{c_int, c_void};
@@ -72,14 +72,23 @@ pub(crate) unsafe extern "C" fn model_ask(
 
 /// Tests convergence. Derivatives are exact here, so the host's own test of voltages and currents is enough; its test of
 /// integrals would cost one more iteration at every point. It comes where those have converged: of an equilibrium this is
-/// the last that is heard.
-pub(crate) unsafe extern "C" fn convergence_test(model: *mut Model, _circuit: *mut c_void) -> c_int {
+/// the last that is heard. What ngspice then writes is the solution before the last one, so that monitors of an equilibrium would
+/// carry `reltol`: they are iterated until they stand still.
+pub(crate) unsafe extern "C" fn convergence_test(model: *mut Model, circuit: *mut c_void) -> c_int {
     guarded(|| {
+        let Some(layout) = LAYOUT.get() else { return code::PANIC };
+        // SAFETY: the host's circuit, for this call.
+        let circuit = unsafe { Circuit::new(circuit, layout) };
         let mut registry = registry();
+        // SAFETY: the host's lists.
+        let mut entries = unsafe { call::instances(model) }.map(|(_, instance)| instance.conn as usize);
+        if entries.any(|key| registry.find(key).is_some_and(|entry| moves(entry, circuit))) {
+            return code::UNSETTLED;
+        }
         // SAFETY: the host's lists.
         for (_, instance) in unsafe { call::instances(model) } {
             if let Some(entry) = registry.find(instance.conn as usize) {
-                let warnings = entry.instance.settled();
+                let warnings = entry.instance.settled(entry.sweeping);
                 told::of_instance(entry.instance.name(), &warnings);
             }
         }
@@ -100,8 +109,8 @@ pub(crate) unsafe extern "C" fn setup(
         if result != code::OK {
             return result;
         }
-        // SAFETY: the host's lists of models and instances, set up above.
-        match unsafe { open_all(model, circuit) } {
+        // SAFETY: the host's lists of models and instances, set up above, and its count of states.
+        match unsafe { open_all(model, circuit, &mut *states) } {
             Ok(()) => {
                 offer_names();
                 code::OK

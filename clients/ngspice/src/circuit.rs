@@ -29,6 +29,11 @@ const IMAGINARY: usize = 304;
 /// Offset of the angular frequency up to ngspice 41 [byte].
 const OMEGA_39: usize = 568;
 
+/// Offsets of the job that is being run: where the mode stands at [`MODE_UNTIL_45`], and elsewhere [byte].
+const JOB: [usize; 2] = [664, 704];
+/// Offset of the mode up to ngspice 45 [byte].
+const MODE_UNTIL_45: usize = 392;
+
 /// Bits of the mode.
 mod bit {
     pub(super) const TRANSIENT: u64 = 0x1;
@@ -86,12 +91,21 @@ impl Circuit {
 
     /// The mode word. ngspice 45 and 46 cannot be told apart, and 46 has it one word further on: there the word that can
     /// be a mode counts.
-    fn mode(self) -> u64 {
+    fn mode_offset(self) -> usize {
         let valid = |word: u64| {
             word & !bit::ALL == 0 && (word & bit::KINDS).is_power_of_two() && (word & bit::STAGES).is_power_of_two()
         };
-        let words = self.layout.mode_offsets().map(|offset| self.read::<u64>(offset));
-        if valid(words[0]) { words[0] } else { words[1] }
+        let offsets = self.layout.mode_offsets();
+        if valid(self.read(offsets[0])) { offsets[0] } else { offsets[1] }
+    }
+
+    fn mode(self) -> u64 {
+        self.read(self.mode_offset())
+    }
+
+    /// Address of the job that is being run: it names one analysis line of the deck as long as that runs.
+    pub(crate) fn job(self) -> usize {
+        self.read(JOB[usize::from(self.mode_offset() != MODE_UNTIL_45)])
     }
 
     /// Time passes in this step.
@@ -125,9 +139,9 @@ impl Circuit {
         (self.layout.generation == Generation::Since39).then(|| self.read(OMEGA_39))
     }
 
-    /// The state vector of this point.
-    pub(crate) fn states(self) -> *mut f64 {
-        self.read(STATES)
+    /// The state vector of a point: 0 for the present one, 1 for the last accepted one. Null before the host has allocated them.
+    pub(crate) fn states(self, point: usize) -> *mut f64 {
+        self.read(STATES + point * size_of::<usize>())
     }
 
     /// Voltage between two nodes in the newest solution [V]. During a load that vector is the right-hand side.

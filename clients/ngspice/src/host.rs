@@ -84,24 +84,6 @@ pub(crate) unsafe fn load(model: *mut Model, circuit: *mut c_void) -> c_int {
     unsafe { CORE.function::<OverModel>(slot::LOAD)(model, circuit) }
 }
 
-/// Reserves state memory for the instance being called.
-///
-/// # Safety
-/// To be called from within a load, at the instance's first call.
-pub(crate) unsafe fn reserve(doubles: usize) {
-    // SAFETY: the host is loading an instance, so the instance that gets the memory is set.
-    unsafe { CORE.function::<unsafe extern "C" fn(c_int, c_int)>(slot::ANALOG_ALLOC)(0, (doubles * 8) as c_int) }
-}
-
-/// The reserved memory of the instance being called: 0 for this point, 1 for the last accepted one. Null without.
-///
-/// # Safety
-/// To be called from within a load.
-pub(crate) unsafe fn memory(point: c_int) -> *mut f64 {
-    // SAFETY: as above; the memory is an array of doubles.
-    unsafe { CORE.function::<unsafe extern "C" fn(c_int, c_int) -> *mut c_void>(slot::ANALOG_GET_PTR)(0, point).cast() }
-}
-
 /// Tells the host that a double of this point's memory is an integral, so that its truncation error bounds the steps.
 /// The double is overwritten. False where the host does not take it now.
 ///

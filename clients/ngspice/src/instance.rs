@@ -3,9 +3,11 @@
 //! Nothing here knows ngspice's memory; `crate::call` copies between the two. State that must follow accepted and
 //! rejected steps lives in a [`History`], which the host rolls back; what stays here is only a cache or a count.
 
+use crate::alternation::Alternation;
 use crate::companion::Rule;
 use crate::history::History;
 use crate::question::{Answer, Outcome, Question};
+use crate::refusals::Refusals;
 use crate::settings::{Monitor, PortName};
 use bimorph::device::scale::Scale;
 use bimorph::device::{
@@ -14,13 +16,6 @@ use bimorph::device::{
 };
 use bimorph::netlist::Diagnostic;
 
-/// How often in a row a step or an operating point may fail before the analysis ends. Each attempt of a transient is
-/// eight times shorter than the one before it.
-const ATTEMPTS: u32 = 4;
-/// A step that fails although it is shorter than this share of the longest one taken is hopeless, too [1]: the steps
-/// are creeping up to a point beyond which there is no answer.
-const HOPELESS: f64 = 1e-4;
-
 /// One device in a circuit.
 pub struct Instance {
     name: String,
@@ -28,7 +23,7 @@ pub struct Instance {
     pub(crate) monitors: Vec<Monitor>,
     description: Description,
     /// Of each port.
-    scales: Vec<Scale>,
+    pub(crate) scales: Vec<Scale>,
     /// What is given to each port, in its own unit.
     pub(crate) given: Vec<f64>,
     pub(crate) reply: TrialReply,
@@ -39,8 +34,8 @@ pub struct Instance {
     /// The last equilibrium whose warnings were asked for.
     looked: Option<Token>,
     step_bound: f64,
-    failures: u32,
-    longest: f64,
+    refusals: Refusals,
+    alternation: Alternation,
     pub(crate) counts: Counts,
 }
 
@@ -130,8 +125,8 @@ impl Instance {
             accepted: None,
             looked: None,
             step_bound: f64::INFINITY,
-            failures: 0,
-            longest: 0.0,
+            refusals: Refusals::default(),
+            alternation: Alternation::default(),
             counts: Counts::default(),
         })
     }
@@ -186,11 +181,11 @@ impl Instance {
         match question {
             Question::Static => {
                 let outcome = self.trial(Mode::Static, 0.0, 0.0, voltages, previous.token);
-                self.finish(outcome, None, previous)
+                self.finish(outcome, None, voltages, previous)
             }
             Question::Transient { t, dt, rule } => {
                 let outcome = self.trial(Mode::Transient, t, dt, voltages, previous.token);
-                self.finish(outcome, Some((rule, t, dt)), previous)
+                self.finish(outcome, Some((rule, t, dt)), voltages, previous)
             }
             Question::SmallSignal { omega } => self.linearize(omega, previous.token),
         }
@@ -199,18 +194,23 @@ impl Instance {
     /// Tells the device that the circuit accepted its last state, and what that warns of.
     pub fn accept(&mut self) -> Vec<Diagnostic> {
         let Some(token) = self.answer.token.filter(|t| self.accepted != Some(*t)) else { return Vec::new() };
-        let warnings = self.device.warns(token);
+        let mut warnings = self.device.warns(token);
         self.device.accept(token);
         self.accepted = Some(token);
         self.counts.points += 1;
+        let names = self.description.ports.iter().map(|p| p.name.as_str());
+        warnings.extend(self.alternation.accepted(self.answer.step, &self.answer.charges, &self.answer.base, names));
         warnings
     }
 
-    /// What its last equilibrium warns of, where the circuit has converged there.
-    pub fn settled(&mut self) -> Vec<Diagnostic> {
+    /// What its last equilibrium warns of, where the circuit has converged there, in a sweep or at an operating point.
+    pub fn settled(&mut self, sweeping: bool) -> Vec<Diagnostic> {
         // a test of convergence comes again where another part has not settled
         let still = self.answer.token.filter(|_| self.answer.step == 0.0 && self.looked != self.answer.token);
         self.looked = still.or(self.looked);
+        if sweeping {
+            self.refusals.settled();
+        }
         still.map_or_else(Vec::new, |token| self.device.warns(token))
     }
 
@@ -252,34 +252,44 @@ impl Instance {
         &mut self,
         result: Result<(), DeviceError>,
         time: Option<(Rule, f64, f64)>,
+        given: &[f64],
         previous: &History,
     ) -> Outcome {
         if let Err(error) = result {
             return Outcome::Stop(error.to_string());
         }
-        let step = time.map_or(0.0, |(.., dt)| dt);
+        let step = time.map(|(.., dt)| dt);
         let why = match &self.reply.status {
             Status::Ok => {
-                self.failures = 0;
-                self.longest = self.longest.max(step);
+                self.refusals.solved(step);
                 self.step_bound = if time.is_some() { self.reply.dt_next } else { f64::INFINITY };
                 self.fill(time, previous);
                 return Outcome::Solved;
             }
             // The host shortens the step and asks again, by as much as it takes.
-            Status::NeedDt(_) if step > HOPELESS * self.longest => {
+            Status::NeedDt(_) if step.is_some_and(|step| self.refusals.may_shorten(step)) => {
                 self.counts.refused += 1;
                 return Outcome::Retry;
             }
             Status::NeedDt(bound) => {
-                format!("the model needs steps below {bound:e} s, and even {step:e} s is too long")
+                format!("the model needs steps below {bound:e} s, and even {:e} s is too long", step.unwrap_or(0.0))
             }
+            Status::Fail(why) if step.is_none() => self.unbalanced(given, why),
             Status::Fail(why) => why.clone(),
         };
-        self.failures += 1;
         self.counts.refused += 1;
-        let hopeless = time.is_some() && step <= HOPELESS * self.longest;
-        if self.failures < ATTEMPTS && !hopeless { Outcome::Retry } else { Outcome::Stop(why) }
+        if self.refusals.refused(step) { Outcome::Stop(why) } else { Outcome::Retry }
+    }
+
+    /// Why there is no equilibrium at what is given to the ports. A circuit without a path for direct current drives a port that
+    /// conducts nothing to any voltage.
+    fn unbalanced(&self, given: &[f64], why: &str) -> String {
+        let ports = self.description.ports.iter().zip(given);
+        let ports: Vec<String> = ports.map(|(p, x)| format!("{} = {x:.4e} {}", p.name, p.kind.given().1)).collect();
+        let insulates = !self.answer.conductances.is_empty() && self.answer.conductances.iter().all(|g| *g == 0.0);
+        let hint =
+            if insulates { "; the ports conduct no direct current: does the circuit lead it to ground?" } else { "" };
+        format!("no equilibrium at {}: {why}{hint}", ports.join(", "))
     }
 
     /// Turns the reply into what ngspice wants; charges into currents where time passes.
@@ -298,28 +308,6 @@ impl Instance {
             let row = &reply.doutputs_dv[s * ports..(s + 1) * ports];
             answer.monitor_gains.extend(row.iter().zip(&self.scales).map(|(d, port)| monitor.scale * d * port.given));
         }
-    }
-
-    /// Spectral density that the part adds at an output on which its ports, then its monitors act by `gains` [complex].
-    ///
-    /// # Errors
-    /// Those of the device.
-    pub fn noise(&mut self, token: Token, omega: f64, gains: &[[f64; 2]]) -> Result<f64, DeviceError> {
-        let mut densities = Vec::new();
-        self.device.noise(token, omega, &mut densities)?;
-        if densities.len() != gains.len() * gains.len() {
-            return Ok(0.0);
-        }
-        let scales = self.scales.iter().map(|s| s.answered).chain(self.monitors.iter().map(|m| m.scale));
-        let gains: Vec<[f64; 2]> = gains.iter().zip(scales).map(|(g, scale)| g.map(|x| x * scale)).collect();
-        let mut sum = 0.0;
-        for (row, a) in densities.chunks_exact(gains.len().max(1)).zip(&gains) {
-            for (s, b) in row.iter().zip(&gains) {
-                // the real part of a·s·b̄; the imaginary ones cancel
-                sum += (a[0] * b[0] + a[1] * b[1]) * s[0] - (a[1] * b[0] - a[0] * b[1]) * s[1];
-            }
-        }
-        Ok(sum.max(0.0))
     }
 
     fn linearize(&mut self, omega: f64, token: Option<Token>) -> Outcome {

@@ -22,6 +22,7 @@
 #![warn(clippy::undocumented_unsafe_blocks)]
 
 mod abi;
+mod alternation;
 mod call;
 mod callbacks;
 mod circuit;
@@ -42,6 +43,7 @@ mod opening;
 mod panics;
 mod parameters;
 pub mod question;
+mod refusals;
 mod registry;
 mod respond;
 pub mod settings;

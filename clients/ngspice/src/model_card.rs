@@ -5,6 +5,7 @@ use crate::settings::{self, Monitor, PortName};
 use bimorph::compile::CompileOptions;
 use bimorph::device::Agitation;
 use bimorph::options::{MODEL, Refused};
+use std::path::PathBuf;
 use std::time::Duration;
 use thiserror::Error;
 
@@ -38,6 +39,8 @@ pub struct RawCard {
 pub struct ModelCard {
     /// Netlist, as spelled.
     pub file: String,
+    /// Folders of the files that hold lines of this model's name, where they are known.
+    pub folders: Vec<PathBuf>,
     /// Ports in the order of the node pairs; empty: all of the netlist, in its order.
     pub ports: Vec<PortName>,
     /// Signals shown as voltages, in the order of the monitor nodes.
@@ -147,6 +150,7 @@ impl ModelCard {
         }
         Ok(Self {
             file: raw.file.clone().filter(|f| !f.is_empty()).ok_or(CardError::NoFile)?,
+            folders: Vec::new(),
             ports: settings::rejoin(&raw.ports).iter().map(|p| PortName::parse(p)).collect(),
             monitors: settings::rejoin(&raw.monitors).iter().map(|m| Monitor::parse(m)).collect(),
             remote: match remote.or_else(|| raw.remote.clone()).filter(|r| !r.is_empty()) {

@@ -9,8 +9,10 @@
 use crate::abi::Model;
 use crate::call;
 use crate::circuit::Circuit;
+use crate::instance::Instance;
 use crate::layout::Layout;
 use crate::registry::{Entry, registry};
+use bimorph::device::{DeviceError, Token};
 use std::ffi::{c_int, c_void};
 
 /// What the host asks for: the density at a frequency, and not the sums at the end.
@@ -107,6 +109,30 @@ fn share(entry: &mut Entry, gains: &[[f64; 2]], frequency: f64) -> Result<f64, S
     };
     let omega = 2.0 * std::f64::consts::PI * frequency;
     entry.instance.noise(token, omega, gains).map_err(|why| told(&why, &name))
+}
+
+impl Instance {
+    /// Spectral density that the part adds at an output on which its ports, then its monitors act by `gains` [complex].
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn noise(&mut self, token: Token, omega: f64, gains: &[[f64; 2]]) -> Result<f64, DeviceError> {
+        let mut densities = Vec::new();
+        self.device.noise(token, omega, &mut densities)?;
+        if densities.len() != gains.len() * gains.len() {
+            return Ok(0.0);
+        }
+        let scales = self.scales.iter().map(|s| s.answered).chain(self.monitors.iter().map(|m| m.scale));
+        let gains: Vec<[f64; 2]> = gains.iter().zip(scales).map(|(g, scale)| g.map(|x| x * scale)).collect();
+        let mut sum = 0.0;
+        for (row, a) in densities.chunks_exact(gains.len().max(1)).zip(&gains) {
+            for (s, b) in row.iter().zip(&gains) {
+                // the real part of a·s·b̄; the imaginary ones cancel
+                sum += (a[0] * b[0] + a[1] * b[1]) * s[0] - (a[1] * b[0] - a[0] * b[1]) * s[1];
+            }
+        }
+        Ok(sum.max(0.0))
+    }
 }
 
 #[cfg(test)]

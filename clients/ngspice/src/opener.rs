@@ -27,6 +27,14 @@ pub enum OpenError {
         /// What the system said.
         source: std::io::Error,
     },
+    /// There are several in the folders where the line may stand.
+    #[error("the netlist \"{file}\" may be \"{}\" or \"{}\": two files hold a .model line of this name; name one of the models otherwise, or the netlist with its folder", .pair[0].display(), .pair[1].display())]
+    Twice {
+        /// As spelled on the line.
+        file: String,
+        /// The first two.
+        pair: [PathBuf; 2],
+    },
     /// The layout makes no netlist.
     #[error("layout \"{file}\": {source}")]
     Layout {
@@ -95,7 +103,7 @@ pub(crate) fn open(card: &mut ModelCard, directory: Option<&Path>) -> Result<Box
 /// # Errors
 /// [`OpenError`]
 pub fn open_model(card: &mut ModelCard, directory: Option<&Path>) -> Result<Box<dyn Device>, OpenError> {
-    let bundle = read(&card.file, directory)?;
+    let bundle = read(&card.file, &card.folders, directory)?;
     if !card.options.set.is_empty()
         && let Ok(plain) = netlist::load(&bundle, &[])
     {
@@ -151,10 +159,24 @@ fn connect(address: &str, _: &Bundle, _: &ModelCard) -> Result<Box<dyn Device>, 
     Err(OpenError::NoRemote(address.to_owned()))
 }
 
-/// Reads the netlist: absolute, or beside the deck, or in the working directory.
-fn read(file: &str, directory: Option<&Path>) -> Result<Bundle, OpenError> {
-    let beside = directory.map(|d| d.join(file));
-    let candidates: Vec<PathBuf> = beside.into_iter().chain([PathBuf::from(file)]).collect();
+/// Reads the netlist: absolute, or beside the file that holds the `.model` line (`folders`), beside the deck, in a folder of `BIMORPH_PATH` or of
+/// ngspice's `sourcepath`, or in the working directory.
+fn read(file: &str, folders: &[PathBuf], directory: Option<&Path>) -> Result<Bundle, OpenError> {
+    let mut own: Vec<PathBuf> = folders.iter().filter_map(|d| names::existing(&d.join(file))).collect();
+    own.dedup();
+    if let [first, second, ..] = own.as_slice() {
+        return Err(OpenError::Twice { file: file.to_owned(), pair: [first.clone(), second.clone()] });
+    }
+    let listed =
+        |name: &str| std::env::var_os(name).map_or_else(Vec::new, |list| std::env::split_paths(&list).collect());
+    let listed = ["BIMORPH_PATH", "BIMORPH_SOURCEPATH", "NGSPICE_INPUT_DIR"].into_iter().flat_map(listed);
+    let places = folders.iter().cloned().chain(directory.map(Path::to_owned)).chain(listed).chain([PathBuf::new()]);
+    let mut candidates: Vec<PathBuf> = Vec::new();
+    for candidate in places.map(|place: PathBuf| place.join(file)) {
+        if !candidates.contains(&candidate) {
+            candidates.push(candidate);
+        }
+    }
     let path = candidates.iter().find_map(|p| names::existing(p)).unwrap_or_else(|| candidates[0].clone());
     let unread = |source| OpenError::File {
         file: file.to_owned(),
@@ -208,7 +230,7 @@ mod tests {
     /// A missing netlist is named as spelled, with every place that was looked at.
     #[test]
     fn missing_file_names_every_place() {
-        let message = read("none.net", Some(Path::new("/nowhere"))).unwrap_err().to_string();
+        let message = read("none.net", &[], Some(Path::new("/nowhere"))).unwrap_err().to_string();
         assert!(message.contains("\"none.net\"") && message.contains("\"/nowhere/none.net\""), "{message}");
     }
 }

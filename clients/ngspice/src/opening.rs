@@ -1,21 +1,22 @@
 //! Setup of the instances: from ngspice's lists of models and instances to open devices.
 
 use crate::abi::{Connection, Model};
-use crate::call::{self, MONITORS};
+use crate::call::{self, MONITORS, Reserved};
 use crate::instance::Instance;
 use crate::model_card::ModelCard;
 use crate::registry::register;
 use crate::table::LAYOUT;
-use crate::{host, opener, parameters, trace};
+use crate::{history, host, opener, parameters, trace};
 use bimorph::device::Agitation;
-use std::ffi::c_void;
+use std::ffi::{c_int, c_void};
 use std::path::{Path, PathBuf};
 
-/// Opens each instance of each model.
+/// Opens each instance of each model, and reserves its state memory as the host's own devices do: by its count of states. What
+/// `cm_analog_alloc` would add later is missing in one vector under `.options maxord=1`, which the host then overruns.
 ///
 /// # Safety
-/// `model` heads the host's list of models; each is set up. `circuit` is the host's.
-pub(crate) unsafe fn open_all(model: *mut Model, circuit: *mut c_void) -> Result<(), String> {
+/// `model` heads the host's list of models; each is set up. `circuit` is the host's, and `states` its count of states so far.
+pub(crate) unsafe fn open_all(model: *mut Model, circuit: *mut c_void, states: &mut c_int) -> Result<(), String> {
     let remote = std::env::var("BIMORPH_REMOTE").ok();
     let share = match std::env::var("BIMORPH_TOL_SHARE") {
         Ok(text) => match text.parse() {
@@ -38,13 +39,15 @@ pub(crate) unsafe fn open_all(model: *mut Model, circuit: *mut c_void) -> Result
             )
         };
         let card = ModelCard::new(&raw, remote.clone())
-            .map(|card| card.with_share(share))
+            .map(|card| ModelCard { folders: folders_of(&model_name), ..card.with_share(share) })
             .and_then(|c| c.check_counts(ports.len(), monitors).map(|()| c));
         let opened = card
             .map_err(|e| e.to_string())
             .and_then(|mut card| open(&name, &mut card, &ports, directory.as_deref()))
             .map_err(|e| format!("instance {name} (model {model_name}): {e}"))?;
-        register(instance.conn as usize, opened);
+        let memory = Reserved { first: usize::try_from(*states).unwrap_or(0), doubles: history::len(ports.len()) };
+        *states += memory.doubles as c_int;
+        register(instance.conn as usize, opened, memory);
     }
     Ok(())
 }
@@ -55,6 +58,15 @@ fn open(name: &str, card: &mut ModelCard, ports: &[bool], directory: Option<&Pat
     let noise = card.noise.map(|noise| Agitation { seed: seed_of(noise.seed, name), ..noise });
     Instance::open(name, device, (&card.ports, ports), &card.monitors, noise)
         .map_err(|e| format!("\"{}\": {e}", card.file))
+}
+
+/// Folders of the files that hold the `.model` line of a model, as whoever started ngspice found them. Models of a subcircuit's instance
+/// are called `INSTANCE:MODEL`.
+fn folders_of(model: &str) -> Vec<PathBuf> {
+    let own = model.rsplit(':').next().unwrap_or(model);
+    let known = std::env::var("BIMORPH_MODEL_FOLDERS").unwrap_or_default();
+    let pairs = known.lines().filter_map(|line| line.split_once('\t'));
+    pairs.filter(|(name, _)| name.eq_ignore_ascii_case(own)).map(|(_, folder)| folder.into()).collect()
 }
 
 /// The seed of one instance, by FNV-1a over its name: parts of one model are shaken independently.

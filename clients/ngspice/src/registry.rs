@@ -1,6 +1,6 @@
 //! The instances ngspice has set up, and what they share during a load.
 
-use crate::call::Wanted;
+use crate::call::{Reserved, Wanted};
 use crate::circuit::Circuit;
 use crate::history::History;
 use crate::instance::Instance;
@@ -16,6 +16,8 @@ pub(crate) struct Entry {
     pub(crate) epoch: u64,
     /// The device.
     pub(crate) instance: Instance,
+    /// Its part of the host's state vectors.
+    pub(crate) memory: Reserved,
     /// Port voltages of the call, or currents where these are given.
     pub(crate) voltages: Vec<f64>,
     /// The last accepted point.
@@ -24,12 +26,18 @@ pub(crate) struct Entry {
     pub(crate) integrals: bool,
     /// The two places in the solution whose difference is given to each port.
     pub(crate) nodes: Vec<[i32; 2]>,
+    /// The places of each monitor in the solution.
+    pub(crate) shown: Vec<[i32; 2]>,
+    /// Iterations in a row that the monitors of an equilibrium have taken beyond ngspice's own.
+    pub(crate) further: u32,
     /// State of the last equilibrium: the operating point of a small signal.
     pub(crate) balanced: Option<Token>,
     /// Where the last answer's record stands: an address in the host's state memory, good until the point is accepted.
     pub(crate) record: usize,
     /// Whether the last equilibrium that was asked for was a point of a sweep.
     pub(crate) sweeping: bool,
+    /// The job of that sweep.
+    pub(crate) job: usize,
     /// The record of an analysis before a sweep, while its first point finds that in the host's memory.
     pub(crate) stale: Option<Token>,
     /// Its share in the noise at the output at the last frequency.
@@ -68,7 +76,7 @@ pub(crate) fn registry() -> MutexGuard<'static, Registry> {
 }
 
 /// Puts an opened instance in; it replaces the one before it.
-pub(crate) fn register(key: usize, instance: Instance) {
+pub(crate) fn register(key: usize, instance: Instance, memory: Reserved) {
     let registry = &mut *registry();
     registry.epochs += 1;
     registry.stopped = false;
@@ -77,13 +85,17 @@ pub(crate) fn register(key: usize, instance: Instance) {
         key,
         epoch: registry.epochs,
         instance,
+        memory,
         voltages: Vec::new(),
         previous: History::default(),
         integrals: false,
         nodes: Vec::new(),
+        shown: Vec::new(),
+        further: 0,
         balanced: None,
         record: 0,
         sweeping: false,
+        job: 0,
         stale: None,
         density: 0.0,
     };

@@ -7,7 +7,7 @@ use crate::instance::Instance;
 use crate::question::{Outcome, Question};
 use crate::registry::{Entry, Registry};
 use crate::{host, trace};
-use std::ffi::c_int;
+use bimorph::device::Status;
 
 /// Answers a call.
 pub(crate) fn respond(call: &Call<'_>, registry: &mut Registry) -> Outcome {
@@ -19,23 +19,19 @@ pub(crate) fn respond(call: &Call<'_>, registry: &mut Registry) -> Outcome {
         Err(why) => return Outcome::Stop(why.into()),
     };
     let ports = call.size(PORTS);
-    let doubles = history::len(ports);
-    if call.init() {
-        // SAFETY: this is the instance's first call in a load.
-        unsafe { host::reserve(doubles) };
-    }
-    let from = c_int::from(!matches!(question, Question::SmallSignal { .. }));
-    // SAFETY: this is within a load; the memory has the size that was reserved.
-    let recalled = unsafe { host::memory(from).as_ref().map(|m| std::slice::from_raw_parts(m, doubles)) };
-    let Some(recalled) = recalled else {
+    let from = usize::from(!matches!(question, Question::SmallSignal { .. }));
+    let (Some(recalled), Some(now)) = (call.memory(from, entry.memory), call.memory(0, entry.memory)) else {
         return Outcome::Stop("ngspice gave no state memory".into());
     };
+    // SAFETY: this is within a load; the memory has the size that was reserved.
+    let recalled = unsafe { std::slice::from_raw_parts(recalled, entry.memory.doubles) };
     history::read(recalled, entry.epoch, &mut entry.previous);
     if question == Question::Static && call.sweep() {
-        if !entry.sweeping {
-            // the host's memory still holds a point of the analysis before, which is no point of this sweep
+        if !entry.sweeping || entry.job != call.job() {
+            // the host's memory still holds a point of the analysis or the sweep before, which is no point of this sweep
             entry.stale = entry.previous.token;
         }
+        entry.job = call.job();
         if entry.stale.is_some() && entry.previous.token == entry.stale {
             entry.previous.token = None;
         } else {
@@ -52,7 +48,7 @@ pub(crate) fn respond(call: &Call<'_>, registry: &mut Registry) -> Outcome {
     }
     if matches!(question, Question::Transient { .. }) && !entry.integrals {
         // SAFETY: this is within a load of a transient, and the charges lie within this point's memory.
-        entry.integrals = unsafe { (0..ports).all(|n| host::integral(host::memory(0).add(history::HEAD + n))) };
+        entry.integrals = unsafe { (0..ports).all(|n| host::integral(now.add(history::HEAD + n))) };
     }
     call.voltages(&mut entry.voltages);
     let outcome = entry.instance.ask(question, &entry.voltages, &entry.previous);
@@ -62,7 +58,7 @@ pub(crate) fn respond(call: &Call<'_>, registry: &mut Registry) -> Outcome {
         }
         match question {
             Question::SmallSignal { .. } => write_gains(call, &entry.instance),
-            _ => write_answer(call, entry, doubles),
+            _ => write_answer(call, entry, now),
         }
     }
     if trace::on() {
@@ -71,7 +67,7 @@ pub(crate) fn respond(call: &Call<'_>, registry: &mut Registry) -> Outcome {
     outcome
 }
 
-fn write_answer(call: &Call<'_>, entry: &mut Entry, doubles: usize) {
+fn write_answer(call: &Call<'_>, entry: &mut Entry, memory: *mut f64) {
     let (answer, ports) = (entry.instance.answer(), call.size(PORTS));
     entry.nodes.clear();
     entry.nodes.extend((0..ports).map(|n| call.given(n)));
@@ -81,13 +77,34 @@ fn write_answer(call: &Call<'_>, entry: &mut Entry, doubles: usize) {
     for n in 0..call.size(MONITORS) {
         call.set(MONITORS, n, answer.monitors[n], &answer.monitor_gains[n * ports..(n + 1) * ports]);
     }
-    // SAFETY: this is within a load; this point's memory has the size that was reserved, and no other view of it.
-    let memory = unsafe { host::memory(0).as_mut().map(|m| std::slice::from_raw_parts_mut(m, doubles)) };
+    entry.shown.clear();
+    entry.shown.extend((0..call.size(MONITORS)).map(|n| call.nodes(MONITORS, n)));
     entry.record = 0;
-    if let (Some(memory), Some(token)) = (memory, answer.token) {
+    if let Some(token) = answer.token {
+        // SAFETY: this is within a load; this point's memory has the size that was reserved, and no other view of it.
+        let memory = unsafe { std::slice::from_raw_parts_mut(memory, entry.memory.doubles) };
         entry.record = memory.as_ptr() as usize;
         history::write(memory, entry.epoch, token, &answer.charges, &answer.base);
     }
+}
+
+/// Change of a monitor from one iteration to the next at which an equilibrium has converged, relative to its value [1]. Newton's iteration
+/// converges quadratically, so one or two more iterations than ngspice's own reach it.
+const STILL: f64 = 1e-6;
+/// Iterations for that beyond ngspice's own, at most.
+const MAX_FURTHER: u32 = 4;
+
+/// Whether the monitors of an equilibrium still move, where ngspice's own test is met: it ends at `reltol`.
+pub(crate) fn moves(entry: &mut Entry, circuit: Circuit) -> bool {
+    let moved = |nodes: &[i32; 2]| {
+        // SAFETY: nodes of the circuit, as the host set them up.
+        let (new, old) = unsafe { (circuit.solved(*nodes), circuit.loaded_at(*nodes)) };
+        (new - old).abs() > STILL * new.abs().max(old.abs())
+    };
+    let at_rest = entry.instance.answer().token.is_some() && entry.instance.answer().step == 0.0;
+    let still_moves = at_rest && entry.further < MAX_FURTHER && entry.shown.iter().any(moved);
+    entry.further = if still_moves { entry.further + 1 } else { 0 };
+    still_moves
 }
 
 /// Puts into the record what the accepted solution differs from the one that the device was asked at.
@@ -130,8 +147,12 @@ fn write_gains(call: &Call<'_>, instance: &Instance) {
 
 fn trace_call(entry: &Entry, question: Question, outcome: &Outcome) {
     let (name, answer) = (entry.instance.name(), entry.instance.answer());
+    let refusal = match &entry.instance.reply.status {
+        Status::Ok => String::new(),
+        refusal => format!(" ({refusal:?})"),
+    };
     trace::line(format_args!(
-        "{name} {question:?} parent {:?} v {:?} -> {outcome:?} token {:?} i {:?} q {:?} monitors {:?}",
+        "{name} {question:?} parent {:?} v {:?} -> {outcome:?}{refusal} token {:?} i {:?} q {:?} monitors {:?}",
         entry.previous.token, entry.voltages, answer.token, answer.currents, answer.charges, answer.monitors
     ));
 }

@@ -1,0 +1,146 @@
+//! Currents that alternate from point to point, which is no motion but the trapezoidal rule.
+//!
+//! i = 2·(q − q₁)/h − i₁ keeps what a current remembers wrongly, with the other sign at each step, as in any capacitor of ngspice. At each accepted
+//! point the derivative of the parabola through three charges is known beside that current; where the difference of the two changes its sign from
+//! point to point, half of what it departs from the mean of its neighbours is the alternation. On a smooth curve that is of fourth order in the step.
+//!
+//! Reference — L. W. Nagel, *SPICE2* (ERL-M520, Berkeley 1975), §4: the oscillation of the trapezoidal rule.
+
+use crate::history::Base;
+use bimorph::netlist::Diagnostic;
+
+/// Code of the warning.
+const CODE: &str = "W047";
+/// Alternation from which on a current is reported, of its range so far [1].
+const REPORTED: f64 = 3e-3;
+/// Points in a row that must alternate: a corner of a source makes few.
+const MIN_POINTS: u32 = 12;
+/// Share of a charge whose change over a step is no motion but what integrators leave of one [1].
+const NOISE: f64 = 1e-7;
+/// Ratio of a step to the one before it below which a point tells no derivative [1].
+const LEAST_RATIO: f64 = 1e-3;
+
+/// What the accepted points of an instance show of its currents.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Alternation {
+    /// Length of the last step [s]; 0 where there is none since an equilibrium.
+    step: f64,
+    ports: Vec<Port>,
+}
+
+#[derive(Debug, Clone, Copy, Default)]
+struct Port {
+    /// Charges at the last two points, the last first [C].
+    charges: [f64; 2],
+    /// Current of the charge at the last point [A].
+    current: f64,
+    /// Differences between current and derivative, the last first [A].
+    off: [f64; 3],
+    /// Range of the derivative [A].
+    range: [f64; 2],
+    /// Points in a row at which the difference changed its sign by as much.
+    points: u32,
+    /// What was reported, of its range [1].
+    reported: f64,
+}
+
+impl Port {
+    /// Alternation [A] at the point before the last, where it is one.
+    fn add(&mut self, [before, step]: [f64; 2], charge: f64) -> f64 {
+        let [last, first] = self.charges;
+        let slopes = [(last - first) / before, (charge - last) / step];
+        let derivative = (slopes[0] * step + slopes[1] * before) / (step + before);
+        self.range = [self.range[0].min(derivative), self.range[1].max(derivative)];
+        self.off = [self.current - derivative, self.off[0], self.off[1]];
+        let [a, b, c] = self.off;
+        let size = (0.5 * (b - 0.5 * (a + c))).abs();
+        let least = (REPORTED * (self.range[1] - self.range[0])).max(NOISE * charge.abs() / step);
+        if a * b < 0.0 && b * c < 0.0 && size > least {
+            self.points += 1;
+            size
+        } else {
+            self.points = 0;
+            0.0
+        }
+    }
+}
+
+impl Alternation {
+    /// After an accepted point: `step` [s], 0 at an equilibrium; `names` of the ports. What alternates by more than before, ten times as much.
+    pub(crate) fn accepted<'a>(
+        &mut self,
+        step: f64,
+        charges: &[f64],
+        base: &Base,
+        names: impl Iterator<Item = &'a str>,
+    ) -> Vec<Diagnostic> {
+        let known = self.step > 0.0 && self.ports.len() == charges.len();
+        if step == 0.0 || self.ports.len() != charges.len() {
+            self.ports = vec![Port::default(); charges.len()];
+        }
+        let even = known && step > LEAST_RATIO * self.step;
+        let mut warnings = Vec::new();
+        for ((port, name), (charge, current)) in
+            self.ports.iter_mut().zip(names).zip(charges.iter().zip(&base.currents))
+        {
+            let size = if even { port.add([self.step, step], *charge) } else { 0.0 };
+            if !even {
+                port.points = 0;
+            }
+            port.charges = [*charge, port.charges[0]];
+            port.current = *current;
+            let share = size / (port.range[1] - port.range[0]);
+            if port.points >= MIN_POINTS && share > 10.0 * port.reported {
+                port.reported = share;
+                warnings.push(Diagnostic::warning(
+                    CODE,
+                    format!(
+                        "the current of port `{name}` alternates from point to point by {share:.1e} of its range: the trapezoidal rule keeps an \
+                         error of a current with the other sign at each step"
+                    ),
+                    "`.options method=gear` or `xmu=0.45` damps it, and steps half as long make less of it",
+                ));
+            }
+        }
+        self.step = step;
+        warnings
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Reports of a charge q(t) at these times, its current off by `wrong` with the other sign at each step.
+    fn reports(q: impl Fn(f64) -> f64, i: impl Fn(f64) -> f64, wrong: f64, step: impl Fn(u32) -> f64) -> usize {
+        let (mut found, mut t) = (Alternation::default(), 0.0);
+        let base = |current: f64| Base { currents: vec![current], ..Base::default() };
+        let mut told = found.accepted(0.0, &[q(0.0)], &base(0.0), ["p"].into_iter()).len();
+        for n in 0..400 {
+            t += step(n);
+            let alternating = if n % 2 == 0 { wrong } else { -wrong };
+            told += found.accepted(step(n), &[q(t)], &base(i(t) + alternating), ["p"].into_iter()).len();
+        }
+        told
+    }
+
+    /// A sine of 28 points a cycle, even or uneven steps, is no alternation by itself; one of 5 % of its range is reported once.
+    #[test]
+    fn alternation_is_told_from_motion() {
+        let even = |_: u32| std::f64::consts::TAU / 28.0;
+        let uneven = |n: u32| even(n) * [1.3, 0.7, 1.1, 0.9, 1.0][n as usize % 5];
+        assert_eq!(reports(f64::sin, f64::cos, 0.0, even), 0);
+        assert_eq!(reports(f64::sin, f64::cos, 0.0, uneven), 0);
+        assert_eq!(reports(f64::sin, f64::cos, 0.1, even), 1);
+        assert_eq!(reports(f64::sin, f64::cos, 0.1, uneven), 1);
+    }
+
+    /// Ramps, constants and an alternation of a quarter of a percent of the range report nothing.
+    #[test]
+    fn what_is_small_is_not_reported() {
+        let even = |_: u32| 0.2;
+        assert_eq!(reports(|t| 3.0 * t, |_| 3.0, 0.0, even), 0);
+        assert_eq!(reports(|_| 1.0, |_| 0.0, 0.0, even), 0);
+        assert_eq!(reports(f64::sin, f64::cos, 0.005, even), 0);
+    }
+}
