@@ -104,7 +104,7 @@ pub fn frame_modes(
     let shape = |x: &Vec<Pose>| normalized(node_motions(compiled, frame, x), beam_motions(frame, x));
     let (shapes, curves) = found.shapes.iter().map(shape).unzip();
     let result = ModesResult {
-        per_deflection: 0.0,
+        per_deflection: Vec::new(),
         estimated_error: None,
         frequencies_hz: found.lambda.iter().map(|&l| l.max(0.0).sqrt() / std::f64::consts::TAU).collect(),
         shapes,

@@ -11,6 +11,7 @@ pub mod harmonic;
 pub mod integrator;
 pub mod joint_transient;
 mod linear_stress;
+mod loose_parts;
 pub mod mesh;
 pub mod modes;
 pub(crate) mod modes_side_by_side;
@@ -24,6 +25,7 @@ pub mod statics;
 pub(crate) mod statics_side_by_side;
 pub mod step_error;
 pub mod transient;
+mod weak_parts;
 
 use serde::Serialize;
 use thiserror::Error;

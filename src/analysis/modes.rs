@@ -1,6 +1,7 @@
 //! Natural frequencies and shapes about the operating point.
 use super::contact_range::comb_beyond_told;
 use super::gap_pieces;
+use super::loose_parts;
 use super::rotary_left_out;
 use super::sensitivity::About;
 use super::signal::{Signal, View};
@@ -28,18 +29,18 @@ pub struct ModesResult {
     /// For each mode, the residual ‖(K + λM)⁻¹(Kx − λMx)‖ in the mass norm, about the relative error of its shape; the
     /// frequency is off by the square [1].
     pub residuals: Vec<f64>,
-    /// For each mode, the estimated relative error of its frequency by the number of segments [1], signed; none where no
-    /// estimate can be made: for the baselines, and about a loaded equilibrium with rigid beams or schemes other than
-    /// E4 and B.
+    /// For each mode, the estimated relative error of its frequency by the number of segments [1]; none where no estimate can be made, as
+    /// for the baselines. About the drawing it is signed. About a loaded equilibrium it includes the error of that, and is a size where it
+    /// does not come from a comparison with twice the segments.
     pub errors: Vec<Option<f64>>,
     /// Mechanical unknowns.
     pub unknowns: usize,
     /// Largest displacement of a node at the equilibrium that the modes are about [m].
     pub deflection_m: f64,
-    /// How much faster a frequency moves than the equilibrium, d ln f / d ln q of the worst [1]; for the search for a mesh, and 0 in
-    /// what it ends with.
+    /// How much faster each frequency moves than the equilibrium, |d ln f / d ln q| [1]; for the search for a mesh, and empty in what it
+    /// ends with and about the drawing.
     #[serde(skip)]
-    pub per_deflection: f64,
+    pub per_deflection: Vec<f64>,
     /// What the numbers do not say by themselves.
     pub warnings: Vec<String>,
     /// Largest estimated relative error by the mesh, of every frequency and of the equilibrium that they are about [1]; none without an
@@ -150,7 +151,8 @@ fn shapeless(compiled: &Compiled, count: usize, voltages: &PortVoltages) -> Resu
         // what stress and heat do to the stiffness belongs to the vibration, in a linear model too
         system.add_stress_stiffness(&q, &drive, &mut tangent);
     }
-    let mut found = lowest_modes(system, (&q, &drive), &tangent, count + GUARDS)?;
+    let rigid = 3 * system.model.loose().count();
+    let mut found = lowest_modes(system, (&q, &drive), &tangent, count + GUARDS + rigid)?;
     if found.lambda.is_empty() {
         let detail = "no mode came out: nothing that moves has mass (give the layer a `density`), or the stiffness is not finite".into();
         return Err(AnalysisError::NotConverged { detail });
@@ -170,12 +172,14 @@ fn shapeless(compiled: &Compiled, count: usize, voltages: &PortVoltages) -> Resu
             detail: format!("there are more than {count} modes below the highest one found; ask for more modes"),
         });
     }
+    let rigid = loose_parts::settle_rigid(system, &tangent, &mut found);
     let forces =
         if loaded && !as_sugar { axial_forces(&compiled.structure, &compiled.parts, &q, &drive) } else { Vec::new() };
-    let errors = estimated(compiled, &tangent, &forces, &found);
+    let mut errors = estimated(compiled, &tangent, &forces, &found);
+    errors.iter_mut().zip(&rigid).filter(|(_, rigid)| **rigid).for_each(|(error, _)| *error = Some(0.0));
     let modes = (&found.lambda[..count.min(found.lambda.len())], found.shapes.as_slice());
     let about = About { compiled, q: &q, drive: &drive, stressed: !as_sugar, modes };
-    let per_deflection = if loaded { about.to_deflection() } else { 0.0 };
+    let per_deflection = if loaded { about.to_deflection() } else { Vec::new() };
     let in_pieces = in_pieces.map(|(name, share)| {
         // f goes as the fourth root of what is left of the voltage: by so much more than in proportion
         let left = 1.0 - 4.0 * share * gap_pieces::OF_PULL_IN * about.to_voltage();
@@ -183,7 +187,9 @@ fn shapeless(compiled: &Compiled, count: usize, voltages: &PortVoltages) -> Resu
         (name, next_to_fold.max(share * gap_pieces::OF_DEFLECTION))
     });
     let way = way.into_iter().map(|way| format!("the equilibrium that these modes are about: {way}"));
-    let warnings = gap_pieces::told(compiled, in_pieces).into_iter().chain(way).collect();
+    let rigid = rigid.iter().take(count).filter(|rigid| **rigid).count();
+    let warnings =
+        gap_pieces::told(compiled, in_pieces).into_iter().chain(way).chain(loose_parts::told(system, rigid)).collect();
     let result = judged(compiled, count, &q, (errors, warnings), &mut found);
     Ok((ModesResult { per_deflection, ..result }, q, found.shapes))
 }
@@ -212,7 +218,7 @@ fn judged(
         errors,
         unknowns: compiled.parts.system.model.unknowns(),
         deflection_m: deflection(compiled, q),
-        per_deflection: 0.0,
+        per_deflection: Vec::new(),
         warnings,
     }
 }

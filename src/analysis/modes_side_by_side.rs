@@ -69,6 +69,7 @@ fn drawn(compiled: &Compiled) -> Variant<'_> {
 fn at_rest(compiled: &Compiled, voltages: &PortVoltages) -> bool {
     let system = &compiled.parts.system;
     !about_equilibrium(compiled, voltages)
+        && system.model.loose().next().is_none()
         && !system.is_acted_on(&system.electrics.drive())
         && system.electrics.inputs.is_empty()
 }

@@ -61,30 +61,31 @@ fn raised(compiled: &Compiled, q: &[Pose], drive: &Drive) -> Option<(Vec<Pose>, 
 }
 
 impl About<'_> {
-    /// d ln f / d ln q of the worst mode [1].
-    pub(super) fn to_deflection(self) -> f64 {
+    /// |d ln f / d ln q| of each mode [1].
+    pub(super) fn to_deflection(self) -> Vec<f64> {
         if self.q.iter().all(|q| *q == Pose::zeros()) {
-            return 0.0;
+            return vec![0.0; self.modes.0.len()];
         }
         let moved = |factor: f64| self.quotients(&self.q.iter().map(|q| q * factor).collect::<Vec<_>>(), self.drive);
-        self.worst(&moved(1.0 + STEP), &moved(1.0 - STEP), 2.0 * STEP)
+        self.changes(&moved(1.0 + STEP), &moved(1.0 - STEP), 2.0 * STEP)
     }
 
     /// d ln f / d ln V of the worst mode, V the voltages across gaps [1]; infinite where the tangent is singular.
     pub(super) fn to_voltage(self) -> f64 {
         let Some((way, raised)) = raised(self.compiled, self.q, self.drive) else { return f64::INFINITY };
         let there: Vec<Pose> = self.q.iter().zip(&way).map(|(q, way)| q + way).collect();
-        self.worst(&self.quotients(&there, &raised), &self.quotients(self.q, self.drive), RAISED)
+        let changes = self.changes(&self.quotients(&there, &raised), &self.quotients(self.q, self.drive), RAISED);
+        changes.into_iter().fold(0.0, f64::max)
     }
 
-    /// The largest relative change of a frequency from `less` to `more`, over `apart`.
-    fn worst(&self, more: &[f64], less: &[f64], apart: f64) -> f64 {
+    /// The relative change of each frequency from `less` to `more`, over `apart`.
+    fn changes(&self, more: &[f64], less: &[f64], apart: f64) -> Vec<f64> {
         let highest = self.modes.0.iter().fold(0.0, |m: f64, l| m.max(l.abs()));
         let one = |((more, less), lambda): ((&f64, &f64), &f64)| {
             let swings = lambda.abs() > FREE * highest;
             if swings { ((more - less) / (2.0 * apart * lambda)).abs() } else { 0.0 }
         };
-        more.iter().zip(less).zip(self.modes.0).map(one).fold(0.0, f64::max)
+        more.iter().zip(less).zip(self.modes.0).map(one).collect()
     }
 
     /// xᵀ·K·x of each shape at `q` under `drive`.

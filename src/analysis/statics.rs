@@ -1,13 +1,15 @@
 //! Static equilibrium.
 pub use super::NodeMotion;
 use super::contact_range::within_contact_range;
+use super::loose_parts;
 use super::signal::{Signal, View};
+use super::weak_parts;
 use super::{AnalysisError, BeamMotions, PortVoltages};
 use crate::compile::Compiled;
 use crate::multibody::planar::Pose;
 use crate::solve::SolveError;
 use crate::solve::equilibrium::{Equilibrium, EquilibriumOptions, Path};
-use crate::solve::path::SourcePath;
+use crate::solve::path::{LoadPath, SourcePath};
 use crate::structure::MOLTEN;
 use serde::Serialize;
 
@@ -54,7 +56,7 @@ fn told(pulled_in: bool, jumped: bool, free_motions: &[String]) -> Vec<String> {
         }
         (false, false) => None,
     };
-    let held = free_motions.iter().map(|motion| format!("held, because no load excites it: {motion}"));
+    let held = free_motions.iter().map(|motion| format!("held where it is drawn: {motion}"));
     way.into_iter().chain(held).collect()
 }
 
@@ -201,14 +203,28 @@ fn settle(
     let electrics = &system.electrics;
     let mut solver = Equilibrium::new(system, EquilibriumOptions::default());
     let path = SourcePath::new(electrics, from, &sources, loads);
-    let path = solver.follow(system, &path, &mut q).map_err(AnalysisError::from)?;
-    // a part that hangs on nothing is a slip of the pen, also where no load finds out; one that hangs on so little that
-    // rounding hides it is not
-    if let Some(&loose) = solver.held().iter().find(|p| !system.model.grounded(p.body)) {
+    let mut end = electrics.drive();
+    path.at(1.0, &mut end);
+    let begun = q.clone();
+    let mut held_weakly = Vec::new();
+    let followed = solver.follow(system, &path, &mut q);
+    let failed = matches!(followed, Err(SolveError::Lost { .. } | SolveError::Singular { .. }));
+    let weak = if failed { weak_parts::held(system) } else { None };
+    let path = match weak {
+        Some((held, parts)) => {
+            q = begun;
+            let found = solver.follow(&held, &path, &mut q)?;
+            held_weakly = weak_parts::told(system, &held, &parts, &q);
+            found
+        }
+        None => followed?,
+    };
+    if let Some(loose) = loose_parts::unbalanced(system, &q, &end) {
         return Err(SolveError::singular(system, loose).into());
     }
     within_contact_range(compiled, &q)?;
-    let free_motions = solver.held().iter().map(|&p| SolveError::singular(system, p).to_string()).collect();
+    let mut free_motions = loose_parts::free_motions(system, solver.held());
+    free_motions.extend(held_weakly);
     Ok(settled(compiled, q, sources, path, free_motions))
 }
 

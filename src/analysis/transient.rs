@@ -2,6 +2,7 @@
 
 mod crossings;
 pub(super) mod first_step;
+mod folded;
 pub(super) mod options;
 pub(super) mod record;
 pub(super) mod result;

@@ -28,8 +28,8 @@ const MOST_SHAPES: usize = 12;
 /// Natural frequencies and mode shapes about the operating point, without damping.
 ///
 /// JSON: "frequencies_hz" ascending [Hz]; "shapes": for each mode the displacement of every node, the largest
-/// translation being 1; "residuals": about the relative error of each shape; "estimated_errors": relative, by the number of segments, signed,
-/// null where there is none; "deflection_m": how far the equilibrium that they are about is from the drawing.
+/// translation being 1; "residuals": about the relative error of each shape; "estimated_errors": relative, by the number of segments, one for
+/// each mode, signed about the drawing, null where there is none; "deflection_m": how far the equilibrium that they are about is from the drawing.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  bimorph modes bank.net --count 10 --band 1.3M\n  \
                         bimorph modes bank.net --port sense=40 --json      about the equilibrium at 40 V\n  \

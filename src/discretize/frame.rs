@@ -14,6 +14,7 @@
 //! Clark et al., "Addressing the needs of complex MEMS design", MEMS 2002, for SUGAR.
 
 use super::bar::bar;
+use super::free_rotation::{self, Acting};
 use super::rigid::Assembly;
 use super::{DiscretizeError, cubic, lay_spring, order};
 use crate::domains::{Domain, Member, Point};
@@ -93,13 +94,15 @@ pub fn assemble(structure: &Structure, options: &FrameOptions) -> Result<Frame, 
     for spring in &structure.springs {
         lay_spring(spring, undamped, &rigid, &mut joints, &mut dampers);
     }
-    rigid.hold_hinges(structure, &mut joints);
-
     let mut gaps = rigid.gaps(structure, options.gaps == FrameGaps::Laid { chord: true });
     if options.gaps == FrameGaps::LeftOut {
         gaps.retain(|laid| !laid.member.is_gap());
     }
     super::lay_dampers(&gaps, undamped, &mut dampers);
+    let ends: Vec<BodyId> = pieces.iter().flat_map(|piece| [piece.from.body, piece.to.body]).collect();
+    let acting = Acting { structure, joints: &joints, dampers: &dampers, members: &gaps, elements: &ends };
+    free_rotation::hold(&acting, &mut rigid);
+    rigid.hold_hinges(structure, &mut joints);
     let couplings: Vec<(BodyId, BodyId)> = (pieces.iter().map(|p| (p.from.body, p.to.body)))
         .chain(joints.iter().map(|j: &Joint| (j.a, j.b)))
         .chain(dampers.iter().map(|d| (d.a, d.b)))

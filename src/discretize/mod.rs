@@ -11,6 +11,7 @@
 //! |---|---|
 //! | [`order`] | model order: how many segments a beam gets |
 //! | [`rigid`] | nodes → rigid groups, supports → ground and held directions |
+//! | `free_rotation` | rotations that nothing uses, which are held |
 //! | [`junction`] | which beams meet where, and what that does to their ends |
 //! | [`junction_limits`] | where a drawing goes beyond the table of junctions |
 //! | [`junction_springs`] | offset and spring at the end of a beam |
@@ -30,6 +31,7 @@ pub mod cubic;
 mod error;
 mod excess;
 pub mod frame;
+mod free_rotation;
 pub mod junction;
 pub mod junction_limits;
 pub mod junction_springs;
@@ -44,6 +46,7 @@ pub mod yielded;
 
 pub use crate::options::{Junctions, Scheme};
 pub use error::{DiscretizeError, MOST_SEGMENTS};
+use free_rotation::Acting;
 
 use crate::budget;
 use crate::domains::{Domain, Laid, Load, Member, Point, System};
@@ -148,8 +151,11 @@ pub fn discretize_like(
     for spring in &structure.springs {
         lay_spring(spring, options.undamped, &rigid, &mut joints, &mut dampers);
     }
-    rigid.hold_hinges(structure, &mut joints);
     let gaps = rigid.gaps(structure, options.as_sugar);
+    lay_dampers(&gaps, options.undamped, &mut dampers);
+    let acting = Acting { structure, joints: &joints, dampers: &dampers, members: &gaps, elements: &[] };
+    free_rotation::hold(&acting, &mut rigid);
+    rigid.hold_hinges(structure, &mut joints);
     let mut couplings = couplings(&gaps);
     let load = |l: &crate::structure::Load| {
         let force = Vector2::new(l.force[0], l.force[1]);
@@ -166,7 +172,6 @@ pub fn discretize_like(
     if rigid.bodies.is_empty() {
         return Err(DiscretizeError::NothingMoves);
     }
-    lay_dampers(&gaps, options.undamped, &mut dampers);
     budget::lay_out(rigid.bodies.len() * BODY_BYTES);
     let bodies = rigid.finish_bodies();
     for joint in &mut joints {

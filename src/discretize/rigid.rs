@@ -8,8 +8,9 @@ use crate::domains::{Drawing, Laid, Member, Point};
 use crate::multibody::planar::JointFrame;
 use crate::multibody::{Body, BodyId, BodyName, Drag, Joint};
 use crate::sets::Sets;
-use crate::structure::{Beam, Mass, NodeId, Structure};
+use crate::structure::{Beam, Mass, NodeId, Structure, Support};
 use nalgebra::{Matrix2, Matrix3, Vector2};
+use std::collections::BTreeMap;
 
 /// Stiffness of a hinge over that of the stiffest beam or spring.
 const HINGE: f64 = 1e6;
@@ -181,12 +182,19 @@ impl Assembly {
         let springs = structure.springs.iter().flat_map(|s| [s.stiffness[0].abs(), s.stiffness[1].abs()]);
         let stiffest = structure.beams.iter().map(along).chain(springs).fold(0.0, f64::max);
         let stiffness = if stiffest > 0.0 { HINGE * stiffest } else { 1e10 };
+        let mut held: BTreeMap<usize, Vec<&Support>> = BTreeMap::new();
         for support in &structure.supports {
             let point = self.point(support.node.0);
             let BodyId::Free(k) = point.body else { continue };
             if self.bodies[k].fixed_angle || !(support.held[0] || support.held[1]) {
                 continue;
             }
+            // a second joint that holds the same would close a loop of rigid joints
+            let before = held.entry(support.node.0).or_default();
+            if before.iter().any(|one| holds_all_of(one, support)) {
+                continue;
+            }
+            before.push(support);
             let at = |held: bool| if held { stiffness } else { 0.0 };
             joints.push(Joint {
                 a: BodyId::Ground,
@@ -229,6 +237,12 @@ impl Assembly {
     }
 }
 
+/// Whether one support holds every translation that another one holds.
+fn holds_all_of(one: &Support, other: &Support) -> bool {
+    let translations = |support: &Support| [support.held[0], support.held[1]];
+    translations(one) == [true; 2] || (one.angle == other.angle && translations(one) == translations(other))
+}
+
 impl Rough {
     fn new(name: BodyName, reference: Vector2<f64>) -> Self {
         let (mass, drag) = (Lump::default(), Lump::default());
@@ -244,6 +258,21 @@ impl Rough {
             self.held.push(Vector2::new(-s, c));
         }
         self.fixed_angle |= held[2];
+    }
+
+    /// Tells `see` the point that a mass or a drag acts on, from the reference point [m]; none where it resists the rotation. What is
+    /// nearer than `same` [m] to a point is there.
+    pub(super) fn lumps_act(&self, same: f64, mut see: impl FnMut(Option<Vector2<f64>>)) {
+        for lump in [&self.mass, &self.drag].into_iter().filter(|lump| lump.amount != 0.0 || lump.second != 0.0) {
+            let center = lump.center();
+            let central = lump.second - lump.amount * center.norm_squared();
+            see((central <= lump.amount * same * same).then_some(center));
+        }
+    }
+
+    /// Takes the rotation out of the unknowns.
+    pub(super) fn hold_rotation(&mut self) {
+        self.fixed_angle = true;
     }
 
     fn finish(&self) -> Body {

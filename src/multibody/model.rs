@@ -1,14 +1,17 @@
 //! The immutable model: bodies in elimination order, joints, dampers; and the state that a snapshot holds.
 
+use super::BlockMatrix;
 use super::body::Body;
+use super::factor::{HELD, Inertia, ZeroPivot};
 use super::joint::{BodyId, Coupling, Damper, Joint};
 use super::layout::Layout;
 use super::pattern::Pattern;
-use super::planar::{Block, Pose};
+use super::planar::{Block, Pose, Symmetric};
 use super::section::{LaidJoint, NONE, Place, Section, Sections};
 use crate::sets::Sets;
-use nalgebra::{Matrix3, Matrix6};
+use nalgebra::{Matrix3, Matrix6, Vector2};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Bodies, joints and their elimination order. Never changed after [`Model::new`]; share it in an `Arc`.
@@ -30,6 +33,8 @@ pub struct Model {
     pub linear: bool,
     /// Bodies with a projector.
     held: Vec<u32>,
+    /// The bodies of each part that no joint connects to ground and no support holds.
+    loose: Vec<Vec<u32>>,
     pub(crate) damper_place: Vec<Place>,
     pub(crate) damper_matrix: Vec<Matrix6<f64>>,
 }
@@ -87,7 +92,7 @@ impl Model {
         drop(joints);
         let mut sorted: Vec<((u32, u32), u32)> = given.iter().map(|j| j.place.order()).zip(0..).collect();
         sorted.sort_unstable();
-        let laid = sorted.iter().map(|(_, k)| given[*k as usize]).collect();
+        let laid: Vec<LaidJoint> = sorted.iter().map(|(_, k)| given[*k as usize]).collect();
         let mut slots: Vec<Option<Body>> = bodies.into_iter().map(Some).collect();
         let mut bodies = Vec::with_capacity(order.len());
         bodies.extend(order.iter().filter_map(|&k| slots[k].take()));
@@ -96,6 +101,7 @@ impl Model {
         let sections = sections.all;
         let held = (0..).zip(&bodies).filter(|(_, b)| b.free.is_some()).map(|(k, _)| k).collect();
         let couplings = Vec::new();
+        let loose = loose_parts(&bodies, &laid);
         let model = Self {
             bodies,
             joints: laid,
@@ -105,6 +111,7 @@ impl Model {
             pattern: Arc::clone(pattern),
             linear,
             held,
+            loose,
             damper_place,
             damper_matrix,
         };
@@ -134,6 +141,56 @@ impl Model {
             joined.join(index(joint.place.a), index(joint.place.b));
         }
         joined.together(body, ground)
+    }
+
+    /// The last body of each part that no joint connects to ground and no support holds, ascending.
+    pub fn loose(&self) -> impl Iterator<Item = usize> {
+        self.loose.iter().filter_map(|part| part.last()).map(|&k| k as usize)
+    }
+
+    /// The bodies of each part that no joint connects to ground and no support holds, ascending.
+    pub fn loose_parts(&self) -> &[Vec<u32>] {
+        &self.loose
+    }
+
+    /// The same model with a spring to ground at the centre of each of these bodies, of a stiffness for displacements [N/m] and one for
+    /// rotations [N·m/rad]. These joints stand after all others.
+    #[must_use]
+    pub fn with_springs_to_ground(&self, bodies: &[usize], [moves, turns]: [f64; 2]) -> Self {
+        let mut model = self.clone();
+        let section = model.sections.len() as u32;
+        model.sections.push(Section {
+            axis: Vector2::x(),
+            stiffness: Symmetric([moves, 0.0, 0.0, moves, 0.0, turns]),
+            second: [0.0; 3],
+            expansion: None,
+            locked: [false; 3],
+        });
+        let spring = |&body: &usize| {
+            let place = Place { a: NONE, b: body as u32, block: NONE };
+            LaidJoint::at_center(place, section)
+        };
+        model.joints.extend(bodies.iter().map(spring));
+        model
+    }
+
+    /// [`BlockMatrix::factor_holding`] of a stiffness whose held directions are projected: the last body of each loose part is held, too.
+    ///
+    /// # Errors
+    /// [`ZeroPivot`].
+    pub fn factor_holding(
+        &self,
+        stiffness: &mut BlockMatrix<f64, 3>,
+        held: &mut Vec<ZeroPivot>,
+    ) -> Result<Inertia, ZeroPivot> {
+        for body in self.loose() {
+            let block = &mut stiffness.diagonal[body];
+            let own = block.diagonal();
+            block.set_diagonal(&(own * (1.0 + HELD)));
+        }
+        let inertia = stiffness.factor_holding(&self.pattern, held)?;
+        held.extend(self.loose().flat_map(|body| (0..3).map(move |direction| ZeroPivot { body, direction })));
+        Ok(inertia)
     }
 
     /// What a joint shares with others.
@@ -171,7 +228,7 @@ impl Model {
     }
 
     /// Removes the held directions from a matrix and gives them the pivot 1, so that solutions have no share in them.
-    pub fn project_matrix<T: super::Scalar>(&self, matrix: &mut super::BlockMatrix<T, 3>) {
+    pub fn project_matrix<T: super::Scalar>(&self, matrix: &mut BlockMatrix<T, 3>) {
         if self.held.is_empty() {
             return;
         }
@@ -199,6 +256,30 @@ impl Model {
             BodyId::Free(k) => q[k],
         }
     }
+}
+
+/// See [`Model::loose_parts`].
+fn loose_parts(bodies: &[Body], joints: &[LaidJoint]) -> Vec<Vec<u32>> {
+    let ground = bodies.len();
+    let mut joined = Sets::new(ground + 1);
+    let index = |id: u32| if id == NONE { ground } else { id as usize };
+    for joint in joints {
+        joined.join(index(joint.place.a), index(joint.place.b));
+    }
+    for (k, body) in bodies.iter().enumerate() {
+        if body.free.is_some() {
+            joined.join(k, ground);
+        }
+    }
+    let mut parts: BTreeMap<usize, Vec<u32>> = BTreeMap::new();
+    for k in 0..ground {
+        if !joined.together(k, ground) {
+            parts.entry(joined.first(k)).or_default().push(k as u32);
+        }
+    }
+    let mut loose: Vec<Vec<u32>> = parts.into_values().collect();
+    loose.sort_unstable_by_key(|part| part.last().copied());
+    loose
 }
 
 /// Where a pair's blocks lie on a pattern.

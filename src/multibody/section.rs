@@ -37,6 +37,11 @@ pub struct LaidJoint {
 }
 
 impl LaidJoint {
+    /// A joint between the centres of mass of two bodies, or of one and the ground.
+    pub(super) fn at_center(place: Place, section: u32) -> Self {
+        Self { arm_a: Vector2::zeros(), arm_b: Vector2::zeros(), rest: 0.0, place, section }
+    }
+
     /// Index of its section.
     #[inline]
     pub fn section(&self) -> usize {

@@ -176,8 +176,7 @@ impl Equilibrium {
         path.slope(s, &mut self.slope);
         system.tangent(q, &self.drive, &mut self.tangent, &mut self.residual);
         system.model.project_matrix(&mut self.tangent);
-        self.tangent
-            .factor_holding(&system.model.pattern, &mut self.held)
+        (system.model.factor_holding(&mut self.tangent, &mut self.held))
             .map_err(|p| SolveError::singular(system, p))?;
         system.drive_force(q, &self.drive, &self.slope, &mut self.step);
         for (step, r) in self.step.iter_mut().zip(&self.residual) {
@@ -201,7 +200,7 @@ impl Equilibrium {
             done.iterations += 1;
             system.tangent(&self.trial, &self.drive, &mut self.tangent, &mut self.residual);
             system.model.project_matrix(&mut self.tangent);
-            let Ok(inertia) = self.tangent.factor_holding(&system.model.pattern, &mut self.held) else {
+            let Ok(inertia) = system.model.factor_holding(&mut self.tangent, &mut self.held) else {
                 return Corrected::No;
             };
             std::mem::swap(&mut self.step, &mut self.residual);
@@ -275,7 +274,7 @@ impl Equilibrium {
         let mut residual = self.residual.clone();
         system.tangent(q, &self.drive, &mut self.tangent, &mut residual);
         model.project_matrix(&mut self.tangent);
-        if self.tangent.factor_holding(&model.pattern, &mut self.held).is_err() {
+        if model.factor_holding(&mut self.tangent, &mut self.held).is_err() {
             return String::new();
         }
         for (j, x) in self.step.iter_mut().enumerate() {

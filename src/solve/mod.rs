@@ -32,7 +32,10 @@ use thiserror::Error;
 #[non_exhaustive]
 pub enum SolveError {
     /// A body can move in a direction that nothing resists.
-    #[error("body \"{body}\" can move {direction} and nothing resists it")]
+    #[error(
+        "body \"{body}\" can move {direction} and nothing resists it: hold it (`anchor`, `hinge`, `slider`, a spring), or remove what moves it; \
+         `tran` runs what moves freely and has mass"
+    )]
     Singular {
         /// Name of the body.
         body: String,
@@ -104,7 +107,9 @@ pub enum SolveError {
 #[non_exhaustive]
 pub enum WhyFailed {
     /// A vanished pivot.
-    #[error("its matrix is singular")]
+    #[error(
+        "its matrix is singular: something moves there that has neither mass nor stiffness (`mass2d` gives a node m and J, `spring2d` a stiffness)"
+    )]
     Singular,
     /// No convergence.
     #[error("Newton's iteration did not settle in {iterations} iterations")]

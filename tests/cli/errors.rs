@@ -68,7 +68,7 @@ fn a_structure_that_can_move_freely() {
     let message = fails(&floating, "static bad.net --out a.svg");
     assert!(message.contains('a') && message.contains("anchor"), "{message}");
 
-    let disconnected = with(|net| format!("{net}beam2d p [x y] [l=50u w=2u]\n"));
+    let disconnected = with(|net| format!("{net}beam2d p [x y] [l=50u w=2u]\nf2d * [y] [F=1u]\n"));
     let message = fails(&disconnected, "static bad.net");
     assert!(message.contains('x') || message.contains('y'), "{message}");
 }

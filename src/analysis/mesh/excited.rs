@@ -11,6 +11,7 @@
 //! Each mode is asked to keep that below the tolerance. Modes are looked at until what is left of d is negligible. What heat
 //! drives comes with its time constant τ: of it a mode swings with 1/√(1 + (ωτ)²), the rest follows slowly.
 
+use super::super::loose_parts;
 use super::super::modes::modes;
 use super::super::rotary_left_out;
 use super::super::statics::{OperatingPoint, operating_point};
@@ -71,7 +72,11 @@ pub(super) fn order(moving: &Compiled, options: &TransientOptions<'_>) -> Result
         true => equilibrium::estimated(model, voltages, segments).map(|(order, _)| order),
         false => equilibrium::order(model, voltages, segments).map(|(order, _)| order),
     };
-    let mut still = at(start, moving.order.segments.clone())?;
+    let mut still = match at(start, moving.order.segments.clone()) {
+        // a run of a mechanism or of a loose part needs no equilibrium
+        Err(AnalysisError::Singular { .. }) if options.release.is_none() => moving.order.clone(),
+        still => still?,
+    };
     if options.release.is_some() {
         // where the run goes to may have no equilibrium at all
         if let Ok(end) = at(moving, still.segments.clone()) {
@@ -282,7 +287,13 @@ fn pushed(
     system.residual(&from.q, drive, &mut x);
     let mut factor = stiffness.clone();
     system.model.project_matrix(&mut factor);
-    factor.factor(&system.model.pattern).ok()?;
+    if system.model.loose_parts().is_empty() {
+        factor.factor(&system.model.pattern).ok()?;
+    } else {
+        // a part that floats bends under the forces that are left beside those of its free motion
+        loose_parts::relieve(&system.model, &mut x);
+        system.model.factor_holding(&mut factor, &mut Vec::new()).ok()?;
+    }
     factor.solve(&system.model.pattern, &mut x);
     system.model.project(&mut x);
     x.iter().all(|x| x.iter().all(|v| v.is_finite())).then_some(x)

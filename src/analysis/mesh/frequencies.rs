@@ -1,9 +1,10 @@
 //! The mesh for modes: the highest one asked for decides, and about a loaded state that state and its frequencies too.
 
-use super::super::modes::{ModesResult, about_equilibrium, modes, modes_with_curves};
+use super::super::modes::{ModesResult, about_equilibrium, modes_with_curves};
 use super::super::{AnalysisError, BeamMotions, PortVoltages};
 use super::equilibrium;
 use super::meshed::{chosen, meshed, on};
+use super::mode_pairs;
 use crate::compile::Compiled;
 use crate::discretize::DiscretizeError;
 use crate::options::{CompileOptions, Junctions};
@@ -20,42 +21,31 @@ const FINEST_KNOWN: f64 = 3e-5;
 /// What is left of an error of the first order over what the comparison, which takes it for one of the second, says.
 const FIRST_ORDER: f64 = 1.5;
 
-/// The modes on the mesh for them, which comes with them, and the displacement of points along every beam.
+/// The modes on the mesh for them, which comes with it, each with the estimate of its own error, and the displacement of points along every beam.
 ///
 /// # Errors
-/// See [`fitted`].
+/// See [`fitted`](super::fitted).
 pub fn modes_fitted(
     compiled: &Compiled,
     count: usize,
     voltages: &PortVoltages,
 ) -> Result<(Compiled, ModesResult, Vec<BeamMotions>), AnalysisError> {
-    let (order, found) = for_modes(compiled, count, voltages)?;
-    let found = found.filter(|(segments, _)| *segments == order.segments);
+    let (order, (result, curves)) = for_modes(compiled, count, voltages)?;
     let fitted = on(compiled, order)?;
-    let (result, curves) = match found {
-        Some((_, found)) => found,
-        None => modes_with_curves(&fitted, count, voltages)?,
-    };
-    let (estimated_error, loaded) = (fitted.order.estimated_error, about_equilibrium(compiled, voltages));
-    // what a mode says of itself knows nothing of the state that it is about
-    let all = |own: &Option<f64>| if loaded { own.zip(estimated_error).map(|(own, all)| own.max(all)) } else { *own };
-    let errors = result.errors.iter().map(all).collect();
+    let estimated_error = fitted.order.estimated_error;
     // the search has no more use of how they follow the deflection
-    Ok((fitted, ModesResult { errors, estimated_error, per_deflection: 0.0, ..result }, curves))
+    Ok((fitted, ModesResult { estimated_error, per_deflection: Vec::new(), ..result }, curves))
 }
 
 /// Modes with the shapes of their beams.
 pub(crate) type Shaped = (ModesResult, Vec<BeamMotions>);
 
-/// Those of a mesh.
-pub(super) type OfMesh = Option<(Vec<usize>, Shaped)>;
-
-/// The mesh for modes, and those of a mesh that was looked at, which may be another one.
+/// The mesh for modes, and the modes on that mesh with the estimates of their errors.
 pub(super) fn for_modes(
     compiled: &Compiled,
     count: usize,
     voltages: &PortVoltages,
-) -> Result<(ModelOrder, OfMesh), AnalysisError> {
+) -> Result<(ModelOrder, Shaped), AnalysisError> {
     let loaded = about_equilibrium(compiled, voltages);
     let given = chosen(compiled) || compiled.options.band.is_some();
     let order = if given {
@@ -64,50 +54,129 @@ pub(super) fn for_modes(
         let detail = |error: DiscretizeError| AnalysisError::NotConverged { detail: error.to_string() };
         counted::choose(&compiled.structure, &compiled.options, count).map_err(detail)?
     };
-    let mut analyse = |segments: &[usize]| {
-        let model = meshed(compiled, segments)?;
-        Ok::<_, AnalysisError>(frequency_outputs(&modes(&model, count, voltages)?, count))
-    };
+    let mut compared = Compared { compiled, count, voltages, meshes: Vec::new() };
+    if !loaded {
+        return about_drawing(&mut compared, order, given);
+    }
+    if chosen(compiled) {
+        let order = doubling::estimate(&compiled.options, order.segments, &mut |mesh| compared.outputs(mesh))?;
+        return compared.finish(order);
+    }
+    let (still, _) = equilibrium::order(compiled, voltages, order.segments)?;
+    let (own, found) = own_estimate(compiled, still.clone(), count, voltages)?;
+    let carried = is_carried(compiled, &found.0, still.estimated_error);
+    let enough = carried && own.estimated_error.is_some_and(|error| error <= counted::SAFETY * compiled.options.tol);
+    if (enough && !is_fine(compiled)) || count > MOST_COMPARED {
+        let (result, curves) = found;
+        let faster = result.per_deflection.iter().copied().fold(1.0, f64::max);
+        let moved = still.estimated_error.map(|error| if carried { error } else { error * faster });
+        // an error of the state moves each frequency as far as that follows the state
+        let of_state = |k: usize| Some(still.estimated_error? * result.per_deflection.get(k)?);
+        let each = |(k, own): (usize, &Option<f64>)| Some(own.as_ref()?.abs() + of_state(k)?);
+        let errors: Vec<Option<f64>> = result.errors.iter().enumerate().map(each).collect();
+        let all = [moved, own.estimated_error, worst(errors.iter().copied())];
+        let estimated_error = worst(all.into_iter());
+        return Ok((ModelOrder { estimated_error, ..own }, (ModesResult { errors, ..result }, curves)));
+    }
+    compared.keep(own.segments.clone(), found);
+    let moving = compared.fit(own.segments)?;
+    let estimated_error = worst([still.estimated_error, moving.estimated_error].into_iter());
+    // the comparison includes the states that the modes are about
+    compared.finish(ModelOrder { estimated_error, ..moving })
+}
+
+/// The mesh and the modes about the drawing, which know their errors where the scheme lets them.
+fn about_drawing(
+    compared: &mut Compared<'_>,
+    order: ModelOrder,
+    given: bool,
+) -> Result<(ModelOrder, Shaped), AnalysisError> {
+    let Compared { compiled, count, .. } = *compared;
     let fine = is_fine(compiled);
-    let mut fit = |segments: Vec<usize>| {
-        if !fine {
+    let (order, found) = own_estimate(compiled, order, count, &[])?;
+    // two modes next to each other may change places from the mesh that was looked at to this one
+    let holds = order.estimated_error.is_some_and(|error| error <= compiled.options.tol);
+    let known = if given { order.estimated_error.is_some() } else { holds && !fine };
+    if known || count > MOST_COMPARED {
+        return Ok((order, found));
+    }
+    compared.keep(order.segments.clone(), found);
+    let order = match given {
+        true => doubling::estimate(&compiled.options, order.segments, &mut |mesh| compared.outputs(mesh))?,
+        false => compared.fit(order.segments)?,
+    };
+    compared.finish(order)
+}
+
+/// Meshes whose modes are kept while they are compared, at most: the mesh that holds and its double are the last two but for rounding.
+const MOST_KEPT: usize = 12;
+
+/// The modes of the meshes that are compared.
+struct Compared<'a> {
+    compiled: &'a Compiled,
+    count: usize,
+    voltages: &'a PortVoltages,
+    meshes: Vec<(Vec<usize>, Shaped)>,
+}
+
+impl Compared<'_> {
+    fn keep(&mut self, segments: Vec<usize>, found: Shaped) {
+        if self.meshes.len() == MOST_KEPT {
+            self.meshes.remove(0);
+        }
+        self.meshes.push((segments, found));
+    }
+
+    /// The modes of a mesh.
+    fn shaped(&mut self, segments: &[usize]) -> Result<&Shaped, AnalysisError> {
+        let at = match self.meshes.iter().position(|(known, _)| known == segments) {
+            Some(at) => at,
+            None => {
+                let model = meshed(self.compiled, segments)?;
+                let found = modes_with_curves(&model, self.count, self.voltages)?;
+                self.keep(segments.to_vec(), found);
+                self.meshes.len() - 1
+            }
+        };
+        Ok(&self.meshes[at].1)
+    }
+
+    fn outputs(&mut self, segments: &[usize]) -> Result<Vec<Output>, AnalysisError> {
+        let count = self.count;
+        Ok(frequency_outputs(&self.shaped(segments)?.0, count))
+    }
+
+    fn fit(&mut self, segments: Vec<usize>) -> Result<ModelOrder, AnalysisError> {
+        let compiled = self.compiled;
+        let mut analyse = |mesh: &[usize]| self.outputs(mesh);
+        if !is_fine(compiled) {
             return doubling::fit(&compiled.structure, &compiled.options, segments, &mut analyse);
         }
         let options = CompileOptions { tol: compiled.options.tol / FIRST_ORDER, ..compiled.options.clone() };
         let order = doubling::fit(&compiled.structure, &options, segments, &mut analyse)?;
         Ok(order.with_estimate_times(FIRST_ORDER))
-    };
-    if !loaded {
-        // modes about the drawing know their errors, where the scheme lets them
-        let (order, found) = own_estimate(compiled, order, count, &[])?;
-        // two modes next to each other may change places from the mesh that was looked at to this one
-        let holds = order.estimated_error.is_some_and(|error| error <= compiled.options.tol);
-        let known = if given { order.estimated_error.is_some() } else { holds && !fine };
-        if known || count > MOST_COMPARED {
-            return Ok((order, found));
+    }
+
+    /// The modes on the mesh that was chosen, each with the difference that twice its segments make.
+    fn finish(&mut self, order: ModelOrder) -> Result<(ModelOrder, Shaped), AnalysisError> {
+        let compiled = self.compiled;
+        let times = if is_fine(compiled) { FIRST_ORDER } else { 1.0 };
+        let (mut result, curves) = self.shaped(&order.segments)?.clone();
+        let twice = doubling::twice(&compiled.options, &order).map(|twice| twice.segments);
+        // without an estimate there is no finer mesh with modes
+        let twice = twice.filter(|twice| order.estimated_error.is_some() && *twice != order.segments);
+        if let Some(twice) = twice
+            && let Ok(finer) = self.shaped(&twice)
+        {
+            let (structure, count) = (&compiled.structure, result.frequencies_hz.len());
+            let errors = mode_pairs::errors(structure, (&result, &curves), (&finer.0, &finer.1));
+            result.errors = errors.into_iter().map(|error| error.map(|error| times * error)).collect();
+            result.errors.resize(count, None);
         }
-        let order = match given {
-            true => doubling::estimate(&compiled.options, order.segments, &mut analyse),
-            false => fit(order.segments),
-        };
-        return Ok((order?, found));
+        let of_modes = worst(result.errors.iter().copied()).filter(|_| order.estimated_error.is_some());
+        let estimated_error = order.estimated_error.map(|error| error.max(of_modes.unwrap_or(0.0)));
+        Ok((ModelOrder { estimated_error, ..order }, (result, curves)))
     }
-    if chosen(compiled) {
-        return Ok((doubling::estimate(&compiled.options, order.segments, &mut analyse)?, None));
-    }
-    let (still, _) = equilibrium::order(compiled, voltages, order.segments)?;
-    let (own, found) = own_estimate(compiled, still.clone(), count, voltages)?;
-    let worst = |a: Option<f64>, b: Option<f64>| Some(a?.max(b?));
-    let carried = found.as_ref().is_some_and(|(_, (modes, _))| is_carried(compiled, modes, still.estimated_error));
-    let enough = carried && own.estimated_error.is_some_and(|error| error <= counted::SAFETY * compiled.options.tol);
-    if (enough && !fine) || count > MOST_COMPARED {
-        let faster = found.as_ref().map_or(1.0, |(_, (modes, _))| modes.per_deflection.max(1.0));
-        let moved = still.estimated_error.map(|error| if carried { error } else { error * faster });
-        let estimated_error = worst(moved, own.estimated_error);
-        return Ok((ModelOrder { estimated_error, ..own }, found));
-    }
-    let moving = fit(own.segments)?;
-    Ok((ModelOrder { estimated_error: worst(still.estimated_error, moving.estimated_error), ..moving }, found))
 }
 
 /// Whether the tolerance is finer than what modes of the drawing know of their errors.
@@ -117,7 +186,8 @@ pub(super) fn is_fine(compiled: &Compiled) -> bool {
 
 /// Whether what the mesh leaves uncertain of the equilibrium moves no frequency beyond the tolerance: next to a fold it does.
 pub(super) fn is_carried(compiled: &Compiled, found: &ModesResult, still: Option<f64>) -> bool {
-    still.is_some_and(|error| error * found.per_deflection.max(1.0) <= doubling::SAFETY * compiled.options.tol)
+    let faster = found.per_deflection.iter().copied().fold(1.0, f64::max);
+    still.is_some_and(|error| error * faster <= doubling::SAFETY * compiled.options.tol)
 }
 
 /// Largest of the errors; none where one of them is not known.
@@ -141,10 +211,9 @@ fn own_estimate(
     order: ModelOrder,
     count: usize,
     voltages: &PortVoltages,
-) -> Result<(ModelOrder, OfMesh), AnalysisError> {
+) -> Result<(ModelOrder, Shaped), AnalysisError> {
     let model = meshed(compiled, &order.segments)?;
     let found = modes_with_curves(&model, count, voltages)?;
     let estimated_error = worst(found.0.errors.iter().copied());
-    let found = Some((order.segments.clone(), found));
     Ok((ModelOrder { estimated_error, ..order }, found))
 }

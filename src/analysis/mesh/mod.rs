@@ -22,6 +22,7 @@ pub(crate) mod given;
 mod in_band;
 mod in_circuit;
 mod meshed;
+mod mode_pairs;
 mod path;
 mod pull_in;
 mod seen;

@@ -6,6 +6,7 @@ use super::super::stability::Stability;
 use super::super::statics::{operating_point, source_vector, told_at};
 use super::super::{AnalysisError, Watch};
 use super::crossings::Crossings;
+use super::folded;
 use super::options::{TransientOptions, check};
 use super::result::{Counters, TransientResult};
 use super::samples::Samples;
@@ -82,7 +83,12 @@ pub(in crate::analysis) fn record(
         }
         watch(((s + h) / options.stop).min(1.0))
     };
-    let (end, work) = carrier.advance(&ramp, &mut motion, &mut observe)?;
+    let (end, work) = carrier.advance(&ramp, &mut motion, &mut observe).map_err(|error| match error {
+        AnalysisError::StepFailed { t, dt, detail } => {
+            AnalysisError::StepFailed { t, dt, detail: detail + &folded::told(compiled, &motion.q) }
+        }
+        other => other,
+    })?;
     if end == Advance::Stopped {
         return Err(beyond.unwrap_or(AnalysisError::Cancelled));
     }

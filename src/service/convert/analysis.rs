@@ -99,7 +99,7 @@ pub fn modes_from_wire(wire: proto::ModesResponse) -> ModesResult {
         estimated_error,
         unknowns,
         deflection_m,
-        per_deflection: 0.0,
+        per_deflection: Vec::new(),
         warnings,
     }
 }

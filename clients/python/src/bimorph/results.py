@@ -63,7 +63,7 @@ class StaticResult:
     def _repr_html_(self) -> str:
         rows = ((name, node.x, node.y, node.rz) for name, node in self.nodes.items())
         way = "pulled in on the way" if self.pulled_in else "snapped through or buckled on the way" if self.jumped else ""
-        held = [f"held, because no load excites it: {motion}" for motion in self.free_motions]
+        held = [f"held where it is drawn: {motion}" for motion in self.free_motions]
         note = showing.note(self.estimated_error, [*filter(None, [way]), *held, *self.warnings])
         return showing.table(["node", "x [m]", "y [m]", "rz [rad]"], rows, note)
 

@@ -1,0 +1,72 @@
+//! Parts that hang on beams so slender that rounding hides their stiffness, as drawings have them that place one part beside another.
+//!
+//! The stiffness of such a beam is below the rounding of what it joins: an equilibrium of the part is not to be had in double precision, and a
+//! linear solver finds any. The part is held where it is drawn, by springs to the ground, and the force that they bear is reported. This
+//! is tried where no equilibrium was found without it.
+
+use crate::domains::System;
+use crate::multibody::planar::Pose;
+use crate::multibody::{BlockMatrix, BodyId};
+use crate::sets::Sets;
+
+/// Bending stiffness of a joint, as a fraction of the largest, below which it holds nothing [1]: rounding of the stiffness is 1e-16 of that, times
+/// what elimination loses.
+const WEAK: f64 = 1e-12;
+/// Stiffness of what holds a part, as a fraction of the largest of a body [1].
+const HOLDS: f64 = 1e-3;
+
+/// The system with its weakly held parts held, and for each a body of it; none where there is no such part.
+pub(super) fn held(system: &System) -> Option<(System, Vec<usize>)> {
+    let model = &system.model;
+    let ground = model.bodies.len();
+    let bends = |k: usize| model.section(&model.joints[k]).stiffness.0[5];
+    let stiffest = (0..model.joints.len()).map(bends).fold(0.0, f64::max);
+    let index = |id: BodyId| if let BodyId::Free(k) = id { k } else { ground };
+    let (mut firmly, mut weak) = (Sets::new(ground + 1), false);
+    for (k, joint) in model.joints.iter().enumerate() {
+        let (a, b) = joint.bodies();
+        // a joint that resists no rotation is a pin, and meant
+        if bends(k) == 0.0 || bends(k) > WEAK * stiffest {
+            firmly.join(index(a), index(b));
+        } else {
+            weak = true;
+        }
+    }
+    for (k, _) in model.held() {
+        firmly.join(k, ground);
+    }
+    if !weak {
+        return None;
+    }
+    // the last body of each part, which has more than one; pieces of the slender beams themselves have one
+    let mut parts = std::collections::BTreeMap::new();
+    for k in 0..ground {
+        if !firmly.together(k, ground) {
+            let part = parts.entry(firmly.first(k)).or_insert((k, 0));
+            *part = (k, part.1 + 1);
+        }
+    }
+    let mut last: Vec<usize> = parts.into_values().filter(|(_, bodies)| *bodies > 1).map(|(last, _)| last).collect();
+    last.sort_unstable();
+    if last.is_empty() {
+        return None;
+    }
+    let (zeros, mut tangent) = (vec![Pose::zeros(); ground], BlockMatrix::new(&model.pattern));
+    system.tangent(&zeros, &system.electrics.drive(), &mut tangent, &mut zeros.clone());
+    let largest = |i: usize| tangent.diagonal.iter().map(|block| block[(i, i)].abs()).fold(0.0, f64::max);
+    let springs = [largest(0).max(largest(1)), largest(2)].map(|k| HOLDS * k);
+    Some((System { model: model.with_springs_to_ground(&last, springs), ..system.clone() }, last))
+}
+
+/// What to say of parts that are held, with the force on each at `q` of the system that holds them.
+pub(super) fn told(system: &System, held: &System, parts: &[usize], q: &[Pose]) -> Vec<String> {
+    let springs = &held.model.joints[system.model.joints.len()..];
+    let one = |(&body, joint): (&usize, &crate::multibody::section::LaidJoint)| {
+        let force = held.model.section(joint).stiffness.0[0] * q[body].x.hypot(q[body].y);
+        format!(
+            "the part with body \"{}\" hangs on beams so slender that rounding hides their stiffness; the net load on it is {force:.1e} N",
+            system.model.bodies[body].name
+        )
+    };
+    parts.iter().zip(springs).map(one).collect()
+}
