@@ -17,6 +17,7 @@
 pub mod agitation;
 mod answer;
 mod contract;
+mod growth;
 pub mod local;
 pub mod look;
 mod noise;

@@ -1,6 +1,7 @@
 //! What is open of a device: its ports, its signals, its states, and the storage that every trial reuses.
 
 use super::agitation::Shaken;
+use super::growth::Growth;
 use super::ports::Ports;
 use super::ringing::Ringing;
 use super::seen::{Seen, surroundings};
@@ -55,6 +56,8 @@ pub(super) struct Session {
     pub(super) warned: Vec<(String, f64)>,
     /// How what was accepted rings.
     pub(super) ringing: Ringing,
+    /// How fast the last trial's motion grows at fixed voltages.
+    pub(super) growth: Growth,
 }
 
 impl Session {
@@ -127,6 +130,7 @@ impl Session {
             response: vec![ComplexPose::zeros(); n],
             warned: Vec::new(),
             ringing: Ringing::default(),
+            growth: Growth::default(),
         };
         Ok((session, description))
     }

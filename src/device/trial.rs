@@ -3,12 +3,13 @@
 
 use super::agitation::Shaken;
 use super::answer::STEP_SHARE;
+use super::growth::{Bound, rate_along};
 use super::session::Session;
 use super::states::Snapshot;
 use super::{Status, Trial, TrialReply};
 use crate::analysis::contact_range::within_contact_range;
 use crate::compile::Compiled;
-use crate::domains::Ramp;
+use crate::domains::{Ramp, System};
 use crate::equations::Bodies;
 use crate::multibody::planar::Pose;
 use crate::solve::path::SourcePath;
@@ -19,6 +20,10 @@ const MAX_INTERNAL_STEPS: usize = 512;
 /// Longest circuit step proposed, in internal steps, whatever the circuit sees: a step that has to be taken again shall
 /// not cost too much, and a change of pace from one step to the next stay below [`MAX_INTERNAL_STEPS`].
 const PROPOSED_STEPS: f64 = 32.0;
+
+/// Share of a charge's derivative beyond that of the capacitance at rest from which on the motion may be unstable [1]: at λh = 1 the response of a
+/// growing motion adds 18 % or more.
+const RESPONDS: f64 = 0.1;
 
 impl Session {
     /// A static trial: from the parent's equilibrium along straight lines in voltage, or from rest.
@@ -136,5 +141,27 @@ impl Session {
         self.answer(compiled, request, Some((&from, parent.unwrap_or(&rest))), h, reply);
         let cell = self.shaken.as_ref().map_or(f64::INFINITY, |shaken| shaken.cell);
         reply.dt_next = reply.dt_next.min(PROPOSED_STEPS * h).min(cell);
+        let rate = self.growth_rate(system, reply);
+        match self.growth.tried(rate, request.dt) {
+            Bound::Next(longest) => reply.dt_next = reply.dt_next.min(longest),
+            Bound::This(longest) => (reply.status, reply.token) = (Status::NeedDt(longest), None),
+        }
+    }
+
+    /// Rate at which the motion at the end of a trial grows at fixed voltages [1/s]; 0 where nothing shows that it does.
+    fn growth_rate(&self, system: &System, reply: &TrialReply) -> f64 {
+        let (electrics, ports) = (&system.electrics, self.ports.len());
+        let mut fastest = 0.0f64;
+        for (p, &source) in self.ports.sources.iter().enumerate() {
+            let fixed: f64 = (0..self.drive.volts.len())
+                .map(|g| electrics.gap_rows[(g, source)].powi(2) * system.capacitance(g, &self.motion.q))
+                .sum();
+            let moving = reply.dq_dv[p * (ports + 1)] - fixed;
+            if moving.abs() > RESPONDS * fixed.abs() {
+                let response = &self.stepper.method.sensitivity()[p].q;
+                fastest = fastest.max(rate_along(system, &self.drive, &self.motion.q, response));
+            }
+        }
+        fastest
     }
 }

@@ -7,8 +7,8 @@ use std::sync::{Mutex, PoisonError};
 
 /// Lines that a process tells, at most.
 const MOST: usize = 200;
-/// Those about one kind of warning of one instance: analyses after one another say much the same.
-const MOST_ALIKE: usize = 3;
+/// Those about one kind of warning of one instance: analyses after one another say much the same, and what grows is told at three times as much.
+const MOST_ALIKE: usize = 6;
 
 /// What was told of whom, by code.
 static TOLD: Mutex<Vec<(String, String, String)>> = Mutex::new(Vec::new());

@@ -7,6 +7,7 @@ mod charge;
 mod check;
 mod export;
 mod harmonic;
+mod held;
 mod lines;
 mod look;
 mod measure;

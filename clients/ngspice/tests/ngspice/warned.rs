@@ -35,13 +35,13 @@ fn states_beyond_their_range_are_told_once() {
     }
 }
 
-/// A cantilever that a force pulse leaves ringing without loss, for 137 cycles: told when its mesh brings it out of step by the tolerance, ten
-/// times and a hundred times that; on the mesh that the tolerance asks for it is told nothing.
+/// A cantilever that a force pulse leaves ringing without loss, for 137 cycles: told when its mesh brings it out of step by the tolerance, and
+/// whenever that is three times as much, up to six times; on the mesh that the tolerance asks for it is told nothing.
 #[test]
 fn what_rings_out_of_step_is_told() {
     let net = "process p = [Youngsmodulus=165e9 density=2300 h=2u]\nanchor p [a] []\nbeam2d p [a b] [l=200u w=2u]\n";
     for (version, ngspice) in versions() {
-        for (more, told) in [("segments=3", 3), ("", 0)] {
+        for (more, told) in [("segments=3", 4..=6), ("", 0..=0)] {
             let folder = all_decks();
             let deck = folder.path().join("ring.cir");
             std::fs::write(folder.path().join("ring.net"), net).unwrap();
@@ -59,7 +59,7 @@ fn what_rings_out_of_step_is_told() {
             };
             let report = cosim::run(&options, &|| true).unwrap();
             let lines: Vec<&str> = report.warnings().filter(|line| line.contains("warning[W040]")).collect();
-            assert_eq!(lines.len(), told, "ngspice {version}, {more}: {lines:#?}");
+            assert!(told.contains(&lines.len()), "ngspice {version}, {more}: {lines:#?}");
         }
     }
 }

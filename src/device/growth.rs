@@ -1,0 +1,93 @@
+//! How fast a motion runs away at fixed voltages, where only the charge of a gap holds it.
+//!
+//! A plate that is charged beyond a third of its gap is unstable at a fixed voltage and stable at a fixed charge. A circuit that gives it
+//! its charge finds the voltage at the end of each step by the derivative of the charge, in which the response of the motion grows as
+//! e^(λh) over a step h. With λh above a few the voltage within the step, a straight line, is no longer that of the charge, and the plate comes
+//! to stand elsewhere. So steps are bounded by 1/λ.
+//!
+//! Along the response s of the motion to a voltage, which the growing motion dominates, λ is the positive root of
+//! (sᵀMs)·λ² + (sᵀDs)·λ + sᵀKs = 0, with the stiffness K at fixed voltages, the mass M and the damping D. A negative sᵀKs proves K
+//! indefinite, without a factorization. Rayleigh's quotient errs by the square of what s has of other motions.
+
+use crate::domains::{Drive, System};
+use crate::multibody::forces;
+use crate::multibody::planar::Pose;
+
+/// Growth over one step that the circuit may take next [1].
+const NEXT: f64 = 1.0;
+/// Growth over a step beyond which its result is not used [1].
+const MAX: f64 = 3.0;
+/// Length of the difference that stands for K·s, as a share of the model's length scale [1].
+const DIFFERENCE: f64 = 1e-5;
+
+/// What the last trials found.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Growth {
+    /// Rate at the state of the last trial [1/s]; 0 where it is stable.
+    rate: f64,
+    /// Length of the step to it [s].
+    step: f64,
+    /// ∫λ dt over the accepted states in a row that are unstable [1].
+    grown: f64,
+}
+
+/// What a step's growth asks of the circuit.
+pub(super) enum Bound {
+    /// The longest next step [s].
+    Next(f64),
+    /// This step was too long; the longest one [s].
+    This(f64),
+}
+
+impl Growth {
+    /// After a trial over a step [s] to a state with this rate [1/s].
+    pub(super) fn tried(&mut self, rate: f64, step: f64) -> Bound {
+        (self.rate, self.step) = (rate, step);
+        if rate * step > MAX { Bound::This(NEXT / rate) } else { Bound::Next(NEXT / rate) }
+    }
+
+    /// After the state of the last trial was accepted: time constant [s] of the motion that the charge alone has held for so long that no transit
+    /// takes it, from one stable state to another, which grows by e^15 or so.
+    pub(super) fn held(&mut self) -> Option<f64> {
+        /// Growth beyond any transit [1].
+        const HELD: f64 = 40.0;
+        self.grown = if self.rate > 0.0 { self.grown + self.rate * self.step } else { 0.0 };
+        (self.grown > HELD).then(|| self.rate.recip())
+    }
+}
+
+/// The rate [1/s] at `q` along the response `s` of the motion; 0 where its stiffness at fixed voltages is positive.
+pub(super) fn rate_along(system: &System, drive: &Drive, q: &[Pose], s: &[Pose]) -> f64 {
+    let largest = s.iter().fold(0.0f64, |m, s| m.max(s.xy().amax()));
+    if largest.is_nan() || largest == 0.0 || largest.is_infinite() {
+        return 0.0;
+    }
+    let scale = DIFFERENCE * system.length_scale / largest;
+    let mut moved = q.to_vec();
+    let mut force = [vec![Pose::zeros(); s.len()], vec![Pose::zeros(); s.len()]];
+    for (force, sign) in force.iter_mut().zip([1.0, -1.0]) {
+        for ((moved, q), s) in moved.iter_mut().zip(q).zip(s) {
+            *moved = q + s * (sign * scale);
+        }
+        system.residual(&moved, drive, force);
+    }
+    let dot = |x: &[Pose]| s.iter().zip(x).map(|(s, x)| s.dot(x)).sum::<f64>();
+    let stiffness = (dot(&force[0]) - dot(&force[1])) / (2.0 * scale);
+    if stiffness >= 0.0 || stiffness.is_nan() {
+        return 0.0;
+    }
+    let mass = system.model.mass_product(s, s);
+    force[0].fill(Pose::zeros());
+    forces::add_damping(&system.model, s, &mut force[0]);
+    let damping = dot(&force[0]).max(0.0);
+    let root = (damping * damping - 4.0 * mass * stiffness).sqrt();
+    if damping + root > 0.0 { -2.0 * stiffness / (damping + root) } else { 0.0 }
+}
+
+/// What to say of a port whose charge alone holds the motion.
+pub(super) fn held_by_charge(seconds: f64) -> String {
+    format!(
+        "only the charge holds the mechanism here: at a fixed voltage its motion would grow e-fold in {seconds:.2e} s, and the circuit's \
+         steps are kept to that time"
+    )
+}
