@@ -107,8 +107,8 @@ pub fn drawing_and_source(
     let process = asked.process()?;
     let drawing = layout::from_file(path, asked.cell.as_deref(), watch)?;
     let converted = convert(&drawing, process.as_ref())?;
-    let bundle = Bundle::from_text(&path.display().to_string(), &converted.netlist);
-    Ok((drawing, Source { bundle, converted: Some(converted) }))
+    let source = source(&path.display().to_string(), converted);
+    Ok((drawing, source))
 }
 
 /// The same from bytes that were sent; `process` is the name of one inside the program, or the text of a process file.
@@ -123,7 +123,13 @@ pub fn from_bytes(bytes: &[u8], name: &str, process: Option<&str>, cell: Option<
     };
     let drawing = layout::from_bytes(bytes, name, cell)?;
     let converted = convert(&drawing, process.as_ref())?;
-    Ok(Source { bundle: Bundle::from_text(name, &converted.netlist), converted: Some(converted) })
+    Ok(source(name, converted))
+}
+
+/// A layout's netlist under its name, with places in the drawing.
+fn source(name: &str, converted: Converted) -> Source {
+    let bundle = Bundle { places: converted.places.clone(), ..Bundle::from_text(name, &converted.netlist) };
+    Source { bundle, converted: Some(converted) }
 }
 
 impl From<LayoutError> for FrontError {

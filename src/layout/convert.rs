@@ -8,6 +8,7 @@ use super::mask;
 use super::process::{Process, ProcessError};
 use super::read::LayoutError;
 use super::report::{Areas, Report, Unrecognised};
+use std::collections::BTreeMap;
 use std::fmt::Write;
 use thiserror::Error;
 
@@ -41,6 +42,8 @@ pub struct Converted {
     pub report: Report,
     /// Name of the process.
     pub process: String,
+    /// For lines of the netlist, from 1, the layer and place in the drawing that they stand for.
+    pub places: BTreeMap<usize, String>,
     /// A node of the netlist and where it lies in the drawing [m]: netlists have an origin of their own.
     pub landmark: Option<(String, [f64; 2])>,
 }
@@ -63,18 +66,27 @@ pub fn convert(drawing: &Drawing, process: Option<&Process>) -> Result<Converted
         return by_geometry(drawing, process);
     }
     let (netlist, report, landmark) = labelled::read(drawing, process)?;
-    Ok(Converted { netlist, report, process: process.name.clone(), landmark })
+    Ok(Converted { netlist, report, process: process.name.clone(), places: BTreeMap::new(), landmark })
 }
 
 /// Limbs, bodies and anchors as they are drawn, with what labels on the layer of notes add.
 fn by_geometry(drawing: &Drawing, process: &Process) -> Result<Converted, ConvertError> {
     let extraction = extract::extract(drawing, process, &ExtractOptions::default())?;
-    let extract::Written { text: mut netlist, names } = extract::written(&extraction);
+    let extract::Written { text: mut netlist, names, places } = extract::written(&extraction);
+    let in_words = |(line, (layer, at)): (usize, (String, [f64; 2]))| {
+        let at = drawing.place(at.map(|x| x / drawing.unit_m));
+        (line, if layer == "*" { format!("at {at}") } else { format!("layer {layer} at {at}") })
+    };
+    let mut places: BTreeMap<usize, String> = places.into_iter().map(in_words).collect();
     let mut report = report(&extraction, drawing.unit_m);
+    let mut lines = netlist.lines().count();
     for label in drawing.labels.iter().filter(|l| mask::on_notes(&l.layer)) {
         match Line::parse(&label.text) {
             Ok(line) => {
                 let _ = writeln!(netlist, "{line}");
+                let at = drawing.place(label.at.map(f64::from));
+                lines += 1;
+                places.insert(lines, format!("label `{}` at {at}", label.text));
                 *report.counts.entry(line.model).or_insert(0) += 1;
             }
             Err(error) => {
@@ -83,7 +95,7 @@ fn by_geometry(drawing: &Drawing, process: &Process) -> Result<Converted, Conver
         }
     }
     let landmark = names.into_iter().zip(&extraction.nodes).map(|(name, n)| (name, n.at)).next();
-    Ok(Converted { netlist, report, process: process.name.clone(), landmark })
+    Ok(Converted { netlist, report, process: process.name.clone(), places, landmark })
 }
 
 fn report(extraction: &Extraction, unit_m: f64) -> Report {
@@ -101,6 +113,7 @@ fn report(extraction: &Extraction, unit_m: f64) -> Report {
         ("anchors", extraction.anchors.len()),
     ];
     let more = [
+        ("elastic edges", extraction.roots.len()),
         ("arcs", extraction.arcs.len()),
         ("combs", extraction.combs.len()),
         ("facing plates", extraction.plates.len()),

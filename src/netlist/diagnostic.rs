@@ -1,7 +1,7 @@
 //! Messages about a netlist, with the line they point at.
 
 use super::bundle::Bundle;
-use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
+use annotate_snippets::{AnnotationKind, Group, Level, Origin, Renderer, Snippet};
 use std::sync::Arc;
 
 /// Of longer lines only the part around the mark is shown [bytes].
@@ -23,9 +23,9 @@ pub struct Diagnostic {
     pub code: String,
     /// Error or warning.
     pub severity: Severity,
-    /// File, as spelled.
+    /// File, as spelled; of a layout with layer and place in the drawing.
     pub file: String,
-    /// Line, from 1; 0 when the message is about no place in the text (a setting from outside).
+    /// Line, from 1; 0 when the message is about no place in the text (a setting from outside, a layout).
     pub line: usize,
     /// Column in characters, from 1; 0 when there is no place.
     pub column: usize,
@@ -97,6 +97,10 @@ impl Diagnostics {
                     .line_start(item.line)
                     .annotation(AnnotationKind::Primary.span(range)),
             ),
+            // a place in a drawing has no line
+            None if item.line == 0 && !self.bundle.places.is_empty() && item.file != self.bundle.root => {
+                Group::with_title(title).element(Origin::path(item.file.as_str()))
+            }
             None => Group::with_title(title),
         };
         if !item.help.is_empty() {

@@ -31,7 +31,7 @@ impl Bundle {
         let files = BTreeMap::from([(root.clone(), text_of(path)?)]);
         let mut reader = Reader { files, found: BTreeMap::new(), own: path.canonicalize().ok(), include, dropped };
         reader.includes_of(&root, &folder_of(path), 0);
-        Ok(Self { root, files: reader.files })
+        Ok(Self { root, files: reader.files, places: BTreeMap::new() })
     }
 }
 

@@ -145,13 +145,23 @@ impl Sink {
             .items
             .into_iter()
             .map(|(span, severity, code, message, help)| {
-                let (file, line, column, width) = place(files, bundle, span);
+                let (file, line, column, width) = in_drawing(bundle, place(files, bundle, span));
                 Diagnostic { code: code.to_owned(), severity, file, line, column, width, message, help }
             })
             .collect();
         items.extend(left_out);
         Diagnostics { items, bundle: Arc::clone(bundle) }
     }
+}
+
+/// A place in a netlist that was made of a layout is one in the drawing, without a line.
+fn in_drawing(bundle: &Bundle, at: (String, usize, usize, usize)) -> (String, usize, usize, usize) {
+    let (file, line, ..) = &at;
+    if bundle.places.is_empty() || *file != bundle.root || *line == 0 {
+        return at;
+    }
+    let place = bundle.places.get(line).map_or("the netlist of the drawing", String::as_str);
+    (format!("{file}: {place}"), 0, 0, 0)
 }
 
 /// File, line, column and width of a span; the width stops at the end of the first line.

@@ -58,7 +58,8 @@ fn netlist(diagnostics: &Diagnostics) -> Status {
     let violations = errors.map(|d| {
         let help = if d.help.is_empty() { String::new() } else { format!("; {}", d.help) };
         let code = if d.code.is_empty() { String::new() } else { format!("{}: ", d.code) };
-        Violation::new(format!("{}:{}:{}", d.file, d.line, d.column), format!("{code}{}{help}", d.message))
+        let place = if d.line > 0 { format!("{}:{}:{}", d.file, d.line, d.column) } else { d.file.clone() };
+        Violation::new(place, format!("{code}{}{help}", d.message))
     });
     bad_request(&diagnostics.render(false), violations)
 }

@@ -1,10 +1,15 @@
 //! What holds a layer: where its anchors lie, and which stretches of a line run over them.
 
 use super::areas::Areas;
+use super::joints::Joint;
+use super::limbs::Limb;
 use super::medial::Medial;
 use crate::layout::drawing::{Drawing, Polygon};
 use crate::layout::process::{self, Layer};
 use crate::layout::regions;
+
+/// A pad is at least this much wider than its limb [1].
+const PAD: f64 = 1.5;
 
 /// What tells which parts are held.
 #[derive(Debug)]
@@ -44,6 +49,37 @@ impl Rule {
         }
         layer.anchoring.undercut.map_or(Self::Pads, |reach| Self::Wide(reach / drawing.unit_m))
     }
+
+    /// Whether a joint is held where it is a body.
+    pub(super) fn holds_body(&self, axis: &Medial, origin: [f64; 2], limbs: &[Limb], joint: &Joint) -> bool {
+        match self {
+            Self::Drawn(held) => held.touches(axis, origin, &joint.edges),
+            Self::Wide(reach) => half_width(axis, joint) >= *reach,
+            Self::Pads => match joint.ports.as_slice() {
+                [] => true,
+                [port] => 2.0 * half_width(axis, joint) >= PAD * limbs[port.limb].width[port.end],
+                _ => false,
+            },
+        }
+    }
+
+    /// Whether some of a limb is held.
+    pub(super) fn holds_limb(&self, limb: &Limb, origin: [f64; 2]) -> bool {
+        match self {
+            Self::Drawn(held) => {
+                let [a, b] = limb.ends.map(|p| [p[0] + origin[0], p[1] + origin[1]]);
+                !held.over(a, b).is_empty()
+            }
+            Self::Wide(reach) => limb.width[0].min(limb.width[1]) >= 2.0 * reach,
+            Self::Pads => false,
+        }
+    }
+}
+
+/// Half of the largest width of a joint.
+pub(super) fn half_width(axis: &Medial, joint: &Joint) -> f64 {
+    let ends = joint.edges.iter().flat_map(|e| axis.edges[*e as usize].ends);
+    ends.map(|v| axis.vertices[v as usize].r).fold(0.0, f64::max)
 }
 
 impl Held {

@@ -93,7 +93,8 @@ fn chains(result: &Extraction) -> Vec<Vec<Link>> {
         beam.nodes.iter().for_each(|n| at[*n].push(k));
     }
     let mut through: Vec<bool> = at.iter().map(|beams| beams.len() == 2).collect();
-    let others = result.links.iter().flatten().chain(&result.anchors).copied();
+    let others =
+        result.links.iter().chain(result.roots.iter().map(|r| &r.nodes)).flatten().chain(&result.anchors).copied();
     let others = others.chain(result.bodies.iter().map(|b| b.node)).chain(result.combs.iter().flat_map(|c| c.nodes));
     let plates = result.plates.iter().flat_map(|p| p.nodes).chain(result.facing.iter().flat_map(|f| f.nodes));
     others.chain(plates).for_each(|n| through[n] = false);

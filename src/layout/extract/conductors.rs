@@ -104,11 +104,12 @@ fn wires(nodes: &[usize]) -> Vec<Item> {
     wires
 }
 
-/// What is rigid in parts with current hangs together: links, and pads with several nodes.
+/// What is rigid in parts with current hangs together: links, roots, and pads with several nodes.
 fn rigid(found: &Extraction) -> Sets {
     let mut sets = Sets::new(found.nodes.len());
     let pads = found.pads.iter().map(|pad| pad.nodes.as_slice());
-    for nodes in found.links.iter().map(<[usize; 2]>::as_slice).chain(pads) {
+    let pairs = found.links.iter().chain(found.roots.iter().map(|root| &root.nodes));
+    for nodes in pairs.map(<[usize; 2]>::as_slice).chain(pads) {
         if nodes.first().is_some_and(|n| found.carries(*n)) {
             nodes.iter().for_each(|n| {
                 sets.join(nodes[0], *n);

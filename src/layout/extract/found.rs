@@ -23,6 +23,8 @@ pub struct Extraction {
     pub bodies: Vec<Body>,
     /// Rigid, massless connections of two nodes.
     pub links: Vec<[usize; 2]>,
+    /// Elastic edges of perforated plates where limbs stand on them.
+    pub roots: Vec<Root>,
     /// Nodes that are held.
     pub anchors: Vec<usize>,
     /// Areas that are held, with the nodes on them.
@@ -153,6 +155,19 @@ pub struct Body {
     pub polar: f64,
 }
 
+/// Where a limb stands on the elastic edge of a perforated plate: a spring between two nodes in one place.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Root {
+    /// Nodes of the plate and of the limb.
+    pub nodes: [usize; 2],
+    /// Direction of the limb.
+    pub along: [f64; 2],
+    /// Stiffness along the limb and across it [N/m].
+    pub shift: f64,
+    /// Stiffness against turning [N m/rad].
+    pub turn: f64,
+}
+
 /// A comb drive.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Comb {
@@ -216,7 +231,7 @@ impl Extraction {
         let beams = self.beams.iter_mut().flat_map(|b| &mut b.nodes);
         let arcs = self.arcs.iter_mut().flat_map(|a| &mut a.nodes);
         let bodies = self.bodies.iter_mut().map(|b| &mut b.node);
-        let links = self.links.iter_mut().flatten();
+        let links = self.links.iter_mut().flatten().chain(self.roots.iter_mut().flat_map(|r| &mut r.nodes));
         let combs = self.combs.iter_mut().flat_map(|c| &mut c.nodes);
         let plates = self.plates.iter_mut().flat_map(|p| &mut p.nodes);
         let facing = self.facing.iter_mut().flat_map(|f| &mut f.nodes);

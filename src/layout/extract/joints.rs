@@ -9,6 +9,7 @@
 //! | anything else | a rigid body with the area, centroid and second moment of its polygon; each limb ends at its edge |
 
 use super::limbs::Limb;
+use super::medial::Medial;
 use super::moments::Moments;
 use super::skeleton::Skeleton;
 
@@ -42,6 +43,8 @@ pub(super) struct Joint {
     pub(super) edges: Vec<u32>,
     /// What it becomes.
     pub(super) kind: Kind,
+    /// Of a body whose edge is elastic, for each port, its compliance: shift [1], turn [1/square database unit]; none: it is rigid there.
+    pub(super) roots: Vec<Option<[f64; 2]>>,
 }
 
 /// What a joint becomes.
@@ -162,10 +165,27 @@ fn kind(skeleton: &Skeleton<'_>, limbs: &[Limb], joint: &Joint) -> Kind {
         _ => crossing(&leads, joint.cell.area),
     };
     let simple = point.map(Kind::Node).or_else(|| bar(&leads, joint.cell.area));
-    simple.unwrap_or_else(|| {
-        let places = joint.ports.iter().zip(&leads).map(|(p, lead)| mouth(skeleton, &limbs[p.limb], p.end, lead));
-        Kind::Body(places.collect())
-    })
+    simple.unwrap_or_else(|| body(skeleton, limbs, joint))
+}
+
+/// How far the sides of a limb that stands on a body stand from its nearest corner; 0 where one of them goes on as its edge.
+pub(super) fn from_corner(axis: &Medial, limb: &Limb, end: usize) -> f64 {
+    let lead = Lead::of(limb, end);
+    let room = limb.sides[end].into_iter().enumerate().map(|(k, side)| {
+        let next = if (k == 1) == (end == 1) { axis.next[side as usize] } else { axis.before(side) };
+        let [p, q] = axis.side(next);
+        let shared = if (k == 1) == (end == 1) { p } else { q };
+        let length = (q[0] - p[0]).hypot(q[1] - p[1]);
+        let across = (lead.u[0] * (q[1] - p[1]) - lead.u[1] * (q[0] - p[0])).abs() / length;
+        if lead.seen(shared)[0].abs() > 0.5 * lead.w || across < 0.2 { 0.0 } else { length }
+    });
+    room.fold(f64::INFINITY, f64::min)
+}
+
+/// A joint as a rigid body: its limbs end at its edge.
+pub(super) fn body(skeleton: &Skeleton<'_>, limbs: &[Limb], joint: &Joint) -> Kind {
+    let place = |p: &Port| mouth(skeleton, &limbs[p.limb], p.end, &Lead::of(&limbs[p.limb], p.end));
+    Kind::Body(joint.ports.iter().map(place).collect())
 }
 
 /// Where a limb with a rectangular end ends.

@@ -4,12 +4,13 @@ use super::anchors::{self, Rule};
 use super::combs::{self, Finger};
 use super::error::{ExtractError, MOST_POINTS};
 use super::gaps::{self, Pull};
-use super::holes;
-use super::joints::{self};
+use super::holes::{self, Hole};
+use super::joints;
 use super::limbs;
 use super::medial::Medial;
 use super::model::Model;
 use super::part::{Found, Part};
+use super::perforated::perforated;
 use super::sink::Sink;
 use super::skeleton::Skeleton;
 use super::snap;
@@ -33,17 +34,24 @@ const BALANCE: f64 = 1e-9;
 struct Shapes(HashMap<Polygon, Result<Found, String>>);
 
 impl Shapes {
-    fn analyse(&mut self, polygon: Polygon) -> Result<Part, (Polygon, String)> {
+    fn analyse(&mut self, polygon: Polygon, holes: Vec<Hole>, rule: &Rule) -> Result<Part, (Polygon, String)> {
         let found = self.0.entry(at_origin(&polygon)).or_insert_with(|| {
             let axis = Medial::of(&polygon).map_err(|e| e.to_string())?;
             let parts = {
                 let skeleton = Skeleton::of(&axis);
                 joints::joints(&skeleton, limbs::limbs(&skeleton))
             };
-            Ok(Arc::new((axis, parts)))
+            Ok((Arc::new(axis), Arc::new(parts)))
         });
         match found {
-            Ok(found) => Ok(Part { found: found.clone(), polygon, holes: Vec::new() }),
+            Ok(found) => {
+                let mut part = Part { found: found.clone(), polygon, holes };
+                if !part.holes.is_empty() {
+                    let (axis, plain) = &part.found;
+                    part.found.1 = Arc::new(perforated(axis, plain, &part.holes, part.origin(), rule));
+                }
+                Ok(part)
+            }
             Err(why) => Err((polygon, why.clone())),
         }
     }
@@ -104,27 +112,26 @@ pub(super) fn extract(
         let (polygon, holes) = holes::fill(polygon, layer.largest_hole / unit);
         done.holes.0 += holes.len();
         done.holes.1 += holes.iter().map(|h| h.area).sum::<f64>() * unit * unit;
-        match shapes.analyse(polygon) {
-            Ok(part) => parts.push(Part { holes, ..part }),
+        let missing: f64 = holes.iter().map(|h| h.area).sum();
+        match shapes.analyse(polygon, holes, &rule) {
+            Ok(part) => parts.push(part),
             Err((polygon, why)) => {
-                let area = regions::area(std::slice::from_ref(&polygon)) - holes.iter().map(|h| h.area).sum::<f64>();
-                let area = area * unit * unit;
+                let area = (regions::area(std::slice::from_ref(&polygon)) - missing) * unit * unit;
                 done.unrecognised += area;
                 result.unrecognised.push(lost(layer, &polygon, unit, area, &why));
             }
         }
     }
     let (combs, fingers) = combs::combs(&parts);
-    let carriers = strip(&mut shapes, &parts, &fingers);
+    let carriers = strip(&mut shapes, &parts, &fingers, &rule);
     let mut taps: Vec<Vec<([f64; 2], bool)>> = vec![Vec::new(); parts.len()];
     for comb in &combs {
         (0..2).for_each(|i| taps[comb.parts[i]].push((comb.roots[i], false)));
     }
     let model = |(carrier, taps): (&Part, &Vec<([f64; 2], bool)>)| {
         budget::check();
-        let (axis, found) = &*carrier.found;
-        let origin = carrier.polygon.extent().unwrap_or_default()[0];
-        Model::of(axis, origin, found, &rule, taps, &carrier.holes)
+        let (axis, found) = &carrier.found;
+        Model::of(axis, carrier.origin(), found, &rule, taps, &carrier.holes)
     };
     let bare: Vec<Vec<([f64; 2], bool)>> = vec![Vec::new(); parts.len()];
     let models: Vec<Model> = carriers.iter().zip(&bare).map(model).collect();
@@ -132,7 +139,8 @@ pub(super) fn extract(
     let gaps = gaps::gaps(&carriers, &moves, &combs, gaps::WIDEST / unit);
     gaps.iter().flat_map(gaps::Gap::pulls).for_each(|pull| taps[pull.part].push((pull.at, pull.on_axis)));
     let first = result.layers.iter().map(|layer| layer.parts).sum();
-    let mut sink = Sink { layer: result.layers.len(), result, first, unit };
+    let rigidity = layer.material.get("Youngsmodulus").filter(|e| **e > 0.0).map(|e| e * layer.thickness);
+    let mut sink = Sink { layer: result.layers.len(), result, first, unit, rigidity };
     // for each part, the nodes where combs pull
     let mut pulled: Vec<Option<std::vec::IntoIter<usize>>> = Vec::new();
     // those at which something pulls once more, with nodes there
@@ -203,7 +211,7 @@ pub(super) fn extract(
 }
 
 /// The parts without the fingers of combs.
-fn strip(shapes: &mut Shapes, parts: &[Part], fingers: &[Finger]) -> Vec<Part> {
+fn strip(shapes: &mut Shapes, parts: &[Part], fingers: &[Finger], rule: &Rule) -> Vec<Part> {
     let mut of_part: Vec<Vec<&Finger>> = vec![Vec::new(); parts.len()];
     fingers.iter().for_each(|finger| of_part[finger.part].push(finger));
     let stripped = parts.iter().zip(&of_part).map(|(part, fingers)| {
@@ -212,10 +220,7 @@ fn strip(shapes: &mut Shapes, parts: &[Part], fingers: &[Finger]) -> Vec<Part> {
         }
         let mut left = regions::union(&[combs::without(part, fingers)]);
         match (left.pop(), left.is_empty()) {
-            (Some(one), true) => {
-                let stripped = shapes.analyse(one).map(|one| Part { holes: part.holes.clone(), ..one });
-                stripped.unwrap_or_else(|_| part.clone())
-            }
+            (Some(one), true) => shapes.analyse(one, part.holes.clone(), rule).unwrap_or_else(|_| part.clone()),
             _ => part.clone(),
         }
     });

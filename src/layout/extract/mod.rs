@@ -15,6 +15,7 @@ mod boxes;
 mod cells;
 mod combs;
 mod conductors;
+mod cut;
 mod error;
 mod found;
 mod gaps;
@@ -32,6 +33,7 @@ mod netlist;
 mod nets;
 mod pads;
 mod part;
+mod perforated;
 mod repeats;
 mod rows;
 mod sink;
@@ -41,7 +43,7 @@ mod strips;
 mod taps;
 
 pub use error::{ExtractError, MOST_POINTS};
-pub use found::{Arc, Beam, Body, Comb, Extraction, Facing, LayerResult, Net, Node, Pad, Plates, Unrecognised};
+pub use found::{Arc, Beam, Body, Comb, Extraction, Facing, LayerResult, Net, Node, Pad, Plates, Root, Unrecognised};
 pub use netlist::{Written, netlist, written};
 
 use super::crossings::bounded;

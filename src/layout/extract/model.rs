@@ -2,12 +2,14 @@
 
 use super::anchors::Rule;
 use super::cells::{Cells, Owner, Tap};
-use super::joints::{self, Joint, Kind, Parts};
+use super::cut::Cut;
+use super::holes::Hole;
+use super::joints::{self, Kind, Parts};
 use super::medial::Medial;
 use super::moments::Moments;
 
-/// A pad is at least this much wider than its limb [1].
-const PAD: f64 = 1.5;
+/// More than this share of a limb is no rounding [1].
+const ROUNDED: f64 = 1e-2;
 
 /// The model of one part, in database units of the drawing.
 #[derive(Debug, Clone, Default)]
@@ -19,6 +21,8 @@ pub(super) struct Model {
     pub(super) bodies: Vec<Body>,
     /// Rigid and massless connections.
     pub(super) links: Vec<[usize; 2]>,
+    /// Elastic edges.
+    pub(super) roots: Vec<Root>,
     /// Nodes that are held.
     pub(super) anchors: Vec<usize>,
     /// Areas that are held, with their nodes.
@@ -49,6 +53,16 @@ pub(super) struct Beam {
     pub(super) porosity: f64,
 }
 
+/// An elastic edge between a node of a body and that of a limb in the same place.
+#[derive(Debug, Clone)]
+pub(super) struct Root {
+    pub(super) nodes: [usize; 2],
+    /// Direction of the limb.
+    pub(super) along: [f64; 2],
+    /// Compliance, times Young's modulus and thickness: shift [1], turn [1/square database unit].
+    pub(super) compliance: [f64; 2],
+}
+
 /// A rigid body.
 #[derive(Debug, Clone)]
 pub(super) struct Body {
@@ -67,13 +81,12 @@ impl Model {
     /// something pulls at it, in coordinates of the drawing: on a centreline, or at the end of an arm.
     pub(super) fn of(
         axis: &Medial,
-        origin: [i32; 2],
+        origin: [f64; 2],
         parts: &Parts,
         rule: &Rule,
         taps: &[([f64; 2], bool)],
-        holes: &[Moments],
+        holes: &[Hole],
     ) -> Self {
-        let origin = origin.map(f64::from);
         let mut build = Builder {
             model: Self::default(),
             axis,
@@ -86,18 +99,11 @@ impl Model {
             adjoining: Vec::new(),
             taps: Vec::new(),
             cells: Cells::default(),
-            limb_holes: vec![0.0; parts.limbs.len()],
-            joint_holes: vec![Moments::default(); parts.joints.len()],
+            holes: Cut::of(axis, parts, holes, origin),
+            led: vec![[0.0; 2]; parts.limbs.len()],
         };
-        if !holes.is_empty() || !taps.is_empty() {
+        if !taps.is_empty() {
             build.cells = Cells::of(axis, parts);
-        }
-        for hole in holes {
-            let local = hole.moved(origin.map(|x| -x));
-            match build.cells.nearest(axis, local.centroid()) {
-                Owner::Limb(k) => build.limb_holes[k] += local.area,
-                Owner::Joint(j) => build.joint_holes[j] += local,
-            }
         }
         build.model.taps = vec![usize::MAX; taps.len()];
         build.taps = taps.iter().map(|(p, on_axis)| build.tap(*p, *on_axis)).collect();
@@ -140,9 +146,10 @@ pub(super) struct Builder<'a> {
     pub(super) adjoining: Vec<(usize, usize)>,
     pub(super) taps: Vec<Tap>,
     pub(super) cells: Cells,
-    /// Area of the holes in each limb, and holes in each joint.
-    pub(super) limb_holes: Vec<f64>,
-    pub(super) joint_holes: Vec<Moments>,
+    /// What holes take of limbs and joints.
+    pub(super) holes: Cut,
+    /// For each limb, the area of holes where it is led into bodies beyond its cells; less than nothing where it ends before.
+    pub(super) led: Vec<[f64; 2]>,
 }
 
 impl Builder<'_> {
@@ -166,12 +173,12 @@ impl Builder<'_> {
         let ends = match &joint.kind {
             Kind::Node(at) => {
                 let held = joint.ports.len() > 1 && self.holds(*at);
-                self.count(joint.cell.area - self.joint_holes[j].area, held);
+                self.count(joint.cell.area - self.holes.joints[j].moments.area, held);
                 let width = joint.ports.iter().map(|p| self.parts.limbs[p.limb].width[p.end]).fold(0.0, f64::max);
                 vec![self.node(*at, width, held); joint.ports.len()]
             }
             Kind::Bar { nodes, width, ends } => {
-                self.count(joint.cell.area - self.joint_holes[j].area, false);
+                self.count(joint.cell.area - self.holes.joints[j].moments.area, false);
                 let made: Vec<usize> = nodes.iter().map(|at| self.node(*at, *width, self.holds(*at))).collect();
                 for (pair, at) in made.windows(2).zip(nodes.windows(2)) {
                     let length = (at[1][0] - at[0][0]).hypot(at[1][1] - at[0][1]);
@@ -184,16 +191,24 @@ impl Builder<'_> {
                 ends.iter().map(|k| made[*k]).collect()
             }
             Kind::Body(places) => {
-                let held = self.held_body(joint);
-                self.count(joint.cell.area - self.joint_holes[j].area, held);
+                let held = self.rule.holds_body(self.axis, self.origin, &self.parts.limbs, joint);
+                self.count(joint.cell.area - self.holes.joints[j].moments.area, held);
                 let size = joint.cell.area.max(0.0).sqrt();
                 let ends: Vec<usize> =
                     places.iter().map(|at| self.node(*at, if held { size } else { 0.0 }, held)).collect();
                 if !held {
-                    let mut moments = self.without_mouths(joint, places);
-                    moments -= self.joint_holes[j];
+                    let moments = self.without_mouths(j, places);
                     let node = self.node(moments.centroid(), size, false);
-                    self.model.links.extend(ends.iter().map(|end| [node, *end]));
+                    for (p, end) in ends.iter().copied().enumerate() {
+                        let Some(compliance) = joint.roots.get(p).copied().flatten() else {
+                            self.model.links.push([node, end]);
+                            continue;
+                        };
+                        let along = self.parts.limbs[joint.ports[p].limb].direction();
+                        let root = self.node(places[p], 0.0, false);
+                        self.model.links.push([node, root]);
+                        self.model.roots.push(Root { nodes: [root, end], along, compliance });
+                    }
                     self.model.bodies.push(Body { node, moments });
                 } else if ends.is_empty() {
                     self.node(joint.cell.centroid(), size, true);
@@ -217,47 +232,72 @@ impl Builder<'_> {
         }
     }
 
+    /// What rounding to the grid makes a limb without holes weigh more than its beam, at a place; half of it where it ends in two bodies
+    /// that take it.
+    fn rounding(&self, k: usize, at: [f64; 2]) -> Moments {
+        let limb = &self.parts.limbs[k];
+        let width = 0.5 * (limb.width[0] + limb.width[1]);
+        let (mut over, mut takers) = (limb.cell.area - width * limb.length(), 0);
+        for end in 0..2 {
+            let j = self.parts.at[k][end];
+            let joint = &self.parts.joints[j];
+            let port = joint.ports.iter().position(|p| p.limb == k && p.end == end);
+            let (Kind::Body(places), Some(p)) = (&joint.kind, port) else { continue };
+            let (d, e, place) = (limb.direction(), limb.ends[end], places[p]);
+            let ahead = (place[0] - e[0]) * d[0] + (place[1] - e[1]) * d[1];
+            let ahead = if end == 1 { ahead } else { -ahead };
+            // what is held brings nothing where the beam is led into it
+            let held = self.rule.holds_body(self.axis, self.origin, &self.parts.limbs, joint);
+            over += ahead * (if held { 0.0 } else { limb.width[end] } - width);
+            takers += usize::from(!held && self.holes.joints[j].moments.area > 0.0);
+        }
+        if self.holes.limbs[k].moments.area > 0.0 || over.abs() > ROUNDED * limb.cell.area {
+            return Moments::default();
+        }
+        let area = over / takers.max(1) as f64;
+        Moments { area, first: at.map(|x| x * area), second: (at[0] * at[0] + at[1] * at[1]) * area }
+    }
+
     /// What a body has beyond the limbs that end at its edge: a limb led into it brings that area itself.
-    fn without_mouths(&self, joint: &Joint, places: &[[f64; 2]]) -> Moments {
+    fn without_mouths(&mut self, j: usize, places: &[[f64; 2]]) -> Moments {
+        let joint = &self.parts.joints[j];
         let mut moments = joint.cell;
+        moments -= self.holes.joints[j].moments;
         for (port, place) in joint.ports.iter().zip(places) {
             let limb = &self.parts.limbs[port.limb];
             let (e, w) = (limb.ends[port.end], limb.width[port.end]);
             let d = [place[0] - e[0], place[1] - e[1]];
             let long = d[0].hypot(d[1]);
+            if self.holes.joints[j].moments.area > 0.0 {
+                moments += self.rounding(port.limb, e);
+            }
             if long <= 0.0 || long * w > 0.5 * joint.cell.area {
                 continue;
             }
             let n = [-d[1] / long * 0.5 * w, d[0] / long * 0.5 * w];
             let corner = |p: [f64; 2], s: f64| [p[0] + s * n[0], p[1] + s * n[1]];
-            let strip = Moments::of(&[corner(e, 1.0), corner(e, -1.0), corner(*place, -1.0), corner(*place, 1.0)]);
+            let outline = [corner(e, 1.0), corner(e, -1.0), corner(*place, -1.0), corner(*place, 1.0)];
+            let mut strip = Moments::of(&outline);
             let out = if port.end == 1 { limb.direction() } else { limb.direction().map(|x| -x) };
-            let sign = if d[0] * out[0] + d[1] * out[1] > 0.0 { -1.0 } else { 1.0 };
-            if sign > 0.0 {
-                moments += strip;
-            } else {
+            let into = d[0] * out[0] + d[1] * out[1] > 0.0;
+            let holes = if into { &self.holes.joints[j] } else { &self.holes.limbs[port.limb] };
+            let missing = holes.within(&outline);
+            strip -= missing;
+            if into {
                 moments -= strip;
+            } else {
+                moments += strip;
             }
+            self.led[port.limb][port.end] = if into { missing.area } else { -missing.area };
+        }
+        // limbs that are led through each other bring their areas twice: the body then keeps all of its own
+        let least = moments.area * moments.area / (2.0 * std::f64::consts::PI);
+        if moments.area <= 0.0 || moments.polar() < least {
+            joint.ports.iter().for_each(|port| self.led[port.limb][port.end] = 0.0);
+            let mut whole = joint.cell;
+            whole -= self.holes.joints[j].moments;
+            return whole;
         }
         moments
-    }
-
-    fn held_body(&self, joint: &Joint) -> bool {
-        let widest = |edges: &[u32]| {
-            let ends = edges.iter().flat_map(|e| self.axis.edges[*e as usize].ends);
-            ends.map(|v| self.axis.vertices[v as usize].r).fold(0.0, f64::max)
-        };
-        match self.rule {
-            Rule::Drawn(held) => held.touches(self.axis, self.origin, &joint.edges),
-            Rule::Wide(reach) => widest(&joint.edges) >= *reach,
-            Rule::Pads => match joint.ports.as_slice() {
-                [] => true,
-                [port] => {
-                    let width = self.parts.limbs[port.limb].width[port.end];
-                    2.0 * widest(&joint.edges) >= PAD * width
-                }
-                _ => false,
-            },
-        }
     }
 }

@@ -46,6 +46,14 @@ impl Moments {
         }
     }
 
+    /// The same shape with `area` more of it: what rounding left over.
+    pub(super) fn grow(&mut self, area: f64) {
+        if self.area > 0.0 {
+            let by = (self.area + area) / self.area;
+            *self = Self { area: self.area + area, first: self.first.map(|m| m * by), second: self.second * by };
+        }
+    }
+
     /// Centroid; the origin for nothing.
     pub fn centroid(&self) -> [f64; 2] {
         if self.area > 0.0 { self.first.map(|m| m / self.area) } else { [0.0; 2] }

@@ -8,6 +8,7 @@ use super::conductors;
 use super::repeats::{self, Instance, Scope, Subnet};
 use super::rows::{Frame, Item, Row, Rows, Value};
 use crate::sets::Sets;
+use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fmt::Write as _;
 
@@ -15,12 +16,14 @@ use std::fmt::Write as _;
 const SHARED: [usize; 2] = [2, 3];
 
 /// A netlist with the names of its nodes.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Written {
     /// The netlist.
     pub text: String,
     /// Full name of each node of the extraction in it.
     pub names: Vec<String>,
+    /// For lines that are elements or materials, from 1: the layer, and the middle of the nodes in the drawing [m].
+    pub places: BTreeMap<usize, (String, [f64; 2])>,
 }
 
 /// The netlist of an extraction.
@@ -33,11 +36,12 @@ pub fn written(extraction: &Extraction) -> Written {
     let rows = Rows::new(extraction);
     let items = items(extraction);
     let mut text = String::new();
-    head(extraction, &mut text);
+    let marks = RefCell::new(Vec::new());
+    head(extraction, &mut text, &mut marks.borrow_mut());
     let flat: Vec<Row> = items.iter().map(|item| rows.row(item, &Frame::DRAWING)).collect();
     let words = Words::new(&flat, &mut text);
     let (scope, subnets) = repeats::scope(extraction, &rows, items);
-    let writer = Writer { extraction, words, rows, subnets: &subnets };
+    let writer = Writer { extraction, words, rows, subnets: &subnets, marks };
     let locals: Vec<HashMap<usize, String>> = subnets.iter().map(|subnet| writer.locals(subnet)).collect();
     for (subnet, local) in subnets.iter().zip(&locals) {
         let formals: Vec<&str> = subnet.terminals.iter().map(|n| local[n].as_str()).collect();
@@ -49,7 +53,8 @@ pub fn written(extraction: &Extraction) -> Written {
     writer.scope(&scope, &|n| extraction.nodes[n].name.clone(), "", &mut text);
     let all: HashMap<usize, usize> = (0..names.len()).map(|n| (n, n)).collect();
     writer.inner(&scope, "", &all, &locals, &mut names);
-    Written { text, names }
+    let places = writer.places_of_lines(&text);
+    Written { text, names, places }
 }
 
 /// All elements in the order in which they are written.
@@ -57,6 +62,7 @@ fn items(extraction: &Extraction) -> Vec<Item> {
     let mut items: Vec<Item> = extraction.anchors.iter().map(|n| Item::Anchor(*n)).collect();
     items.extend((0..extraction.bodies.len()).map(Item::Body));
     items.extend((0..extraction.links.len()).map(Item::Link));
+    items.extend((0..extraction.roots.len()).map(Item::Root));
     items.extend((0..extraction.beams.len()).map(Item::Beam));
     items.extend((0..extraction.arcs.len()).map(Item::Arc));
     items.extend((0..extraction.combs.len()).map(Item::Comb));
@@ -66,7 +72,7 @@ fn items(extraction: &Extraction) -> Vec<Item> {
     items
 }
 
-fn head(extraction: &Extraction, out: &mut String) {
+fn head(extraction: &Extraction, out: &mut String, marks: &mut Vec<Mark>) {
     let clean = |text: &str| text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect::<String>();
     let _ = writeln!(
         out,
@@ -85,11 +91,23 @@ fn head(extraction: &Extraction, out: &mut String) {
             clean(&lost.why)
         );
     }
-    for layer in &extraction.layers {
+    for (k, layer) in extraction.layers.iter().enumerate() {
+        let first = extraction.bodies.iter().find(|b| b.layer == k).map(|b| b.node);
+        let first = first.or_else(|| extraction.beams.iter().find(|b| b.layer == k).map(|b| b.nodes[0]));
+        marks.extend(first.map(|n| Mark { at: out.len(), layer: layer.name.clone(), place: extraction.nodes[n].at }));
         let entries: Vec<String> =
             layer.material.iter().map(|(name, value)| format!("{name}={}", number(*value))).collect();
         let _ = writeln!(out, "process {} = [ {} h={} ]", layer.name, entries.join(" "), micro(layer.thickness));
     }
+}
+
+/// Where a line begins, and what it stands for.
+struct Mark {
+    /// Byte of the netlist.
+    at: usize,
+    layer: String,
+    /// Place in the drawing [m].
+    place: [f64; 2],
 }
 
 struct Writer<'a> {
@@ -97,9 +115,21 @@ struct Writer<'a> {
     words: Words,
     rows: Rows<'a>,
     subnets: &'a [Subnet],
+    marks: RefCell<Vec<Mark>>,
 }
 
 impl Writer<'_> {
+    /// What lines of the netlist stand for, by their numbers.
+    fn places_of_lines(&self, text: &str) -> BTreeMap<usize, (String, [f64; 2])> {
+        let (mut line, mut from, mut places) = (1, 0, BTreeMap::new());
+        for mark in self.marks.borrow().iter() {
+            line += text[from..mark.at].matches('\n').count();
+            from = mark.at;
+            places.insert(line, (mark.layer.clone(), mark.place));
+        }
+        places
+    }
+
     /// The lines of a scope.
     fn scope(&self, scope: &Scope, name: &dyn Fn(usize) -> String, indent: &str, out: &mut String) {
         self.places(scope, name, indent, out);
@@ -117,7 +147,13 @@ impl Writer<'_> {
             let _ = writeln!(out, "{indent}{} {subnet} * [{}] [{}]", instance.name, nodes.join(" "), turned.join(" "));
         }
         for item in &scope.items {
-            let _ = writeln!(out, "{indent}{}", self.words.line(&self.rows.row(item, &scope.frame), name));
+            let row = self.rows.row(item, &scope.frame);
+            let nodes = self.extraction.nodes_of(item);
+            let place = [0, 1].map(|i| {
+                nodes.iter().map(|n| self.extraction.nodes[*n].at[i]).sum::<f64>() / nodes.len().max(1) as f64
+            });
+            self.marks.borrow_mut().push(Mark { at: out.len(), layer: row.layer.clone(), place });
+            let _ = writeln!(out, "{indent}{}", self.words.line(&row, name));
         }
     }
 
@@ -128,7 +164,7 @@ impl Writer<'_> {
         let number: BTreeMap<usize, usize> = shown.iter().enumerate().map(|(k, n)| (*n, k)).collect();
         let mut sets = Sets::new(shown.len());
         for item in &scope.items {
-            if let Item::Beam(_) | Item::Arc(_) | Item::Link(_) = item {
+            if let Item::Beam(_) | Item::Arc(_) | Item::Link(_) | Item::Root(_) = item {
                 let nodes = self.extraction.nodes_of(item);
                 sets.join(number[&nodes[0]], number[&nodes[1]]);
             }

@@ -1,13 +1,13 @@
 //! A part of a layer that hangs together, and what is known of its shape.
 
+use super::holes::Hole;
 use super::joints::Parts;
 use super::medial::Medial;
-use super::moments::Moments;
 use crate::layout::drawing::Polygon;
 use std::sync::Arc;
 
 /// What was found along the axis of a shape.
-pub(super) type Found = Arc<(Medial, Parts)>;
+pub(super) type Found = (Arc<Medial>, Arc<Parts>);
 
 /// A part that hangs together.
 #[derive(Debug, Clone)]
@@ -17,7 +17,7 @@ pub(super) struct Part {
     /// Its axis, limbs and joints.
     pub(super) found: Found,
     /// Etch holes in it, in coordinates of the drawing.
-    pub(super) holes: Vec<Moments>,
+    pub(super) holes: Vec<Hole>,
 }
 
 impl Part {

@@ -51,6 +51,7 @@ pub(super) enum Item {
     Anchor(usize),
     Body(usize),
     Link(usize),
+    Root(usize),
     Beam(usize),
     Arc(usize),
     Comb(usize),
@@ -125,6 +126,7 @@ impl Extraction {
             Item::Anchor(n) | Item::Ground(n) | Item::Port(_, n) => vec![*n],
             Item::Body(k) => vec![self.bodies[*k].node],
             Item::Link(k) => self.links[*k].to_vec(),
+            Item::Root(k) => self.roots[*k].nodes.to_vec(),
             Item::Beam(k) => self.beams[*k].nodes.to_vec(),
             Item::Arc(k) => self.arcs[*k].nodes.to_vec(),
             Item::Comb(k) => self.combs[*k].nodes.to_vec(),
@@ -182,6 +184,14 @@ impl<'a> Rows<'a> {
                 let [a, b] = self.found.links[*k];
                 let d = self.between(frame, a, b);
                 row("link2d", "*", vec![a, b], vec![("l", Value::Metres(d[0].hypot(d[1]))), ("oz", turn(d))])
+            }
+            Item::Root(k) => {
+                let root = &self.found.roots[*k];
+                let shift = Value::Plain(root.shift);
+                let along = turn(frame.direction(root.along));
+                let values =
+                    vec![("kx", shift.clone()), ("ky", shift), ("krz", Value::Plain(root.turn)), ("oz", along)];
+                row("spring2d", "*", root.nodes.to_vec(), values)
             }
             Item::Beam(k) => self.beam_row(&self.found.beams[*k], frame),
             Item::Arc(k) => {

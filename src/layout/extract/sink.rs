@@ -5,10 +5,13 @@ use super::combs;
 use super::model::Model;
 use super::moments::Moments;
 use super::part::Part;
-use super::{Beam, Body, Comb, Extraction, Node, Pad};
+use super::{Beam, Body, Comb, Extraction, Node, Pad, Root};
 use crate::layout::drawing::Drawing;
 use crate::layout::process;
 use std::collections::HashSet;
+
+/// So many bodies of a part that only their width holds are told of.
+const MOST_MIDDLES: usize = 3;
 
 /// Puts models into the result, in SI units.
 pub(super) struct Sink<'a> {
@@ -17,6 +20,8 @@ pub(super) struct Sink<'a> {
     /// Number of the layer's first part.
     pub(super) first: usize,
     pub(super) unit: f64,
+    /// Young's modulus times thickness [N/m]; none: the material has no modulus.
+    pub(super) rigidity: Option<f64>,
 }
 
 impl Sink<'_> {
@@ -25,6 +30,7 @@ impl Sink<'_> {
         let (unit, layer) = (self.unit, self.layer);
         let mut used = vec![false; model.nodes.len()];
         let ends = model.beams.iter().flat_map(|b| [b.a, b.b]).chain(model.links.iter().flatten().copied());
+        let ends = ends.chain(model.roots.iter().flat_map(|root| root.nodes));
         ends.chain(model.bodies.iter().map(|b| b.node)).chain(model.taps.iter().copied()).for_each(|n| used[n] = true);
         // a part that is nothing but held is an electrode: it keeps one node
         if !used.iter().any(|u| *u) {
@@ -43,6 +49,16 @@ impl Sink<'_> {
         }));
         result.bodies.extend(model.bodies.iter().map(|b| body(layer, number[b.node], &b.moments, unit)));
         result.links.extend(model.links.iter().map(|l| l.map(|n| number[n])));
+        for root in &model.roots {
+            let (nodes, [shift, turn]) = (root.nodes.map(|n| number[n]), root.compliance);
+            match self.rigidity {
+                Some(e) => {
+                    let (shift, turn) = (e / shift, e * unit * unit / turn);
+                    result.roots.push(Root { nodes, along: root.along, shift, turn });
+                }
+                None => result.links.push(nodes),
+            }
+        }
         result.pads.extend(model.pads.iter().map(|pad| Pad {
             nodes: pad.nodes.iter().map(|n| number[*n]).filter(|n| *n != usize::MAX).collect(),
             layer,
@@ -90,6 +106,7 @@ impl Sink<'_> {
             }
             self.result.notes.push(told);
         }
+        self.result.notes.extend(parts.iter().flat_map(|part| middles(drawing, name, rule, part)));
         if !models.iter().any(Model::is_held) {
             self.result.notes.push(format!("layer {name}: nothing holds it"));
             return;
@@ -125,6 +142,32 @@ impl Sink<'_> {
             overlap: comb.overlap * self.unit,
         });
     }
+}
+
+/// Tells of bodies that only their width holds, though all of their limbs lead to other places that are held: where that is the mechanism
+/// itself, no undercut can say so.
+fn middles(drawing: &Drawing, layer: &str, rule: &Rule, part: &Part) -> Vec<String> {
+    let (Rule::Wide(reach), (axis, found)) = (rule, &part.found) else { return Vec::new() };
+    let held: Vec<bool> =
+        found.joints.iter().map(|joint| rule.holds_body(axis, part.origin(), &found.limbs, joint)).collect();
+    let mut notes = Vec::new();
+    for (j, joint) in found.joints.iter().enumerate().filter(|(j, joint)| held[*j] && joint.ports.len() > 1) {
+        let beyond = |k: usize| found.at[k].into_iter().find(|other| *other != j);
+        if joint.ports.iter().all(|port| beyond(port.limb).is_some_and(|other| held[other])) {
+            let [x, y] = joint.cell.centroid();
+            let at = drawing.place([x + part.origin()[0], y + part.origin()[1]]);
+            notes.push(format!(
+                "layer {layer}: the body at {at} is held, being wider than twice the undercut of {:.3} µm, though its {} limbs all lead to \
+                 other places that are held; if it moves, name the mask that holds the layer in the process (`anchors`, `released`), or \
+                 leave `undercut` out: then pads at the ends of single limbs are held",
+                reach * drawing.unit_m * 1e6,
+                joint.ports.len(),
+            ));
+        }
+    }
+    // a middle is told of, not each pad of a chain
+    notes.truncate(MOST_MIDDLES);
+    notes
 }
 
 fn body(layer: usize, node: usize, moments: &Moments, unit: f64) -> Body {

@@ -39,12 +39,7 @@ impl Builder<'_> {
         let width = |t: f64| limb.width[0] + t * (limb.width[1] - limb.width[0]);
         let widest = limb.width[0].max(limb.width[1]);
         let (mut kept, mut free_ends) = (0.0, [false; 2]);
-        // a free end is a joint of its own, and part of the beam
-        let tips = (0..2).filter(|end| loose(*end)).map(|end| self.parts.at[k][end]);
-        let (solid, missing) = tips.fold((limb.cell.area, self.limb_holes[k]), |(solid, missing), tip| {
-            (solid + self.parts.joints[tip].cell.area, missing + self.joint_holes[tip].area)
-        });
-        let porosity = missing / solid;
+        let porosity = self.porosity(k, [p, q]);
         let (loose_start, loose_end) = (loose(0), loose(1));
         let cut = !(free.len() == 1 && free[0] == [0.0, 1.0]);
         let origin = self.origin;
@@ -100,13 +95,39 @@ impl Builder<'_> {
             }
         }
         self.stretches(k, [p, q], held);
-        let area = limb.cell.area - self.limb_holes[k];
+        let area = limb.cell.area - self.holes.limbs[k].moments.area;
         self.model.area += area;
         self.model.held += (1.0 - kept) * area;
         // a free end of what is held is held
         for end in (0..2).filter(|end| loose(*end) && !free_ends[*end]) {
             let tip = self.parts.at[k][end];
-            self.model.held += self.parts.joints[tip].cell.area - self.joint_holes[tip].area;
+            self.model.held += self.parts.joints[tip].cell.area - self.holes.joints[tip].moments.area;
         }
+    }
+
+    /// Share of a limb between two places that holes take, so that its beams weigh what is drawn: a free end is part of it, and where it is
+    /// led into a body or ends before, so are the holes there.
+    fn porosity(&self, k: usize, [p, q]: [[f64; 2]; 2]) -> f64 {
+        let limb = &self.parts.limbs[k];
+        let (mut solid, mut missing) = (limb.cell.area, self.holes.limbs[k].moments.area);
+        for end in 0..2 {
+            let j = self.parts.at[k][end];
+            let joint = &self.parts.joints[j];
+            if let (1, Kind::Node(_)) = (joint.ports.len(), &joint.kind) {
+                solid += joint.cell.area;
+                missing += self.holes.joints[j].moments.area;
+                continue;
+            }
+            let (e, other, place) = (limb.ends[end], limb.ends[1 - end], [p, q][end]);
+            let long = limb.length();
+            let past = [0, 1].map(|i| (place[i] - self.origin[i] - e[i]) * (e[i] - other[i]) / long);
+            solid += (past[0] + past[1]) * limb.width[end];
+            missing += self.led[k][end];
+        }
+        if missing <= 0.0 {
+            return 0.0;
+        }
+        let drawn = 0.5 * (limb.width[0] + limb.width[1]) * (q[0] - p[0]).hypot(q[1] - p[1]);
+        (1.0 - (solid - missing) / drawn).clamp(0.0, 1.0)
     }
 }

@@ -23,7 +23,7 @@ pub fn bundle_from_wire(bundle: Option<proto::Bundle>) -> Result<Bundle, Violati
         let names: Vec<&str> = files.keys().take(8).map(String::as_str).collect();
         return Err(Violation::new("bundle.root", format!("\"{root}\" is not among the files {names:?}")));
     }
-    Ok(Bundle { root, files })
+    Ok(Bundle { root, files, places: Default::default() })
 }
 
 /// The netlist of a layout that was sent.

@@ -1,0 +1,166 @@
+//! Parts with etch holes: which of their limbs are plates, and which of their joints are bodies.
+//!
+//! A perforated plate longer than wide has the axis of a beam. Its limbs are taken together with the joints between them as one rigid
+//! body, with the mass and inertia that the holes leave, where they give way by less than 1/[`STIFF`] of what they hang on, and nothing
+//! of them is held. Any other perforated limb stays a beam. A joint with a hole in it is a node only at a free end: else it is a body, so that it
+//! lacks what the hole takes; so is one where a limb stands on a perforated one.
+//!
+//! The edge of a perforated plate gives way where a narrow limb stands on it, as the half-plane E′ of the plate does: by a spring for shifts and
+//! turns, and by [`ROOT`] widths by which the limb is led into it.
+
+use super::anchors::{self, Rule};
+use super::boxes;
+use super::cut::Cut;
+use super::holes::{self, Hole};
+use super::joints::{self, Joint, Kind, Parts, Port};
+use super::limbs::{self, Limb};
+use super::medial::Medial;
+use super::skeleton::Skeleton;
+use crate::sets::Sets;
+use std::f64::consts::FRAC_PI_2;
+
+/// By how much the limbs of a plate are stiffer, in a row, than each limb that it hangs on [1].
+const STIFF: f64 = 30.0;
+/// By how much a free plate that its inertia bends gives way, over four times its limbs as a cantilever [1]: 5/384 over 1/3.
+const BENT: f64 = 0.16;
+/// Limbs of one plate are given up together down to this share of the most compliant one [1].
+const ALIKE: f64 = 0.5;
+
+/// How far the turn of an elastic edge under a moment makes a limb longer, in widths of it [1]: for traction as in a long beam on a half-plane
+/// in plane stress the edge turns by 16.67·M/(π·E·w²) (W. J. O'Donnell, J. Appl. Mech. 27, 1960), the limb by 12·M/(E·w³) per length.
+const ROOT: f64 = 0.44;
+/// What the holes add to that turn, times E·w²·thickness [1]: fitted, as [`FLUSH`] and [`FAR`], to plane stress of the plates that
+/// `scripts/random-plates` draws.
+const TURN: f64 = 0.37;
+/// By how much an edge gives way more at a corner [1], and how far from it that is felt, in widths of the limb [1].
+const FLUSH: [f64; 2] = [1.1, 0.25];
+/// Shift of a half-plane under an even pressure on a width w, times π·E/2 over the pressure times w: ln(D/w) and this [1], for a plate of
+/// area D² (S. Timoshenko, J. N. Goodier, Theory of Elasticity, §36).
+const FAR: f64 = 1.0;
+/// What a plate of sides l along a limb and b across adds to the shift, over E′/E [1]: (l/b − 1) times a third, as of a bar that its
+/// own inertia loads, and (b²/l² − 1) times the second, fitted, for bending.
+const LONG: [f64; 2] = [1.0 / 3.0, 0.3];
+/// Widest limb for which a body is a half-plane, over twice the radius of the largest disc in it [1].
+const NARROW: f64 = 0.5;
+
+/// Limbs and joints of a part with holes; `plain` are those of its outline alone.
+pub(super) fn perforated(axis: &Medial, plain: &Parts, holes: &[Hole], origin: [f64; 2], rule: &Rule) -> Parts {
+    let skeleton = Skeleton::of(axis);
+    let cut = Cut::of(axis, plain, holes, origin);
+    let rigid = plates(axis, plain, &cut, origin, rule);
+    let mut kept = rigid.iter();
+    let mut limbs = limbs::limbs(&skeleton);
+    limbs.retain(|_| !kept.next().is_some_and(|rigid| *rigid));
+    let mut parts = joints::joints(&skeleton, limbs);
+    let cut = Cut::of(axis, &parts, holes, origin);
+    for j in 0..parts.joints.len() {
+        let joint = &parts.joints[j];
+        let point =
+            matches!(joint.kind, Kind::Bar { .. }) || matches!(joint.kind, Kind::Node(_)) && joint.ports.len() > 1;
+        // where a limb stands on a perforated one, its way to the centreline would weigh twice, by different densities
+        let stands = joint.ports.len() > 2 && joint.ports.iter().any(|port| cut.limbs[port.limb].moments.area > 0.0);
+        if point && (stands || cut.joints[j].moments.area > 0.0) {
+            let body = joints::body(&skeleton, &parts.limbs, joint);
+            parts.joints[j].kind = body;
+        }
+        let (joint, limbs) = (&mut parts.joints[j], &parts.limbs);
+        let elastic = cut.joints[j].moments.area > 0.0 && !rule.holds_body(axis, origin, limbs, joint);
+        let wide = 2.0 * anchors::half_width(axis, joint);
+        let stiffness = holes::stiffness(cut.joints[j].moments.area / joint.cell.area);
+        let narrow = |port: &Port| elastic && limbs[port.limb].width[port.end] <= NARROW * wide;
+        let elastic: Vec<bool> = joint.ports.iter().map(narrow).collect();
+        let yields =
+            |(port, narrow): (&Port, &bool)| narrow.then(|| edge(axis, joint, &limbs[port.limb], port.end, stiffness));
+        joint.roots = joint.ports.iter().zip(&elastic).map(yields).collect();
+        if let Kind::Body(places) = &mut joint.kind {
+            for ((place, port), narrow) in places.iter_mut().zip(&joint.ports).zip(elastic) {
+                *place = root(*place, &limbs[port.limb], port.end, joint.cell.area, narrow);
+            }
+        }
+    }
+    parts
+}
+
+/// By how much the edge of a plate gives way under a limb that stands on it, times E·thickness: shift, turn.
+fn edge(axis: &Medial, joint: &Joint, limb: &Limb, end: usize, stiffness: f64) -> [f64; 2] {
+    let (width, d) = (limb.width[end], limb.direction());
+    let room = joints::from_corner(axis, limb, end);
+    let corner = 1.0 + FLUSH[0] * (-room / (FLUSH[1] * width)).exp();
+    let outlines = joint.edges.iter().map(|e| &axis.edges[*e as usize]).flat_map(|e| axis.outline(e.ends, e.sites));
+    let [low, high] = boxes::around(outlines.map(|p| [p[0] * d[0] + p[1] * d[1], d[0] * p[1] - d[1] * p[0]]));
+    let long = (high[0] - low[0]) / (high[1] - low[1]);
+    let slender = LONG[0] * (long - 1.0).max(0.0) + LONG[1] * (long.powi(-2) - 1.0).max(0.0);
+    let shift = (0.5 * joint.cell.area.ln() - width.ln() + FAR) / FRAC_PI_2;
+    [(shift * corner + slender) / stiffness, TURN * corner / (width * width)]
+}
+
+/// Where a limb ends in a body, less than half of whose area lies on the way there; `deep`: it is led into an elastic one.
+fn root(mouth: [f64; 2], limb: &Limb, end: usize, area: f64, deep: bool) -> [f64; 2] {
+    let (e, w) = (limb.ends[end], limb.width[end]);
+    let u = if end == 1 { limb.direction() } else { limb.direction().map(|x| -x) };
+    let ahead = (mouth[0] - e[0]) * u[0] + (mouth[1] - e[1]) * u[1];
+    let deep = if deep { ahead + ROOT * w } else { ahead };
+    let fits = |t: &f64| t.abs() * w <= 0.5 * area && *t > -0.9 * limb.length();
+    let t = [deep, ahead].into_iter().find(fits).unwrap_or(0.0);
+    [e[0] + t * u[0], e[1] + t * u[1]]
+}
+
+/// For each limb whether it is a piece of a plate.
+fn plates(axis: &Medial, parts: &Parts, cut: &Cut, origin: [f64; 2], rule: &Rule) -> Vec<bool> {
+    let porosity = |k: usize| cut.limbs[k].moments.area / parts.limbs[k].cell.area;
+    let compliance: Vec<f64> = (0..parts.limbs.len()).map(|k| compliance(&parts.limbs[k], porosity(k))).collect();
+    let mut rigid: Vec<bool> = parts.limbs.iter().map(|limb| !rule.holds_limb(limb, origin)).collect();
+    let held: Vec<bool> = parts.joints.iter().map(|joint| rule.holds_body(axis, origin, &parts.limbs, joint)).collect();
+    loop {
+        crate::budget::check();
+        let mut sets = Sets::new(parts.joints.len());
+        for k in (0..rigid.len()).filter(|k| rigid[*k]) {
+            sets.join(parts.at[k][0], parts.at[k][1]);
+        }
+        // of each plate: cube root of the compliance of all its limbs in a row, the largest of them, the least of those that it hangs on
+        let mut plates = vec![(0.0, 0.0_f64, f64::INFINITY, f64::INFINITY); parts.joints.len()];
+        for k in 0..rigid.len() {
+            for j in parts.at[k].map(|j| sets.first(j)) {
+                let (row, most, least, stretch) = &mut plates[j];
+                if rigid[k] {
+                    *row += 0.5 * compliance[k].cbrt();
+                    *most = most.max(compliance[k]);
+                } else {
+                    *least = least.min(compliance[k]);
+                    *stretch = stretch.min(slender(&parts.limbs[k]));
+                }
+            }
+        }
+        for j in (0..held.len()).filter(|j| held[*j]) {
+            plates[sets.first(j)].2 = 0.0;
+        }
+        let before = rigid.clone();
+        for k in (0..rigid.len()).filter(|k| before[*k]) {
+            let (row, most, least, stretch) = plates[sets.first(parts.at[k][0])];
+            let row: f64 = row.powi(3);
+            rigid[k] = STIFF * row <= least && BENT * row <= stretch || compliance[k] < ALIKE * most;
+        }
+        if rigid == before {
+            // what has no hole is no perforated plate
+            let mut holes = vec![false; parts.joints.len()];
+            for (j, lack) in cut.joints.iter().enumerate() {
+                holes[sets.first(j)] |= lack.moments.area > 0.0;
+            }
+            for k in (0..rigid.len()).filter(|k| rigid[*k]) {
+                holes[sets.first(parts.at[k][0])] |= cut.limbs[k].moments.area > 0.0;
+            }
+            return (0..rigid.len()).map(|k| rigid[k] && holes[sets.first(parts.at[k][0])]).collect();
+        }
+    }
+}
+
+/// By how much a limb gives way across, about: bending and shear [1].
+fn compliance(limb: &Limb, porosity: f64) -> f64 {
+    let slender = slender(limb);
+    (slender.powi(3) + slender) / holes::stiffness(porosity)
+}
+
+/// Length over width [1]: by how much it gives way along, times E·thickness.
+fn slender(limb: &Limb) -> f64 {
+    limb.length() / (0.5 * (limb.width[0] + limb.width[1]))
+}
