@@ -14,14 +14,19 @@ pub const MOST_CUTS: usize = 4_000_000;
 const BYTES_PER_CUT: usize = 200;
 /// What counting holds for each edge.
 const BYTES_PER_EDGE: usize = 200;
+/// Sum over slanted edges of the squares of how many cuts each has. Crossings of slanted edges are rounded to the grid, which moves the pieces
+/// between them, so that set operations go over them again and again: a star of n edges that all cut one another takes n³ (0.1 s at 250).
+const MOST_DENSE: u64 = 20_000_000;
+/// Up to so many edges cannot come to that.
+const FEW: usize = 250;
 /// Pairs of runs that are tried: long lines side by side on a slope, none of which cut another, come to that.
 const MOST_TRIED: usize = 50_000_000;
 
 /// Polygons whose union could be too large to hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 #[error(
-    "its polygons cut one another in more than {MOST_CUTS} places, or many long slanted ones lie side by side, about point {} {} of its \
-     grid", .at[0], .at[1]
+    "its polygons cut one another in more than {MOST_CUTS} places, or slanted ones each in hundreds, or many long slanted ones lie side by \
+     side, about point {} {} of its grid", .at[0], .at[1]
 )]
 pub struct Tangled {
     /// Where the counting ended [database units].
@@ -31,12 +36,13 @@ pub struct Tangled {
 /// Looks at polygons before a set operation on all of them.
 ///
 /// # Errors
-/// [`Tangled`] beyond [`MOST_CUTS`].
+/// [`Tangled`] beyond [`MOST_CUTS`], or where slanted edges cut one another too often each.
 pub(super) fn bounded<'a>(polygons: impl Iterator<Item = &'a Polygon>) -> Result<(), Tangled> {
     let edges: Vec<Vec<Edge>> = polygons.flat_map(|p| &p.contours).map(|c| edges_of(c).collect()).collect();
     let all = edges.iter().map(Vec::len).sum::<usize>();
     // fewer pairs than cuts that are taken on
-    if all.saturating_mul(all) / 2 <= MOST_CUTS {
+    let slanted = edges.iter().flatten().filter(|e| e.slanted()).count();
+    if all.saturating_mul(all) / 2 <= MOST_CUTS && slanted <= FEW {
         return Ok(());
     }
     crate::budget::lay_out(all.saturating_mul(BYTES_PER_EDGE));
@@ -64,6 +70,10 @@ impl Edge {
 
     fn high(&self) -> i32 {
         self.a[1].max(self.b[1])
+    }
+
+    fn slanted(&self) -> bool {
+        self.a[0] != self.b[0] && self.a[1] != self.b[1]
     }
 
     fn apart(&self, other: &Self) -> bool {
@@ -119,16 +129,43 @@ fn runs(contours: &[Vec<Edge>]) -> Vec<Run<'_>> {
     runs
 }
 
+/// Cuts of each edge of a run with slanted ones, or of a slanted edge with any.
+type Each = [u32; RUN];
+
 impl Run<'_> {
-    /// Cuts among its own edges.
-    fn own(&self) -> usize {
-        let before = |k: usize| self.edges[..k].iter();
-        self.edges.iter().enumerate().map(|(k, e)| before(k).filter(|f| e.cuts(f)).count()).sum()
+    /// Cuts among its own edges, and by how much they add to [`MOST_DENSE`].
+    fn own(&self, each: &mut Each) -> (usize, u64) {
+        let (mut cuts, mut dense) = (0, 0);
+        for (k, e) in self.edges.iter().enumerate() {
+            for (j, f) in self.edges[..k].iter().enumerate().filter(|(_, f)| e.cuts(f)) {
+                cuts += 1;
+                if e.slanted() || f.slanted() {
+                    dense += one_more(&mut each[k]) + one_more(&mut each[j]);
+                }
+            }
+        }
+        (cuts, dense)
     }
 
-    fn cuts(&self, other: &Self) -> usize {
-        self.edges.iter().map(|e| other.edges.iter().filter(|f| e.cuts(f)).count()).sum()
+    /// The same with the edges of another.
+    fn cuts(&self, other: &Self, [own, others]: [&mut Each; 2]) -> (usize, u64) {
+        let (mut cuts, mut dense) = (0, 0);
+        for (k, e) in self.edges.iter().enumerate() {
+            for (j, f) in other.edges.iter().enumerate().filter(|(_, f)| e.cuts(f)) {
+                cuts += 1;
+                if e.slanted() || f.slanted() {
+                    dense += one_more(&mut own[k]) + one_more(&mut others[j]);
+                }
+            }
+        }
+        (cuts, dense)
     }
+}
+
+/// Counts one; answers by how much the square grows.
+fn one_more(count: &mut u32) -> u64 {
+    *count += 1;
+    2 * u64::from(*count) - 1
 }
 
 /// Runs in the tree, by the nodes that cover their range of y.
@@ -145,6 +182,9 @@ struct Sweep<'a> {
     last: Vec<u32>,
     /// Pairs that were tried.
     tried: usize,
+    /// By run, the cuts of each of its edges where slanted ones meet, and the sum of their squares.
+    each: Vec<Each>,
+    dense: u64,
 }
 
 impl<'a> Sweep<'a> {
@@ -154,8 +194,8 @@ impl<'a> Sweep<'a> {
         places.dedup();
         let leaves = places.len().next_power_of_two();
         let (at, below) = (vec![Vec::new(); 2 * leaves], vec![0; 2 * leaves]);
-        let last = vec![u32::MAX; runs.len()];
-        Self { runs, places, leaves, at, below, last, tried: 0 }
+        let (last, each) = (vec![u32::MAX; runs.len()], vec![[0; RUN]; runs.len()]);
+        Self { runs, places, leaves, at, below, last, tried: 0, each, dense: 0 }
     }
 
     fn count(&mut self, most: usize) -> Result<usize, Tangled> {
@@ -164,8 +204,10 @@ impl<'a> Sweep<'a> {
             crate::budget::check();
             let run = self.runs[k];
             let range = [run.low[1], run.high[1]].map(|y| self.places.partition_point(|p| *p < y));
-            cuts += run.own() + self.meet(k, range, 1, [0, self.leaves - 1]);
-            if cuts > most || self.tried > MOST_TRIED {
+            let (own, dense) = run.own(&mut self.each[k]);
+            self.dense += dense;
+            cuts += own + self.meet(k, range, 1, [0, self.leaves - 1]);
+            if cuts > most || self.tried > MOST_TRIED || self.dense > MOST_DENSE {
                 return Err(Tangled { at: run.low });
             }
             self.enter(k, range, 1, [0, self.leaves - 1]);
@@ -193,7 +235,10 @@ impl<'a> Sweep<'a> {
             }
             if std::mem::replace(&mut self.last[other as usize], k as u32) != k as u32 {
                 self.tried += 1;
-                cuts += run.cuts(found);
+                let [own, others] = self.each.get_disjoint_mut([k, other as usize]).unwrap_or_else(|_| unreachable!());
+                let (more, dense) = run.cuts(found, [own, others]);
+                cuts += more;
+                self.dense += dense;
             }
             i += 1;
         }
@@ -247,6 +292,22 @@ mod tests {
         assert_eq!(count(&bars(20)), 4 * 20 * 20);
         assert_eq!(bounded(bars(900).iter()), Ok(()));
         assert!(bounded(bars(10_000).iter()).is_err());
+    }
+
+    /// A star whose edges all cut one another is refused from 273 edges on (the cube root of [`MOST_DENSE`], each cut counts for two edges), one that
+    /// each edge crosses a few times is not, however many edges it has.
+    #[test]
+    fn stars() {
+        let star = |n: usize, step: usize| {
+            let corner = |k: usize| {
+                let angle = std::f64::consts::TAU * (k * step % n) as f64 / n as f64;
+                [(1e6 * angle.cos()).round() as i32, (1e6 * angle.sin()).round() as i32]
+            };
+            Polygon::from_contour((0..n).map(corner).collect())
+        };
+        assert_eq!(bounded([star(255, 127)].iter()), Ok(()));
+        assert!(bounded([star(301, 150)].iter()).is_err() && bounded([star(2001, 1000)].iter()).is_err());
+        assert_eq!(bounded([star(2001, 5)].iter()), Ok(()));
     }
 
     /// Boxes side by side share edges and are not cut; shifted ones are, once for each end on another's edge.
