@@ -11,8 +11,8 @@ use std::sync::Arc;
 
 /// Places along a segment where its shape is taken.
 const PLACES: usize = 8;
-/// Fraction of the largest deflection at which the first half-wave is found [1].
-const HALF_WAVE: f64 = 0.5;
+/// Fraction of the largest displacement across a beam at which its side is taken [1].
+const HALF: f64 = 0.5;
 
 /// The centreline of a beam.
 #[derive(Debug, Clone, PartialEq)]
@@ -75,23 +75,24 @@ impl BeamLine {
         SegmentState { strain: chord.norm() / h - 1.0, turns: ends.map(|end| end - turned) }
     }
 
-    /// Energy [J] with which a motion `dq` from the configuration `q` bends the beam, and the side to which its first half-wave goes.
+    /// Energy [J] with which a motion `dq` from the configuration `q` bends the beam, and the side to which it carries the beam: that of the
+    /// first place that moves across the beam by half of the largest such displacement.
     pub fn bending(&self, q: &[Pose], dq: &[Pose], linear: bool) -> (f64, Side) {
-        let (mut energy, mut base, mut shape) = (0.0, 0.0, vec![0.0]);
+        let (mut energy, mut shape) = (0.0, Vec::with_capacity(PLACES * self.segments()));
         for k in 0..self.segments() {
             let chord = self.chord(k, q, linear);
             let h = chord.norm().max(f64::MIN_POSITIVE);
             let across = planar::turn(chord) / h;
             let [a, b] = [k, k + 1].map(|k| moved(&self.points[k], q, dq, linear));
-            let turn = (b.0 - a.0).dot(&across) / h;
+            let ends = [a.0.dot(&across), b.0.dot(&across)];
+            let turn = (ends[1] - ends[0]) / h;
             let (first, second) = (a.1 - turn, b.1 - turn);
             energy += 2.0 * self.rigidity / h * (first * first + first * second + second * second);
             for place in 1..=PLACES {
                 let x = place as f64 / PLACES as f64;
                 let bow = x * (1.0 - x) * ((1.0 - x) * first - x * second);
-                shape.push(base + h * (x * turn + bow));
+                shape.push((1.0 - x) * ends[0] + x * ends[1] + h * bow);
             }
-            base += h * turn;
         }
         (energy, first_side(&shape))
     }
@@ -104,11 +105,11 @@ fn moved(point: &Point, q: &[Pose], dq: &[Pose], linear: bool) -> (Vector2<f64>,
     (Vector2::new(change.x, change.y) + lever * change.z, change.z)
 }
 
-/// The side of the first half-wave of a shape from the line between its ends.
+/// The side of the first place with half of the largest displacement.
 fn first_side(shape: &[f64]) -> Side {
-    let (Some(last), count) = (shape.last(), shape.len() - 1) else { return Side::Left };
-    let from_chord = |k: usize| shape[k] - last * k as f64 / count.max(1) as f64;
-    let most = (0..=count).map(|k| from_chord(k).abs()).fold(0.0, f64::max);
-    let first = (0..=count).map(from_chord).find(|v| v.abs() >= HALF_WAVE * most).unwrap_or(0.0);
-    if first < 0.0 { Side::Right } else { Side::Left }
+    let most = shape.iter().map(|v| v.abs()).fold(0.0, f64::max);
+    match shape.iter().find(|v| v.abs() >= HALF * most) {
+        Some(v) if *v < 0.0 => Side::Right,
+        _ => Side::Left,
+    }
 }

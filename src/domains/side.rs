@@ -1,7 +1,7 @@
 //! The side to which a part goes where both are alike, by a rule that turns with the drawing.
 //!
-//! Of the beams whose bending energy in the motion is at least half of the largest, the first of the netlist bows to the left of its chord, seen along its
-//! drawn direction. Without beams the first gap that changes at least half as much as any closes, and without gaps the first joint with half of the
+//! Of the beams whose bending energy in the motion is at least half of the largest, the first of the netlist goes to the left, seen along its drawn
+//! direction. Without beams the first gap that changes at least half as much as any closes, and without gaps the first joint with half of the
 //! largest strain lengthens or turns to the left.
 
 use super::beam_line::Side;
@@ -37,7 +37,7 @@ impl System {
         {
             let left = if bent[k].1 == Side::Left { 1.0 } else { -1.0 };
             let side = if left * sign > 0.0 { "left" } else { "right" };
-            return (left, format!("{} bows {side}", self.beams[k].name));
+            return (left, format!("{} to the {side}", self.beams[k].name));
         }
         let gaps = self.members.iter().map(|gap| -gap.distance_change(self.at(q), motion)).filter(|x| x.is_finite());
         let own = decisive(gaps).unwrap_or_else(|| decisive(self.changes(q, motion)).unwrap_or(1.0));

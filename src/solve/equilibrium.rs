@@ -45,7 +45,7 @@ pub struct EquilibriumOptions {
     pub iterations: usize,
     /// Smallest load step before a loss of stability is declared, default 1e-7 of the present load. Smaller: losses located more sharply.
     pub smallest_step: f64,
-    /// Factorizations of a fall after a loss of stability, default 1500.
+    /// Factorizations of a fall after a loss of stability, default 4000.
     pub fall_steps: usize,
     /// Stop at the first loss of stability instead of falling, default false.
     pub stop_at_fold: bool,
@@ -59,7 +59,7 @@ impl Default for EquilibriumOptions {
             tolerance: 1e-10,
             iterations: 12,
             smallest_step: 1e-7,
-            fall_steps: 1500,
+            fall_steps: 4000,
             stop_at_fold: false,
             mirrored: false,
         }

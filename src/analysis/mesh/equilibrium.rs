@@ -24,6 +24,7 @@ use crate::netlist::Diagnostic;
 use crate::refine::carry::carried;
 use crate::refine::doubling::{self, Output};
 use crate::refine::model_order::ModelOrder;
+use crate::solve::equilibrium::Equilibrium;
 use std::borrow::Cow;
 
 /// Share of the mechanism's size below which a displacement is rounding.
@@ -67,7 +68,14 @@ pub(super) fn order(
             Some(finer) => segments = finer.segments,
             None => match search.ended(order)? {
                 (_, _, Some(buckled)) if buckled != from => segments = buckled,
-                (order, point, _) => return Ok((order, point)),
+                (order, point, _) => {
+                    let beyond = |model: &Compiled| Equilibrium::beyond_beams(&model.parts.system, &point.q).is_some();
+                    return match lost.take() {
+                        // a mesh fine enough stretches whatever is drawn; that is no beam
+                        Some(error) if beyond(&*meshed(compiled, &order.segments)?) => Err(error),
+                        _ => Ok((order, point)),
+                    };
+                }
             },
         }
     }

@@ -10,7 +10,7 @@
 
 use super::path::LoadPath;
 use super::{Equilibrium, Path};
-use crate::domains::{Domain, System};
+use crate::domains::{BeamLine, Domain, System};
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::{Block, Pose};
 use crate::solve::SolveError;
@@ -32,7 +32,9 @@ const MOST_SHIFT: f64 = 1e12;
 /// Fractions of the predicted decrease of energy: below the first a step is rejected, below the second the region shrinks, above the third it grows.
 const RATIO: [f64; 3] = [0.05, 0.25, 0.75];
 /// Rounding of the energy, as a fraction of it.
-const ROUNDING: f64 = 1e-13;
+const ROUNDING: f64 = 1e-12;
+/// Rotation between the ends of a segment beyond which a step is rejected [rad].
+const OVERTURNED: f64 = 1.5;
 /// Largest change of the distance of a gap in one step, as a fraction of the larger distance.
 const CLOSING: f64 = 0.5;
 
@@ -106,6 +108,15 @@ struct Region {
     energy: f64,
 }
 
+/// A step that was taken.
+#[derive(Debug, Clone, Copy)]
+struct Accepted {
+    /// Its largest displacement, in the units of W.
+    length: f64,
+    /// True where the energy it gains is more than rounding.
+    resolved: bool,
+}
+
 /// Why a fall ended without an equilibrium.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Unsettled {
@@ -148,12 +159,12 @@ impl Equilibrium {
         for _ in 0..self.options.fall_steps {
             crate::budget::check();
             done.iterations += 1;
-            let Some(length) = self.try_step(system, q, &mut region)? else { continue };
+            let Some(Accepted { length, resolved }) = self.try_step(system, q, &mut region)? else { continue };
             for (q, step) in q.iter_mut().zip(&self.step) {
                 *q += step;
             }
             // converged, or as close as rounding lets it come
-            if region.shift == 0.0 && (length < SETTLED || (length < UNTESTED && length > 0.5 * last)) {
+            if region.shift == 0.0 && (length < SETTLED || (!resolved && length > 0.5 * last)) {
                 return Ok(());
             }
             last = if region.shift == 0.0 { length } else { f64::INFINITY };
@@ -162,8 +173,8 @@ impl Equilibrium {
         Err(Unsettled::Budget)
     }
 
-    /// One factorization: the step from `q`, and its length where it is accepted.
-    fn try_step(&mut self, system: &System, q: &[Pose], region: &mut Region) -> Result<Option<f64>, Unsettled> {
+    /// One factorization: the step from `q`, where it is accepted.
+    fn try_step(&mut self, system: &System, q: &[Pose], region: &mut Region) -> Result<Option<Accepted>, Unsettled> {
         let units = region.units;
         system.tangent(q, &self.drive, &mut self.tangent, &mut self.residual);
         if region.least[0] == 0.0 {
@@ -188,13 +199,16 @@ impl Equilibrium {
         if length > 1.5 * region.radius {
             return raise(region, (length / region.radius).clamp(2.0, 8.0));
         }
-        if length < UNTESTED {
-            return Ok(Some(length));
-        }
         for ((trial, q), step) in self.trial.iter_mut().zip(q).zip(&self.step) {
             *trial = q + step;
         }
         let there = system.potential(&self.trial, &self.drive);
+        if length < UNTESTED {
+            // what noise of the energy made small may grow again
+            region.radius = (2.0 * region.radius).min(RADIUS[1]);
+            region.energy = there;
+            return Ok(Some(Accepted { length, resolved: false }));
+        }
         let work: f64 = self.residual.iter().zip(&self.step).map(|(r, d)| -r.dot(d)).sum();
         let predicted = 0.5 * (work + region.shift * units.weigh(&self.step));
         let noise = ROUNDING * (region.energy.abs() + there.abs());
@@ -203,7 +217,7 @@ impl Equilibrium {
         } else {
             (region.energy - there) / predicted
         };
-        if ratio.is_nan() || ratio < RATIO[0] || self.closes_too_far(system, q) {
+        if ratio.is_nan() || ratio < RATIO[0] || self.closes_too_far(system, q) || self.overturns(system, q) {
             region.radius = region.radius.min(length) / 3.0;
             if region.radius < LEAST_RADIUS {
                 return Err(Unsettled::Stuck);
@@ -216,18 +230,30 @@ impl Equilibrium {
             region.radius *= 0.5;
         }
         region.energy = there;
-        Ok(Some(length))
+        Ok(Some(Accepted { length, resolved: predicted > noise }))
     }
 
     /// Factors the tangent; true where it is positive definite, motions aside that are free from the start.
     pub(super) fn is_definite(&mut self, system: &System) -> bool {
         let pattern = &system.model.pattern;
         let inertia = if self.free_from_start {
-            self.tangent.factor_holding(pattern, &mut self.held)
+            system.model.factor_holding(&mut self.tangent, &mut self.held)
         } else {
             self.tangent.factor(pattern)
         };
         inertia.is_ok_and(|inertia| inertia.negative == 0)
+    }
+
+    /// True where the step to `trial` turns the ends of a segment so far against each other, and further than at `from`, that its law has a
+    /// valley of its own there: it stretches without strain.
+    fn overturns(&self, system: &System, from: &[Pose]) -> bool {
+        let turned =
+            |beam: &BeamLine, k: usize, q: &[Pose]| (beam.points[k + 1].rotation(q) - beam.points[k].rotation(q)).abs();
+        let over = |beam: &BeamLine, k: usize| {
+            let there = turned(beam, k, &self.trial);
+            there > OVERTURNED && there > turned(beam, k, from)
+        };
+        !system.model.linear && system.beams.iter().any(|beam| (0..beam.segments()).any(|k| over(beam, k)))
     }
 
     /// True where the step to `trial` changes the distance of a gap by so much that it may lead across.

@@ -12,12 +12,15 @@ use super::fall::{Units, Unsettled};
 use super::path::LoadPath;
 use super::{Equilibrium, Path};
 use crate::domains::System;
+use crate::multibody::forces::axial_force;
 use crate::multibody::planar::Pose;
 use crate::solve::SolveError;
 use serde::{Deserialize, Serialize};
 
 /// Participation of the load in the softest motion that divides bifurcations (up to 4e-6 seen) from limit points (from 1.7e-4).
 const PARTICIPATION: f64 = 3e-5;
+/// Force that is none but rounding, as a fraction of the largest section force.
+const UNBALANCED: f64 = 1e-8;
 /// Inverse iterations for the softest motion.
 const ROUNDS: usize = 6;
 /// Largest displacement of the disturbance with which a fall begins, in the units of W.
@@ -46,7 +49,7 @@ pub struct Passed {
     pub kind: LossKind,
     /// Fraction of the path where it lies [1].
     pub share: f64,
-    /// Where the part went: the beam that bends and the side of its chord to which it bows, seen along its drawn direction; without one the body that moves most.
+    /// Where the part went: the beam that bends and its side, seen along its drawn direction; without one the body that moves most.
     pub direction: String,
 }
 
@@ -150,8 +153,12 @@ impl Equilibrium {
             motion += (x.x * x.x + x.y * x.y) / (length * length) + x.z * x.z;
             force += (r.x * r.x + r.y * r.y) * length * length + r.z * r.z;
         }
+        let axial = |joint| axial_force(&system.model, joint, q, &self.drive.rest()).abs();
+        let stress = system.model.joints.iter().map(axial).fold(0.0, f64::max) * length;
+        // a straight part under uniform stress is balanced at any load
+        let unbalanced = force.sqrt() > UNBALANCED * stress;
         let norm = (motion * force).sqrt();
-        if norm > 0.0 && work.abs() > PARTICIPATION * norm {
+        if unbalanced && norm > 0.0 && work.abs() > PARTICIPATION * norm {
             let sign = work.signum();
             return Towards { kind: LossKind::LimitPoint, sign, direction: system.side(q, &self.soft, sign).1 };
         }

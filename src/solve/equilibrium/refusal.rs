@@ -64,8 +64,8 @@ impl Equilibrium {
             .map(|_| "two electrodes touch and no contact is declared".into())
     }
 
-    /// The segment that is beyond what a beam segment describes.
-    pub(super) fn beyond_beams(system: &System, q: &[Pose]) -> Option<String> {
+    /// The segment that is farthest beyond what a beam segment describes, in words; none where all are beams.
+    pub fn beyond_beams(system: &System, q: &[Pose]) -> Option<String> {
         let linear = system.model.linear;
         if linear {
             return None;
@@ -79,13 +79,16 @@ impl Equilibrium {
             })
         });
         let (_, beam, k, turn, strain) = states.max_by(|a, b| a.0.total_cmp(&b.0))?;
-        Some(format!(
-            "segment {} of beam {} is turned {:.0}° from its chord where the search ended: finer segments are needed (--segments), or the \
-             load is beyond beams (strain {strain:.2})",
-            k + 1,
-            beam.name,
-            turn.to_degrees()
-        ))
+        let place = format!("segment {} of beam {}", k + 1, beam.name);
+        Some(if turn > TURNED {
+            format!(
+                "{place} is turned {:.0}° from its chord where the search ended: finer segments are needed (--segments), or the load is beyond \
+                 beams (strain {strain:.2})",
+                turn.to_degrees()
+            )
+        } else {
+            format!("{place} comes to a strain of {strain:.2} where the search ended: the load is beyond beams")
+        })
     }
 
     fn gone(&self, system: &System, q: &[Pose]) -> Option<String> {
@@ -118,7 +121,7 @@ impl Equilibrium {
         let model = &system.model;
         system.tangent(q, &self.drive, &mut self.tangent, &mut self.residual);
         model.project_matrix(&mut self.tangent);
-        self.tangent.factor_holding(&model.pattern, &mut self.held).ok()?;
+        model.factor_holding(&mut self.tangent, &mut self.held).ok()?;
         for (j, x) in self.step.iter_mut().enumerate() {
             *x = Pose::new(1.0, 1.0 + 0.1 * (j % 7) as f64, 0.0);
         }
