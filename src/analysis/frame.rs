@@ -75,6 +75,7 @@ pub fn frame_statics(
         charges_c: (0..electrics.ports).map(|p| (electrics.names[p].clone(), charge(p))).collect(),
         pulled_in: false,
         jumped: false,
+        passed: Vec::new(),
         free_motions: Vec::new(),
         unknowns: frame.system.unknowns(),
         estimated_error: None,

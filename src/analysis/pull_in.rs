@@ -160,7 +160,7 @@ impl Sweep<'_> {
         let rest = vec![0.0; self.off.len()];
         let path = SourcePath::new(&self.system.electrics, &rest, &self.off, [0.0, 1.0]);
         let path = self.equilibrium.follow(self.system, &path, &mut q)?;
-        self.jumped = path.fold.is_some().then_some(
+        self.jumped = (!path.passed.is_empty()).then_some(
             "without any voltage the part has snapped through or buckled: these voltages are those of one of its branches; \
              `bimorph path` shows them, --imperfection chooses",
         );

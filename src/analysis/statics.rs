@@ -8,7 +8,7 @@ use super::{AnalysisError, BeamMotions, PortVoltages};
 use crate::compile::Compiled;
 use crate::multibody::planar::Pose;
 use crate::solve::SolveError;
-use crate::solve::equilibrium::{Equilibrium, EquilibriumOptions, Path};
+use crate::solve::equilibrium::{Equilibrium, EquilibriumOptions, LossKind, Passed, Path};
 use crate::solve::path::{LoadPath, SourcePath};
 use crate::structure::MOLTEN;
 use serde::Serialize;
@@ -28,6 +28,8 @@ pub struct StaticResult {
     pub pulled_in: bool,
     /// True when it jumped: it pulled in, snapped through or buckled.
     pub jumped: bool,
+    /// Losses of stability on the way from rest, in their order; `jumped` where there are any.
+    pub passed: Vec<Passed>,
     /// Motions that nothing resists noticeably and no load excites; they are held where they are.
     pub free_motions: Vec<String>,
     /// Mechanical unknowns.
@@ -43,18 +45,33 @@ pub struct StaticResult {
 impl StaticResult {
     /// How it came about, as sentences, where that is not by the shortest way.
     pub fn told(&self) -> Vec<String> {
-        told(self.pulled_in, self.jumped, &self.free_motions)
+        told(self.pulled_in, &self.passed, &self.free_motions)
     }
 }
 
-fn told(pulled_in: bool, jumped: bool, free_motions: &[String]) -> Vec<String> {
-    let way = match (pulled_in, jumped) {
-        (true, _) => Some("pulled in on the way to these voltages".to_owned()),
-        (false, true) => {
+/// Losses of stability that a sentence names at most.
+const MAX_NAMED: usize = 3;
+
+fn told(pulled_in: bool, passed: &[Passed], free_motions: &[String]) -> Vec<String> {
+    let one = |Passed { kind, share, direction }: &Passed| {
+        let kind = match kind {
+            LossKind::LimitPoint => "limit point",
+            LossKind::Bifurcation => "bifurcation",
+        };
+        let towards = if direction.is_empty() { String::new() } else { format!(" ({direction})") };
+        format!("a {kind} at {share:.4} of the load{towards}")
+    };
+    let named: Vec<String> = passed.iter().take(MAX_NAMED).map(one).collect();
+    let more = passed.len().saturating_sub(MAX_NAMED);
+    let more = if more == 0 { String::new() } else { format!(" and {more} more") };
+    let losses = format!("passed {}{more}", named.join(", "));
+    let way = match (pulled_in, passed.is_empty()) {
+        (true, _) => Some(format!("pulled in on the way to these voltages: {losses}")),
+        (false, false) => {
             let branches = "`bimorph path` shows the branches";
-            Some(format!("snapped through or buckled on the way to these loads; {branches}"))
+            Some(format!("snapped through or buckled on the way to these loads: {losses}; {branches}"))
         }
-        (false, false) => None,
+        (false, true) => None,
     };
     let held = free_motions.iter().map(|motion| format!("held where it is drawn: {motion}"));
     way.into_iter().chain(held).collect()
@@ -62,14 +79,14 @@ fn told(pulled_in: bool, jumped: bool, free_motions: &[String]) -> Vec<String> {
 
 /// [`StaticResult::told`] of an equilibrium that something else starts from.
 pub(crate) fn told_at(compiled: &Compiled, point: &OperatingPoint) -> Vec<String> {
-    let (pulled_in, jumped) = jump(compiled, point);
-    told(pulled_in, jumped, &point.free_motions)
+    let (pulled_in, _) = jump(compiled, point);
+    told(pulled_in, &point.path.passed, &point.free_motions)
 }
 
 /// Whether it pulled in, and whether it jumped at all.
 fn jump(compiled: &Compiled, point: &OperatingPoint) -> (bool, bool) {
     let system = &compiled.parts.system;
-    let jumped = point.path.fold.is_some();
+    let jumped = !point.path.passed.is_empty();
     let touching = (0..system.members.len()).any(|g| system.touches(g, &point.q));
     (jumped && point.volts.iter().any(|v| *v != 0.0) && touching, jumped)
 }
@@ -113,6 +130,7 @@ pub(crate) fn result_at(compiled: &Compiled, point: &OperatingPoint) -> StaticRe
         charges_c: (0..electrics.ports).map(|p| (port(p), charge(p))).collect(),
         pulled_in,
         jumped,
+        passed: point.path.passed.clone(),
         free_motions: point.free_motions.clone(),
         unknowns: system.model.unknowns(),
         estimated_error: compiled.order.estimated_error,
@@ -154,6 +172,8 @@ pub(crate) struct OperatingPoint {
     pub(crate) volts: Vec<f64>,
     pub(crate) path: Path,
     pub(crate) free_motions: Vec<String>,
+    /// The beam that bends most in the softest motion, where the load is within 1 % of buckling.
+    pub(crate) near_buckling: Option<String>,
 }
 
 impl OperatingPoint {
@@ -166,7 +186,7 @@ impl OperatingPoint {
         let mut drive = electrics.drive();
         electrics.apply(&sources, &rise, &mut drive);
         let q = vec![Pose::zeros(); system.bodies()];
-        Ok(Self { q, sources, rise, volts: drive.volts, path: Path::default(), free_motions: Vec::new() })
+        Ok(Self { q, sources, rise, volts: drive.volts, ..Self::default() })
     }
 }
 
@@ -186,7 +206,7 @@ pub(crate) fn operating_point_near(
 ) -> Result<(OperatingPoint, bool), AnalysisError> {
     let sources = source_vector(compiled, voltages)?;
     match settle(compiled, q, sources.clone(), &sources, [1.0, 1.0]) {
-        Ok(point) if point.path.fold.is_none() => Ok((point, false)),
+        Ok(point) if point.path.passed.is_empty() => Ok((point, false)),
         _ => Ok((operating_point(compiled, voltages)?, true)),
     }
 }
@@ -240,7 +260,7 @@ pub(super) fn settled(
     let mut drive = electrics.drive();
     let mut rise = vec![0.0; electrics.heating.heaters.len()];
     electrics.steady(&sources, &mut rise, &mut drive);
-    OperatingPoint { q, sources, rise, volts: drive.volts, path, free_motions }
+    OperatingPoint { q, sources, rise, volts: drive.volts, path, free_motions, near_buckling: None }
 }
 
 /// Largest voltage of a port [V], as of those that are searched.

@@ -70,7 +70,7 @@ impl StaticsSideBySide {
                 let (compiled, _) = path(laid);
                 points[laid.number] = arrived.and_then(|arrived| {
                     within_contact_range(compiled, &arrived.q).ok()?;
-                    let path = Path { iterations: arrived.iterations, fold: None, reached: 1.0 };
+                    let path = Path { iterations: arrived.iterations, passed: Vec::new(), reached: 1.0 };
                     Some(settled(compiled, arrived.q, laid.sources.clone(), path, Vec::new()))
                 });
             }

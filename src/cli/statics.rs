@@ -16,6 +16,7 @@ use bimorph::results::plot::mechanism::{self, Drawing, Scale};
 use bimorph::results::plot::shapes::Motion;
 use bimorph::results::plot::svg::Picture;
 use bimorph::results::table::Table;
+use bimorph::solve::equilibrium::Passed;
 use clap::Args;
 use serde::Serialize;
 use std::fmt::Write;
@@ -65,6 +66,7 @@ struct Document<'a> {
     permanent_strains: Named<'a, f64>,
     pulled_in: bool,
     jumped: bool,
+    passed: &'a [Passed],
     free_motions: &'a [String],
     unknowns: usize,
     solver: ModelChoice,
@@ -104,6 +106,7 @@ impl Static {
             permanent_strains: Named(&permanent_strains),
             pulled_in: result.pulled_in,
             jumped: result.jumped,
+            passed: &result.passed,
             free_motions: &result.free_motions,
             unknowns: result.unknowns,
             solver: self.solver,

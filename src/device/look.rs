@@ -41,7 +41,12 @@ impl Session {
         let none = |hint: &str| DeviceError::UnknownSignal { name: name.into(), hint: hint.into() };
         match name {
             "moved" => {
-                let points = compiled.parts.nodes.iter().flatten().chain(compiled.parts.beams.iter().flatten());
+                let points = compiled
+                    .parts
+                    .nodes
+                    .iter()
+                    .flatten()
+                    .chain(compiled.parts.beams.iter().flat_map(|points| points.iter()));
                 let far = |p: &Point| p.displacement(&state.q, system.model.linear).norm();
                 Ok(points.map(far).fold(0.0, f64::max))
             }

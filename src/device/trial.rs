@@ -44,7 +44,7 @@ impl Session {
         self.motion.v.fill(Pose::zeros());
         let path = SourcePath::new(electrics, from, &self.sources, [load, 1.0]);
         match self.equilibrium.follow(system, &path, &mut self.motion.q) {
-            Ok(found) => reply.jumped = found.fold.is_some(),
+            Ok(found) => reply.jumped = !found.passed.is_empty(),
             Err(error) => {
                 reply.status = Status::Fail(error.to_string());
                 return;

@@ -49,7 +49,7 @@ pub use error::{DiscretizeError, MOST_SEGMENTS};
 use free_rotation::Acting;
 
 use crate::budget;
-use crate::domains::{Domain, Laid, Load, Member, Point, System};
+use crate::domains::{BeamLine, Domain, Laid, Load, Member, Point, System};
 use crate::multibody::{BodyId, Coupling, Damper, Joint, Model};
 use crate::options::CompileOptions;
 use crate::structure::Structure;
@@ -69,7 +69,7 @@ pub struct Discretized {
     /// For each node of the structure, its material point; none for purely electrical nodes.
     pub nodes: Vec<Option<Point>>,
     /// For each beam, the equally spaced points along its centreline, ends included: one more than its segments.
-    pub beams: Vec<Vec<Point>>,
+    pub beams: Vec<Arc<[Point]>>,
     /// For each beam, what the junctions at its start and its end take of its length [m].
     pub offsets: Vec<[f64; 2]>,
     /// What junctions do to the drawing.
@@ -189,7 +189,9 @@ pub fn discretize_like(
     let model = model.couple(coupled);
     let moved = |p: Point| rigid.centered(p, &place);
     let gap_names = gaps.iter().filter(|laid| laid.member.is_gap()).map(|laid| laid.name.to_owned()).collect();
+    let beams: Vec<Arc<[Point]>> = beams.into_iter().map(|points| points.into_iter().map(moved).collect()).collect();
     let system = System {
+        beams: Arc::new(structure.beams.iter().zip(&beams).map(|(drawn, points)| line(drawn, points)).collect()),
         model,
         members: gaps.into_iter().map(|laid| laid.member.moved(&moved)).collect(),
         loads: loads.into_iter().map(|l| Load { point: moved(l.point), ..l }).collect(),
@@ -198,7 +200,6 @@ pub fn discretize_like(
     };
     let nodes =
         (0..structure.nodes.len()).map(|n| structure.nodes[n].mechanical.then(|| moved(rigid.point(n)))).collect();
-    let beams = beams.into_iter().map(|points| points.into_iter().map(moved).collect()).collect();
     let offsets = ends.beams.iter().map(|[a, b]| [a.offset, b.offset]).collect();
     Ok(Discretized { system, nodes, beams, offsets, ends, heaters, gap_names })
 }
@@ -207,6 +208,17 @@ impl Discretized {
     /// The beams whose junctions are beyond what the table was made from.
     pub fn beyond_table(&self, structure: &Structure) -> Option<junction_limits::Beyond> {
         junction_limits::beyond(structure, &self.ends)
+    }
+}
+
+/// The centreline of a beam.
+fn line(drawn: &crate::structure::Beam, points: &Arc<[Point]>) -> BeamLine {
+    BeamLine {
+        name: drawn.name.as_str().into(),
+        points: Arc::clone(points),
+        angle: drawn.angle,
+        length: drawn.length,
+        rigidity: drawn.material.youngs_modulus * drawn.thickness * drawn.width.powi(3) / 12.0,
     }
 }
 

@@ -11,6 +11,7 @@
 //! |---|---|
 //! | [`approach`] | the scalar a gap measures between two material points, and its derivatives |
 //! | [`backbending`] | the strength of a hot arm, beyond which it is shortened for good |
+//! | [`beam_line`] | the centreline of a beam: how it bends in a motion, and how far its segments are turned |
 //! | [`capacitor`] | C(u) of a comb and of parallel plates |
 //! | [`contact`] | pressure between surfaces that touch |
 //! | [`domain`] | the trait of all that acts; [`member`]: which there are, and how each call finds its own |
@@ -27,12 +28,14 @@
 //! | [`drive`] | ports → gap voltages and free strains, at a time within a step |
 //! | [`inputs`] | forces at points, heat into beams, the motion of the frame: what they do; `input`: which there are |
 //! | [`energy`] | the potential of it all, and the energy that an undamped motion keeps |
+//! | `side` | the side to which a part buckles |
 //! | [`stop`] | how a stop bears |
 //! | `reading` | what is read of gaps: capacitance, distance, pull, which of them touch |
 //! | [`system`] | a multibody model with its gaps, loads and network: what `solve` works on |
 
 pub mod approach;
 pub mod backbending;
+pub mod beam_line;
 pub mod capacitor;
 mod conduction;
 pub mod contact;
@@ -55,12 +58,14 @@ pub mod member;
 pub mod moving_frame;
 pub mod network;
 mod reading;
+mod side;
 pub mod stop;
 pub mod stop_pair;
 pub mod system;
 pub mod thermal;
 
 pub use approach::Point;
+pub use beam_line::BeamLine;
 pub use domain::{At, Domain, Law};
 pub use drawn::{Drawing, Laid};
 pub use drive::{Drive, Ramp};

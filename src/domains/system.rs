@@ -3,6 +3,7 @@
 //! The residual is r(q, drive) = ∂Π/∂q − load, so that statics is r = 0 and dynamics M·q̈ + C·q̇ + r = 0.
 
 use super::approach::Point;
+use super::beam_line::BeamLine;
 use super::domain::{At, Domain};
 use super::drive::{Drive, Electrics};
 use super::load::Load;
@@ -26,6 +27,8 @@ pub struct System {
     /// What displacements are measured against [m]: the narrowest beam or the smallest gap, whichever is smaller; 1 µm where
     /// there is neither.
     pub length_scale: f64,
+    /// Centrelines of the beams in netlist order: what directions of buckling are named by.
+    pub beams: Arc<Vec<BeamLine>>,
 }
 
 impl System {

@@ -10,13 +10,13 @@ use nalgebra::{Matrix6, Vector3};
 
 /// Half turns of the two bodies that were met last. Along a beam each body is met twice in a row, and a sine and cosine
 /// is dearer than everything else that a body costs.
-struct Turns {
+pub(super) struct Turns {
     a: (u32, HalfTurn),
     b: (u32, HalfTurn),
 }
 
 impl Turns {
-    fn new() -> Self {
+    pub(super) fn new() -> Self {
         Self { a: (NONE, HalfTurn::REST), b: (NONE, HalfTurn::REST) }
     }
 
@@ -35,7 +35,13 @@ impl Turns {
 
     /// Kinematics of the next joint.
     #[inline(always)]
-    fn kinematics(&mut self, linear: bool, joint: &LaidJoint, section: &Section, q: &[Pose]) -> JointKinematics {
+    pub(super) fn kinematics(
+        &mut self,
+        linear: bool,
+        joint: &LaidJoint,
+        section: &Section,
+        q: &[Pose],
+    ) -> JointKinematics {
         let Place { a, b, .. } = joint.place;
         let (qa, qb) = (pose(q, a), pose(q, b));
         let frame = joint.frame(section);
@@ -142,9 +148,10 @@ fn turn_between(q: &[Pose], (a, b): (BodyId, BodyId)) -> f64 {
 }
 
 /// The constant tangent of coupled joints.
-fn add_coupling_tangent(model: &Model, tangent: &mut BlockMatrix<f64, 3>) {
+pub(super) fn add_coupling_tangent(model: &Model, factor: f64, tangent: &mut BlockMatrix<f64, 3>) {
     for Coupling { first, second, stiffness } in &model.couplings {
-        for (i, row) in [(first.0, -stiffness), (first.1, *stiffness)] {
+        let stiffness = factor * stiffness;
+        for (i, row) in [(first.0, -stiffness), (first.1, stiffness)] {
             for (j, side) in [(second.0, -1.0), (second.1, 1.0)] {
                 let (BodyId::Free(i), BodyId::Free(j)) = (i, j) else { continue };
                 if i == j {
@@ -179,7 +186,7 @@ pub fn add_tangent(
         joint.place.add_pair(tangent, &h);
     }
     add_couplings(model, q, r);
-    add_coupling_tangent(model, tangent);
+    add_coupling_tangent(model, 1.0, tangent);
 }
 
 /// `tangent +=` the stiffness that the stress of the joints brings to a linear model about the drawn geometry, as stress and
@@ -286,7 +293,7 @@ pub fn add_inertia(model: &Model, m: f64, c: f64, matrix: &mut BlockMatrix<f64, 
 }
 
 #[inline(always)]
-fn scatter(place: Place, (a, b): (Pose, Pose), r: &mut [Pose]) {
+pub(super) fn scatter(place: Place, (a, b): (Pose, Pose), r: &mut [Pose]) {
     if place.a != NONE {
         r[place.a as usize] += a;
     }

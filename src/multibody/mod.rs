@@ -20,6 +20,7 @@
 //! | [`agitation`] | the random forces that come with drag and dampers |
 //! | [`linear_system`] | K, M and C of a linear frame on one pattern |
 //! | [`forces`] | elastic forces, energy and tangent of a model at a configuration |
+//! | [`unstressed`] | the stiffness in the present geometry without stress |
 //! | [`precise`] | the product of that tangent with a displacement in extended precision |
 //! | [`double`] | double-double numbers |
 
@@ -41,6 +42,7 @@ pub mod rcr;
 pub mod relative;
 pub mod section;
 pub mod sine;
+pub mod unstressed;
 
 pub use body::{Body, BodyName, Drag};
 pub use factor::{BlockMatrix, Scalar};

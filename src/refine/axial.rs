@@ -24,7 +24,7 @@ pub fn axial_forces(structure: &Structure, parts: &Discretized, q: &[Pose], driv
         let axis = model.section(joint).axis;
         between.entry(key(a, b)).or_default().push((axis.x, axis.y, axial_force(model, joint, q, &drive.rest())));
     }
-    let of = |(beam, points): (&crate::structure::Beam, &Vec<Point>)| {
+    let of = |(beam, points): (&crate::structure::Beam, &std::sync::Arc<[Point]>)| {
         let along = |&&(x, y, _): &&Along| (x * beam.angle.cos() + y * beam.angle.sin()).abs() > ALONG;
         let one = |pair: &[Point]| {
             let joints = between.get(&key(pair[0].body, pair[1].body))?;

@@ -232,7 +232,7 @@ fn to_frame(model: &Model, parts: &Discretized, frame: &Frame, x: &[Pose]) -> Ve
     let mut y = vec![Pose::zeros(); frame.system.bodies()];
     let pairs = (frame.nodes.iter().zip(&parts.nodes))
         .filter_map(|(to, from)| Some((*to.as_ref()?, *from.as_ref()?)))
-        .chain(frame.beams.iter().flatten().copied().zip(parts.beams.iter().flatten().copied()));
+        .chain(frame.beams.iter().flatten().copied().zip(parts.beams.iter().flat_map(|points| points.iter()).copied()));
     for (to, from) in pairs {
         if let BodyId::Free(k) = to.body {
             let pose = Model::pose(x, from.body);

@@ -128,18 +128,19 @@ fn lighten(f: &mut Vector3<f64>, x: &Vector3<f64>, lump: &Part) {
 }
 
 /// Every beam over its `points`, less the offsets at both ends.
-pub(super) fn spans(
+pub(super) fn spans<P: AsRef<[Point]>>(
     structure: &Structure,
     options: &CompileOptions,
-    (beams, offsets): (&[Vec<Point>], &[[f64; 2]]),
+    (beams, offsets): (&[P], &[[f64; 2]]),
     lumped: bool,
 ) -> Vec<Span> {
-    let span = |((beam, points), [first, last]): ((&crate::structure::Beam, &Vec<Point>), &[f64; 2])| {
+    let span = |((beam, points), [first, last]): ((&crate::structure::Beam, &P), &[f64; 2])| {
+        let points = points.as_ref();
         let n = points.len() - 1;
         let bar = Bar { length: beam.length - first - last, ..bar(beam, options.shear, options.rotary_inertia) };
         let h = bar.length / n as f64;
         let along = Vector2::new(beam.angle.cos(), beam.angle.sin());
-        let mut points = points.clone();
+        let mut points = points.to_vec();
         points[0] = points[0].beyond(along * *first);
         points[n] = points[n].beyond(along * -*last);
         let mut lumps = Vec::new();

@@ -114,9 +114,8 @@ impl Continuation {
             }
             Err(Some(pivot)) => Err(SolveError::singular(family.system(), pivot)),
             Err(None) => {
-                let residual = self.residual.iter().map(|r| r.amax()).fold(0.0, f64::max);
-                let body = family.system().model.bodies.first().map(|b| b.name.to_string()).unwrap_or_default();
-                Err(SolveError::Lost { share: 0.0, iterations: self.iterations, residual, body, unheld: String::new() })
+                let reason = "Newton's iteration does not settle on an equilibrium where the path begins".into();
+                Err(SolveError::Lost { share: 0.0, passed: String::new(), reason })
             }
         }
     }

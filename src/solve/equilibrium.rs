@@ -2,17 +2,23 @@
 //!
 //! Each step predicts along the tangent, then corrects by Newton. It is accepted only when the corrector converges, ends on
 //! a stable equilibrium (no negative pivot), and corrects at most half of what it predicted: a Newton iteration that
-//! wandered to another branch corrects more. Nor may it change the distance of electrodes under voltage by more than half. Otherwise the step is halved. Where steps vanish the path has a fold: pull-in, release or
-//! snap-through. From there the system falls, as an overdamped motion each step of which leads down in its potential, to the
-//! next stable equilibrium, and the path goes on from that; the fold's place is reported.
+//! wandered to another branch corrects more. Nor may it change the distance of electrodes under voltage by more than half. Otherwise the
+//! step is halved. Where steps vanish beside the present load the branch loses its stability: at a limit point (pull-in, release,
+//! snap-through) or at a bifurcation ([`loss`]). A little beyond, at 1.02 of that load, the system falls to the next stable
+//! equilibrium ([`fall`]), and the path goes on from there with steps of a quarter of the present load. Falling at once under a
+//! load far beyond leads to states that a slowly growing load does not reach.
 //!
 //! Reference: E. Riks, "An incremental approach to the solution of snapping and buckling problems", Int. J. Solids
-//! Structures 15 (1979), for folds; Kelley & Keyes, "Convergence analysis of pseudo-transient continuation", SIAM J. Numer.
-//! Anal. 35 (1998), for the fall.
+//! Structures 15 (1979), for limit points.
 
 mod fall;
+mod loss;
 pub mod path;
+mod refusal;
 pub mod side_by_side;
+
+use fall::Unsettled;
+pub use loss::{LossKind, Passed};
 
 use super::SolveError;
 use crate::domains::{Domain, Drive, System};
@@ -21,10 +27,11 @@ use crate::multibody::factor::ZeroPivot;
 use crate::multibody::planar::Pose;
 use path::LoadPath;
 
-/// A body that gives way so many times as far as others hangs on next to nothing.
-const UNHELD: f64 = 1e8;
 /// Corrections below this share of the displacement that no longer shrink are rounding.
 const STALLED: f64 = 1e-5;
+
+/// Smallest load step where the present load is next to nothing, as a fraction of the path.
+const LEAST_STEP: f64 = 1e-10;
 
 /// Share of the distance of electrodes that one step may change. A plate on a spring folds at a third.
 const LEAP: f64 = 0.5;
@@ -36,14 +43,14 @@ pub struct EquilibriumOptions {
     pub tolerance: f64,
     /// Newton iterations per load step, default 12.
     pub iterations: usize,
-    /// Smallest load step before a fold is declared, default 1e-7 of the path. Smaller: folds located more sharply.
+    /// Smallest load step before a loss of stability is declared, default 1e-7 of the present load. Smaller: losses located more sharply.
     pub smallest_step: f64,
-    /// How far past a fold the fall begins, default 1e-2 of the path. Smaller: closer to the fold, and slower.
-    pub past_fold: f64,
-    /// Steps of a fall after a fold, default 4000.
+    /// Factorizations of a fall after a loss of stability, default 4000.
     pub fall_steps: usize,
-    /// Stop at the first fold instead of falling, default false.
+    /// Stop at the first loss of stability instead of falling, default false.
     pub stop_at_fold: bool,
+    /// Take the other one of the two sides of a bifurcation, default false.
+    pub mirrored: bool,
 }
 
 impl Default for EquilibriumOptions {
@@ -52,21 +59,21 @@ impl Default for EquilibriumOptions {
             tolerance: 1e-10,
             iterations: 12,
             smallest_step: 1e-7,
-            past_fold: 1e-2,
             fall_steps: 4000,
             stop_at_fold: false,
+            mirrored: false,
         }
     }
 }
 
 /// What a search along a path found.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Path {
     /// Newton iterations.
     pub iterations: usize,
-    /// Share of the path at the first fold; none when there was none.
-    pub fold: Option<f64>,
-    /// Share of the path that was reached: 1 unless it stopped at a fold.
+    /// Losses of stability that it passed, in this order.
+    pub passed: Vec<Passed>,
+    /// Fraction of the path that was reached: 1 unless it stopped at a loss of stability.
     pub reached: f64,
 }
 
@@ -81,7 +88,14 @@ pub struct Equilibrium {
     /// Where the tangent predicted the end of the step.
     prediction: Vec<Pose>,
     trial: Vec<Pose>,
+    /// The softest motion at a loss of stability.
+    soft: Vec<Pose>,
+    /// The last stable equilibrium, and where a fall from there ended without one.
+    before: Vec<Pose>,
+    stopped: Vec<Pose>,
     held: Vec<ZeroPivot>,
+    /// Motions are free where the path begins.
+    free_from_start: bool,
     drive: Drive,
     slope: Drive,
 }
@@ -91,6 +105,13 @@ enum Corrected {
     No,
     /// An equilibrium that a gap has gone far to in one step: perhaps not that of this branch.
     Leaps,
+}
+
+impl Path {
+    /// Fraction of the path at the first loss of stability; none when there was none.
+    pub fn fold(&self) -> Option<f64> {
+        self.passed.first().map(|passed| passed.share)
+    }
 }
 
 impl Equilibrium {
@@ -103,8 +124,12 @@ impl Equilibrium {
             residual: zeros.clone(),
             step: zeros.clone(),
             prediction: zeros.clone(),
-            trial: zeros,
+            trial: zeros.clone(),
+            soft: zeros.clone(),
+            before: zeros.clone(),
+            stopped: zeros,
             held: Vec::new(),
+            free_from_start: false,
             drive: system.electrics.drive(),
             slope: system.electrics.drive(),
         }
@@ -129,6 +154,7 @@ impl Equilibrium {
         let mut s = 0.0;
         let mut ds = 1.0;
         let mut free_at_first = None;
+        self.free_from_start = false;
         while s < 1.0 {
             let step = f64::min(ds, 1.0 - s);
             let to = if 1.0 - s - step < 1e-12 { 1.0 } else { s + step };
@@ -136,13 +162,15 @@ impl Equilibrium {
             // held where the step begins; what a wild trial holds says nothing
             let free = self.held.first().copied();
             let from_the_first = *free_at_first.get_or_insert(free.is_some());
+            self.free_from_start = from_the_first;
+            let smallest = (self.options.smallest_step * to).max(LEAST_STEP);
             match self.correct(system, path, to, q, &mut done) {
                 Corrected::Stable => {
                     q.copy_from_slice(&self.trial);
                     s = to;
                     ds = 2.0 * step;
                 }
-                Corrected::Leaps if step > self.options.smallest_step => ds = 0.5 * step,
+                Corrected::Leaps if step > smallest => ds = 0.5 * step,
                 Corrected::No if free.is_some() && !from_the_first => {
                     // what was held at first is so no more: bent or stretched so far that rounding hides what resists
                     return Err(self.too_far(system, s, &done, free));
@@ -151,20 +179,18 @@ impl Equilibrium {
                     // a free motion that a load excites never settles: there is no equilibrium to look for
                     return free.map_or(Ok(done), |pivot| Err(SolveError::singular(system, pivot)));
                 }
-                Corrected::No if step > self.options.smallest_step => ds = 0.5 * step,
+                Corrected::No if step > smallest => ds = 0.5 * step,
                 Corrected::No | Corrected::Leaps => {
-                    done.fold.get_or_insert(s);
                     if self.options.stop_at_fold {
                         done.reached = s;
                         return Ok(done);
                     }
-                    // a little past the fold, where the branch is gone; nearer to it the fall would take for ever
-                    let to = f64::min(s + self.options.past_fold, 1.0);
-                    self.fall(system, path, to, q, &mut done)?;
-                    s = to;
-                    ds = 0.25;
+                    (s, ds) = self.pass(system, path, (s, to), q, &mut done)?;
                 }
             }
+        }
+        if !done.passed.is_empty() && Self::beyond_beams(system, q).is_some() {
+            return Err(self.lost(system, s, Unsettled::Stuck, &done, q));
         }
         done.reached = 1.0;
         Ok(done)
@@ -242,59 +268,6 @@ impl Equilibrium {
             (after - before).abs() > LEAP * before.max(after)
         };
         self.drive.volts.iter().enumerate().any(far)
-    }
-
-    /// A load that is far more than the part bears.
-    fn too_far(&self, system: &System, share: f64, done: &Path, at: Option<ZeroPivot>) -> SolveError {
-        let body = at.map_or(String::new(), |pivot| system.model.bodies[pivot.body].name.to_string());
-        let residual = self.residual.iter().map(|r| r.amax()).fold(0.0, f64::max);
-        let unheld = format!(
-            "; \"{body}\" is deformed so far there that rounding hides what resists it: the load is too large for this part"
-        );
-        SolveError::Lost { share, iterations: done.iterations, residual, body, unheld }
-    }
-
-    fn lost(&mut self, system: &System, share: f64, iterations: usize, q: &[Pose]) -> SolveError {
-        let unheld = self.unheld(system, q);
-        let worst =
-            (0..self.residual.len()).max_by(|&a, &b| self.residual[a].amax().total_cmp(&self.residual[b].amax()));
-        let worst = worst.unwrap_or(0);
-        SolveError::Lost {
-            share,
-            iterations,
-            residual: self.residual[worst].amax(),
-            body: system.model.bodies[worst].name.to_string(),
-            unheld,
-        }
-    }
-
-    /// Names the body that gives way most under a force on every body, if it does so far more than most.
-    fn unheld(&mut self, system: &System, q: &[Pose]) -> String {
-        let model = &system.model;
-        let mut residual = self.residual.clone();
-        system.tangent(q, &self.drive, &mut self.tangent, &mut residual);
-        model.project_matrix(&mut self.tangent);
-        if model.factor_holding(&mut self.tangent, &mut self.held).is_err() {
-            return String::new();
-        }
-        for (j, x) in self.step.iter_mut().enumerate() {
-            *x = Pose::new(1.0, 1.0 + 0.1 * (j % 7) as f64, 0.0);
-        }
-        model.project(&mut self.step);
-        self.tangent.solve(&model.pattern, &mut self.step);
-        let moved: Vec<f64> = self.step.iter().map(|p| p.x.hypot(p.y)).collect();
-        let mut sorted = moved.clone();
-        sorted.sort_by(f64::total_cmp);
-        let typical = sorted[sorted.len() / 2].max(f64::MIN_POSITIVE);
-        // the middle body may hang on the same threads: then all are soft, and the stiffest is what to compare with
-        let stiff = sorted[sorted.len() / 20].max(f64::MIN_POSITIVE);
-        let softest = (0..moved.len()).max_by(|&a, &b| moved[a].total_cmp(&moved[b])).unwrap_or(0);
-        let over = moved[softest] / typical.min(stiff);
-        if over < UNHELD {
-            return String::new();
-        }
-        let name = &model.bodies[softest].name;
-        format!("; the part with \"{name}\" is nearly unheld: it gives way {over:.0e} times as far as what is held")
     }
 }
 

@@ -42,22 +42,15 @@ pub enum SolveError {
         /// Which way.
         direction: &'static str,
     },
-    /// Load steps became too small and no other equilibrium was found.
-    #[error(
-        "equilibrium lost at {share:.6} of the load after {iterations} iterations (residual {residual:.3e} at \"{body}\"): \
-         nothing that was found bears more{unheld}"
-    )]
+    /// No stable equilibrium was found beyond some load.
+    #[error("the last stable equilibrium that was found bears {share:.4} of the load{passed}: {reason}")]
     Lost {
-        /// Share of the load path that was reached [1].
+        /// Fraction of the load path that was reached [1].
         share: f64,
-        /// Iterations spent.
-        iterations: usize,
-        /// Largest residual force [N] or moment [N·m].
-        residual: f64,
-        /// Body where it stands.
-        body: String,
-        /// Names a part that next to nothing holds; empty where there is none.
-        unheld: String,
+        /// Losses of stability before, as words; empty where there are none.
+        passed: String,
+        /// Why there is none beyond.
+        reason: String,
     },
     /// The integrator's steps became too small.
     #[error(

@@ -27,6 +27,7 @@ mod responses;
 mod scenes;
 mod schemes;
 mod small_parts;
+mod stability_losses;
 mod swung;
 mod told;
 mod vm236;

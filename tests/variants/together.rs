@@ -30,7 +30,7 @@ fn alone(system: &System, volts: f64) -> Option<(Vec<Pose>, usize)> {
     let path = SourcePath::new(&system.electrics, &from, &to, [0.0, 1.0]);
     let mut q = vec![Pose::zeros(); system.bodies()];
     let done = Equilibrium::new(system, EquilibriumOptions::default()).follow(system, &path, &mut q).ok()?;
-    done.fold.is_none().then_some((q, done.iterations))
+    done.passed.is_empty().then_some((q, done.iterations))
 }
 
 fn sources(system: &System, volts: f64) -> (Vec<f64>, Vec<f64>) {

@@ -201,7 +201,7 @@ fn warnings(exact: &Exact<'_>) -> Vec<String> {
             "the equilibrium is unstable in {negative} direction(s): what moves there grows, and never settles to this response"
         ));
     }
-    if exact.point.path.fold.is_some() {
+    if !exact.point.path.passed.is_empty() {
         warnings.push(
             "the part pulled in, snapped or buckled on the way to this operating point: the response is about where it went".into(),
         );

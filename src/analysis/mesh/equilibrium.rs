@@ -14,22 +14,24 @@ use super::super::statics::{
     OperatingPoint, StaticResult, beam_motions, operating_point, operating_point_near, result_at,
 };
 use super::super::{AnalysisError, BeamMotions, PortVoltages};
+use super::finer::MOST_NEAR_LIMIT;
+use super::hidden::{Hidden, hidden};
 use super::meshed::{chosen, meshed, on};
 use super::softening;
-use super::warnings::{of_fingers, of_heat, of_share_in_pieces, of_stress, worst_in_pieces};
+use super::warnings::{near_buckling, of_fingers, of_heat, of_share_in_pieces, of_stress, worst_in_pieces};
 use crate::compile::Compiled;
-use crate::multibody::planar::Pose;
 use crate::netlist::Diagnostic;
 use crate::refine::carry::carried;
 use crate::refine::doubling::{self, Output};
 use crate::refine::model_order::ModelOrder;
+use crate::solve::equilibrium::Equilibrium;
 use std::borrow::Cow;
 
 /// Share of the mechanism's size below which a displacement is rounding.
 pub(super) const ROUNDING: f64 = 1e-12;
 
-/// Segments of all beams together up to which the side of a limit is sought.
-const MOST_NEAR_LIMIT: usize = 5000;
+/// How often all segments are doubled where a mesh has no equilibrium.
+const MAX_DOUBLINGS: usize = 5;
 
 /// Share of the path beyond which a fold that it passed is looked for anew on each mesh: the one before may have passed it by mistake.
 const NEAR_THE_END: f64 = 0.9;
@@ -43,17 +45,18 @@ pub(super) fn order(
     if chosen(compiled) {
         return estimated(compiled, voltages, segments);
     }
-    let (mut segments, mut lost) = (segments, None);
+    let (mut segments, mut doublings, mut lost) = (segments, 0, None);
     loop {
         let mut search = Search::new(compiled, voltages);
         let from = segments.clone();
         let order = match doubling::fit(&compiled.structure, &compiled.options, segments, &mut |s| search.follow(s)) {
-            // a leg in one piece may bear nothing that one in two does
-            Err(error @ AnalysisError::NoEquilibrium { .. }) if lost.is_none() => {
+            // a leg in one piece may bear nothing that one in two does, and a segment far from its chord is none of a beam
+            Err(error @ AnalysisError::NoEquilibrium { .. }) if doublings < MAX_DOUBLINGS => {
                 segments = doubling::doubled(&compiled.options, &from, |_| true);
                 if segments == from || segments.iter().sum::<usize>() > MOST_NEAR_LIMIT {
                     return Err(error);
                 }
+                doublings += 1;
                 lost = Some(error);
                 continue;
             }
@@ -63,7 +66,17 @@ pub(super) fn order(
         let finer = if search.is_sure(&order) { None } else { doubling::twice(&compiled.options, &order) };
         match finer.filter(|finer| finer.segments.iter().sum::<usize>() <= MOST_NEAR_LIMIT) {
             Some(finer) => segments = finer.segments,
-            None => return search.ended(order),
+            None => match search.ended(order)? {
+                (_, _, Some(buckled)) if buckled != from => segments = buckled,
+                (order, point, _) => {
+                    let beyond = |model: &Compiled| Equilibrium::beyond_beams(&model.parts.system, &point.q).is_some();
+                    return match lost.take() {
+                        // a mesh fine enough stretches whatever is drawn; that is no beam
+                        Some(error) if beyond(&*meshed(compiled, &order.segments)?) => Err(error),
+                        _ => Ok((order, point)),
+                    };
+                }
+            },
         }
     }
 }
@@ -89,20 +102,6 @@ pub(super) fn estimated_from(
     Ok((point, order.estimated_error))
 }
 
-/// A model of twice the segments, and where its equilibrium is about.
-pub(crate) struct Finer {
-    pub(crate) model: Compiled,
-    pub(crate) start: Vec<Pose>,
-}
-
-/// See [`Finer`]; none where it would be too fine.
-pub(crate) fn finer(compiled: &Compiled, point: &OperatingPoint) -> Option<Finer> {
-    let model = compiled.with_order(doubling::twice(&compiled.options, &compiled.order)?).ok()?;
-    let linear = model.parts.system.model.linear;
-    let start = carried(&model.structure, &compiled.parts, &model.parts, &point.q, linear);
-    Some(Finer { model, start })
-}
-
 /// The equilibrium on the mesh as it is, and the estimate of its error.
 pub(super) fn judged(
     compiled: &Compiled,
@@ -125,7 +124,7 @@ struct Looked {
 
 /// How far beyond its fold an equilibrium is, as a share of the way, where that is little: the mesh may have passed it by mistake.
 fn beyond(point: &OperatingPoint) -> Option<f64> {
-    point.path.fold.filter(|share| *share > NEAR_THE_END).map(|share| 1.0 - share)
+    point.path.passed.last().map(|passed| passed.share).filter(|share| *share > NEAR_THE_END).map(|share| 1.0 - share)
 }
 
 /// Equilibria on one mesh after the other.
@@ -149,7 +148,8 @@ impl<'a> Search<'a> {
     /// A mesh with the estimate of its error and its equilibrium.
     fn estimated(mut self, segments: Vec<usize>) -> Result<(ModelOrder, OperatingPoint), AnalysisError> {
         let order = doubling::estimate(&self.compiled.options, segments, &mut |segments| self.follow(segments))?;
-        self.ended(order)
+        let (order, point, _) = self.ended(order)?;
+        Ok((order, point))
     }
 
     /// The equilibrium on a mesh, next to that of the mesh before.
@@ -162,7 +162,9 @@ impl<'a> Search<'a> {
         };
         if let (false, Some(Looked { point: before, .. })) = (from_rest, self.points.last()) {
             // the way from rest is that of the mesh before
-            point.path.fold = point.path.fold.or(before.path.fold);
+            if point.path.passed.is_empty() {
+                point.path.passed.clone_from(&before.path.passed);
+            }
             point.path.iterations += before.path.iterations;
         }
         let left = match self.points.first() {
@@ -208,8 +210,12 @@ impl<'a> Search<'a> {
         of(&order.segments).zip(twice).is_none_or(|(here, twice)| softening::agree(here, twice))
     }
 
-    /// The mesh that came out, with its equilibrium. Where nothing says on which side of its limit that is, nothing tells its error.
-    fn ended(mut self, mut order: ModelOrder) -> Result<(ModelOrder, OperatingPoint), AnalysisError> {
+    /// The mesh that came out, with its equilibrium, and a mesh on which that has buckled. Where nothing says on which side of its limit that is,
+    /// nothing tells its error.
+    fn ended(
+        mut self,
+        mut order: ModelOrder,
+    ) -> Result<(ModelOrder, OperatingPoint, Option<Vec<usize>>), AnalysisError> {
         let mut found = self.points.iter().position(|looked| looked.segments == order.segments);
         if found.is_none() {
             self.follow(&order.segments)?;
@@ -220,7 +226,19 @@ impl<'a> Search<'a> {
         }
         let point = found.map(|k| self.points.swap_remove(k).point);
         let lost = || AnalysisError::NotConverged { detail: "no mesh has an equilibrium".into() };
-        Ok((order, point.ok_or_else(lost)?))
+        let mut point = point.ok_or_else(lost)?;
+        let buckled = match hidden(&*meshed(self.compiled, &order.segments)?, self.voltages, &point) {
+            Hidden::Nothing => None,
+            Hidden::Near(beam) => {
+                point.near_buckling = Some(beam);
+                None
+            }
+            Hidden::Buckled(segments) => {
+                order.estimated_error = None;
+                Some(segments)
+            }
+        };
+        Ok((order, point, buckled))
     }
 }
 
@@ -310,7 +328,8 @@ fn told_with_sizes(fitted: &Compiled, point: OperatingPoint) -> (OperatingPoint,
     let sizes = (share.unwrap_or(1.0), worst.as_ref().map_or(1.0, |worst| worst.1));
     let stress = of_stress(fitted, share).map(|warning| (warning, sizes.0));
     let pieces = of_share_in_pieces(fitted, worst).map(|warning| (warning, sizes.1));
-    let others = of_fingers(fitted, &points[0].0).into_iter().chain(of_heat(fitted, &points[0].0));
+    let point = &points[0].0;
+    let others = of_fingers(fitted, point).into_iter().chain(of_heat(fitted, point)).chain(near_buckling(point));
     let told = stress.into_iter().chain(pieces).chain(others.map(|warning| (warning, 1.0))).collect();
     let [(point, _)] = points;
     (point, told)

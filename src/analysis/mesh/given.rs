@@ -10,6 +10,7 @@ use super::super::pull_in::{PullInResult, pull_in};
 use super::super::statics::{OperatingPoint, StaticResult, operating_point, result_at};
 use super::super::{AnalysisError, PortVoltages};
 use super::equilibrium::{self, told_of_static};
+pub(crate) use super::finer::{Finer, finer};
 use super::frequencies::{frequency_outputs, is_carried, is_fine, worst};
 use super::meshed::meshed;
 use super::pull_in::{pull_in_outputs, told_of_pull_in};
@@ -18,7 +19,6 @@ use crate::compile::Compiled;
 use crate::netlist::Diagnostic;
 use crate::refine::counted;
 use crate::refine::doubling::{self, Output};
-pub(crate) use equilibrium::{Finer, finer};
 
 /// What an analysis found.
 #[derive(Debug, Clone)]

@@ -17,8 +17,10 @@
 
 mod equilibrium;
 mod excited;
+mod finer;
 mod frequencies;
 pub(crate) mod given;
+mod hidden;
 mod in_band;
 mod in_circuit;
 mod meshed;

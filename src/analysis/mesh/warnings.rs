@@ -19,6 +19,8 @@ const FINGERS: &str = "W024";
 const HEAT: &str = "W037";
 /// Code of the warning that the steps of a run are longer than what it begins with.
 const STEPS: &str = "W044";
+/// Code of the warning that an equilibrium is close to buckling.
+const BUCKLING: &str = "W046";
 /// Code of the warning that rotary inertia is left out.
 const ROTARY: &str = "W045";
 
@@ -28,7 +30,7 @@ pub fn warnings(fitted: &Compiled) -> impl Iterator<Item = String> {
         .warnings
         .items
         .iter()
-        .filter(|d| [WARNING, STRESS, PIECES, FINGERS, HEAT, STEPS, ROTARY].contains(&d.code.as_str()))
+        .filter(|d| [WARNING, STRESS, PIECES, FINGERS, HEAT, STEPS, ROTARY, BUCKLING].contains(&d.code.as_str()))
         .map(|d| d.message.clone())
 }
 
@@ -98,6 +100,17 @@ pub(super) fn of_rotary(compiled: &Compiled, error: f64) -> Option<Diagnostic> {
         "the sections of wide beams turn without inertia: the motion may be off by {error:.1e} of its amplitude"
     );
     Some(Diagnostic::warning(ROTARY, message, "take --rotary-inertia"))
+}
+
+/// Where an equilibrium is so close to buckling that its load decides on less than the accuracy of dimensions.
+pub(super) fn near_buckling(point: &OperatingPoint) -> Option<Diagnostic> {
+    let beam = point.near_buckling.as_ref()?;
+    let message = format!("the load is within 1 % of buckling; softest motion: beam {beam}");
+    Some(Diagnostic::warning(
+        BUCKLING,
+        message,
+        "`bimorph path` shows the branches; --imperfection gives the part a shape that is not ideal",
+    ))
 }
 
 /// Where current makes a beam hotter than any solid bears.

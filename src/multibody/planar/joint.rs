@@ -34,6 +34,11 @@ pub struct JointFrame {
 pub struct Symmetric(pub [f64; 6]);
 
 impl Symmetric {
+    /// `factor` times it.
+    pub(crate) fn scaled(&self, factor: f64) -> Self {
+        Self(self.0.map(|x| factor * x))
+    }
+
     /// A column of it.
     #[inline]
     pub fn column(&self, i: usize) -> Vector3<f64> {
@@ -178,6 +183,11 @@ impl JointKinematics {
             turn_a: Vector3::new(u_a + g_a * twice.x - twice.y, g_a, -1.0),
             turn_b: Vector3::new(u_b + g_b * twice.x + twice.y, g_b, 1.0),
         }
+    }
+
+    /// The same frame and arms, all strains zero.
+    pub(crate) fn unstrained(&self) -> Self {
+        Self { strain: Vector3::zeros(), axial: 0.0, shear: 0.0, bent: Vector2::zeros(), ..*self }
     }
 
     /// ∂strain/∂(q_a, q_b).

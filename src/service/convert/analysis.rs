@@ -6,6 +6,7 @@ use crate::analysis::pull_in::PullInResult;
 use crate::analysis::statics::{NodeMotion, StaticResult};
 use crate::analysis::transient::{Counters, Event, TransientResult};
 use crate::service::proto;
+use crate::solve::equilibrium::{LossKind, Passed};
 use crate::solve::event::Direction;
 
 fn size(n: u64) -> usize {
@@ -22,12 +23,29 @@ pub fn static_to_wire(result: &StaticResult) -> proto::StaticResponse {
         charges_c: named(&result.charges_c),
         pulled_in: result.pulled_in,
         jumped: result.jumped,
+        passed: result.passed.iter().map(passed_to_wire).collect(),
         free_motions: result.free_motions.clone(),
         unknowns: result.unknowns as u64,
         iterations: result.iterations as u64,
         estimated_error: result.estimated_error,
         warnings: result.warnings.clone(),
     }
+}
+
+fn passed_to_wire(passed: &Passed) -> proto::PassedLoss {
+    let kind = match passed.kind {
+        LossKind::LimitPoint => proto::passed_loss::Kind::LimitPoint,
+        LossKind::Bifurcation => proto::passed_loss::Kind::Bifurcation,
+    };
+    proto::PassedLoss { kind: kind.into(), share: passed.share, direction: passed.direction.clone() }
+}
+
+fn passed_from_wire(wire: proto::PassedLoss) -> Passed {
+    let kind = match wire.kind() {
+        proto::passed_loss::Kind::LimitPoint => LossKind::LimitPoint,
+        proto::passed_loss::Kind::Bifurcation => LossKind::Bifurcation,
+    };
+    Passed { kind, share: wire.share, direction: wire.direction }
 }
 
 /// A static equilibrium back.
@@ -40,6 +58,7 @@ pub fn static_from_wire(wire: proto::StaticResponse) -> StaticResult {
         charges_c: pairs(wire.charges_c),
         pulled_in: wire.pulled_in,
         jumped: wire.jumped,
+        passed: wire.passed.into_iter().map(passed_from_wire).collect(),
         free_motions: wire.free_motions,
         unknowns: size(wire.unknowns),
         iterations: size(wire.iterations),

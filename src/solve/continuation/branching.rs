@@ -110,13 +110,12 @@ impl Continuation {
         found
     }
 
-    /// Null vector of the nearly singular tangent by inverse iteration, of length 1, its largest translation positive.
+    /// Null vector of the nearly singular tangent by inverse iteration, of length 1, to the side of [`System::side`](crate::domains::System::side).
     fn null_vector(&mut self, family: &mut Blend, at: &Place) -> Option<Vec<Pose>> {
         self.linearize(family, at).ok()?;
         let system = family.system();
-        // a fixed vector without symmetry
-        let mut x: Vec<Pose> =
-            (0..at.q.len()).map(|j| Pose::new(1.0, 1.0 + 0.37 * ((j * 7) % 5) as f64, 0.1)).collect();
+        let mut x = vec![Pose::zeros(); at.q.len()];
+        system.excite(&at.q, system.length_scale, &mut x);
         for _ in 0..4 {
             system.model.project(&mut x);
             self.tangent.solve(&system.model.pattern, &mut x);
@@ -126,8 +125,7 @@ impl Continuation {
             }
             x.iter_mut().for_each(|x| *x /= length);
         }
-        let largest = x.iter().flat_map(|p| [p.x, p.y]).max_by(|a, b| a.abs().total_cmp(&b.abs()))?;
-        if largest < 0.0 {
+        if system.side(&at.q, &x, 1.0).0 < 0.0 {
             x.iter_mut().for_each(|x| *x = -*x);
         }
         Some(x)

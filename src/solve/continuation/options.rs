@@ -7,7 +7,7 @@ use crate::options::analysis::PATH_POINTS;
 pub enum Branch {
     /// Straight on, along the unstable path.
     Stay,
-    /// Along the null vector whose largest translation is positive.
+    /// Along the null vector to the side of [`System::side`](crate::domains::System::side).
     #[default]
     Plus,
     /// Against it.

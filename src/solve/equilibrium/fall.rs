@@ -1,33 +1,148 @@
-//! The fall from where a branch ends to the next stable equilibrium: an overdamped motion whose every step leads down in the
-//! potential. Without that, iterations jump in and out of stiff contacts for ever.
+//! The fall from where a branch loses its stability to the next stable equilibrium: a trust region on the potential energy.
 //!
-//! Reference: Kelley & Keyes, "Convergence analysis of pseudo-transient continuation", SIAM J. Numer. Anal. 35 (1998).
+//! Each step solves (K + μW)·d = −r, with W a diagonal of units (translations in mean segment lengths, rotations in radians). μ grows until
+//! the matrix is positive definite, the step is no longer than the trust region and the energy falls as predicted; it shrinks after each
+//! accepted step, so that the last steps are Newton's. Without the test of energy, iterations cycle in stiff curved valleys and jump
+//! in and out of stiff contacts.
+//!
+//! References: A. R. Conn, N. I. M. Gould, P. L. Toint, "Trust-Region Methods" (2000), ch. 6; C. T. Kelley, D. E. Keyes, "Convergence
+//! analysis of pseudo-transient continuation", SIAM J. Numer. Anal. 35 (1998), for steps without the test.
 
 use super::path::LoadPath;
-use super::{Equilibrium, Path, size};
-use crate::domains::System;
+use super::{Equilibrium, Path};
+use crate::domains::{BeamLine, Domain, System};
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::{Block, Pose};
 use crate::solve::SolveError;
 
-/// Smallest damping that is tried, as a share of the softest translation of a body by its own joints: what keeps a part back just
-/// beyond a fold is a direction much softer than that.
-const LEAST_DAMPING: f64 = 1e-14;
-/// A step is taken, down or not, after its damping was raised so often.
-const STUBBORN: usize = 60;
+/// Weight of rotations in W; that of translations is 1.
+const TURN_WEIGHT: f64 = 0.1;
+/// First and largest radius of the trust region, in mean segment lengths and radians.
+const RADIUS: [f64; 2] = [0.05, 0.3];
+/// Smallest radius: below it the energy no longer falls.
+const LEAST_RADIUS: f64 = 1e-11;
+/// Steps below this are not tested for energy: rounding.
+const UNTESTED: f64 = 1e-6;
+/// A step without μ below this ends the fall.
+const SETTLED: f64 = 1e-9;
+/// First μ and the μ that counts as none, as fractions of the median stiffness.
+const LEAST_SHIFT: [f64; 2] = [1e-8, 1e-9];
+/// A μ that no finite stiffness needs, in median stiffnesses.
+const MOST_SHIFT: f64 = 1e12;
+/// Fractions of the predicted decrease of energy: below the first a step is rejected, below the second the region shrinks, above the third it grows.
+const RATIO: [f64; 3] = [0.05, 0.25, 0.75];
+/// Rounding of the energy, as a fraction of it.
+const ROUNDING: f64 = 1e-12;
+/// Rotation between the ends of a segment beyond which a step is rejected [rad].
+const OVERTURNED: f64 = 1.5;
+/// Largest change of the distance of a gap in one step, as a fraction of the larger distance.
+const CLOSING: f64 = 0.5;
 
-impl Equilibrium {
-    /// Lets the system fall at the loads of `s` from `q`, as an overdamped motion, to a stable equilibrium; `q` becomes that.
-    ///
-    /// # Errors
-    /// [`SolveError::Lost`] where it falls without end.
-    pub fn settle(&mut self, system: &System, path: &dyn LoadPath, s: f64, q: &mut [Pose]) -> Result<Path, SolveError> {
-        let mut done = Path::default();
-        self.fall(system, path, s, q, &mut done)?;
-        Ok(done)
+/// Units of displacements.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Units {
+    /// Mean segment length; where gaps may close, the length scale of the system [m].
+    pub(super) length: f64,
+}
+
+impl Units {
+    pub(super) fn of(system: &System) -> Self {
+        let (mut length, mut segments) = (0.0, 0);
+        for beam in
+            system.beams.iter().filter(|beam| beam.points.first().map(|p| p.body) != beam.points.last().map(|p| p.body))
+        {
+            length += beam.length;
+            segments += beam.segments();
+        }
+        let gaps = system.members.iter().any(|member| member.closes() || member.touching().is_some());
+        Self { length: if segments == 0 || gaps { system.length_scale } else { length / segments as f64 } }
     }
 
-    /// Lets the system fall at fixed loads, as an overdamped motion, to a stable equilibrium.
+    /// Largest displacement of a body.
+    pub(super) fn size(self, x: &[Pose]) -> f64 {
+        let one = |p: &Pose| (p.x.hypot(p.y) / self.length).max(p.z.abs());
+        // a comparison with NaN must not hide it
+        let finite = |p: &Pose| if p.iter().all(|v| v.is_finite()) { one(p) } else { f64::INFINITY };
+        x.iter().map(finite).fold(0.0, f64::max)
+    }
+
+    /// xᵀWx.
+    fn weigh(self, x: &[Pose]) -> f64 {
+        let square = self.length * self.length;
+        x.iter().map(|p| (p.x * p.x + p.y * p.y) / square + TURN_WEIGHT * p.z * p.z).sum()
+    }
+
+    /// W·x.
+    pub(super) fn weighted(self, x: &Pose) -> Pose {
+        let square = self.length * self.length;
+        Pose::new(x.x / square, x.y / square, TURN_WEIGHT * x.z)
+    }
+
+    /// The median of the translational stiffness of the bodies [J].
+    pub(super) fn median_stiffness(self, tangent: &BlockMatrix<f64, 3>) -> f64 {
+        let one = |block: &Block| 0.5 * (block[(0, 0)] + block[(1, 1)]).abs() * self.length * self.length;
+        let mut all: Vec<f64> = tangent.diagonal.iter().map(one).filter(|k| *k > 0.0).collect();
+        all.sort_by(f64::total_cmp);
+        all.get(all.len() / 2).copied().unwrap_or(1.0)
+    }
+
+    /// `tangent += shift·W`.
+    pub(super) fn add_shift(self, shift: f64, tangent: &mut BlockMatrix<f64, 3>) {
+        if shift > 0.0 {
+            let translation = shift / (self.length * self.length);
+            for block in &mut tangent.diagonal {
+                block[(0, 0)] += translation;
+                block[(1, 1)] += translation;
+                block[(2, 2)] += shift * TURN_WEIGHT;
+            }
+        }
+    }
+}
+
+/// A trust region.
+struct Region {
+    units: Units,
+    shift: f64,
+    least: [f64; 2],
+    radius: f64,
+    energy: f64,
+}
+
+/// A step that was taken.
+#[derive(Debug, Clone, Copy)]
+struct Accepted {
+    /// Its largest displacement, in the units of W.
+    length: f64,
+    /// True where the energy it gains is more than rounding.
+    resolved: bool,
+}
+
+/// Why a fall ended without an equilibrium.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Unsettled {
+    /// The energy falls without end.
+    Budget,
+    /// Numbers overflowed, or no step decreases the energy.
+    Stuck,
+}
+
+impl Equilibrium {
+    /// Lets the system fall at the loads of `s` from `q` to a stable equilibrium; `q` becomes that.
+    ///
+    /// # Errors
+    /// [`SolveError::Lost`] where none was found.
+    pub fn settle(&mut self, system: &System, path: &dyn LoadPath, s: f64, q: &mut [Pose]) -> Result<Path, SolveError> {
+        let mut done = Path::default();
+        path.at(s, &mut self.drive);
+        let towards = self.softest(system, q).map(|_| self.judge(system, q));
+        self.lean(q, towards.map_or(0.0, |towards| towards.sign));
+        match self.fall(system, path, s, q, &mut done) {
+            Ok(()) => Ok(done),
+            Err(why) => Err(self.lost(system, s, why, &done, q)),
+        }
+    }
+
+    /// Lets the system fall at fixed loads to a stable equilibrium.
     pub(super) fn fall(
         &mut self,
         system: &System,
@@ -35,143 +150,122 @@ impl Equilibrium {
         s: f64,
         q: &mut [Pose],
         done: &mut Path,
-    ) -> Result<(), SolveError> {
+    ) -> Result<(), Unsettled> {
         path.at(s, &mut self.drive);
-        self.disturb(system, q);
-        // no step longer than a twentieth of the smallest gap
-        let longest = 0.05 * system.length_scale;
-        // the damping of now, and the last that was needed
-        let (mut damping, mut needed): (f64, f64) = (0.0, 0.0);
-        let mut height = system.potential(q, &self.drive);
+        let units = Units::of(system);
+        let energy = system.potential(q, &self.drive);
+        let mut region = Region { units, shift: 0.0, least: [0.0; 2], radius: RADIUS[0], energy };
+        let mut last = f64::INFINITY;
         for _ in 0..self.options.fall_steps {
             crate::budget::check();
             done.iterations += 1;
-            system.tangent(q, &self.drive, &mut self.tangent, &mut self.residual);
-            let least = LEAST_DAMPING * mean_ratio(system, &self.tangent);
-            if !least.is_finite() {
-                return Err(self.lost(system, s, done.iterations, q));
-            }
-            let mut tried = 0;
-            loop {
-                crate::budget::check();
-                self.add_damping(system, damping);
-                system.model.project_matrix(&mut self.tangent);
-                let stable = matches!(self.tangent.factor(&system.model.pattern), Ok(i) if i.negative == 0);
-                if stable {
-                    self.step.copy_from_slice(&self.residual);
-                    self.tangent.solve(&system.model.pattern, &mut self.step);
-                    if size(system, &self.step) <= longest
-                        && (tried > STUBBORN || self.descends(system, q, &mut height))
-                    {
-                        break;
-                    }
-                }
-                // also where it is no number
-                if damping.is_nan() || damping > 1e6 / LEAST_DAMPING * least.max(1e-300) {
-                    return Err(self.lost(system, s, done.iterations, q));
-                }
-                tried += 1;
-                damping = if damping == 0.0 { least.max(0.1 * needed) } else { 3.0 * damping };
-                system.tangent(q, &self.drive, &mut self.tangent, &mut self.residual);
-            }
+            let Some(Accepted { length, resolved }) = self.try_step(system, q, &mut region)? else { continue };
             for (q, step) in q.iter_mut().zip(&self.step) {
-                *q -= step;
+                *q += step;
             }
-            if tried > STUBBORN {
-                height = system.potential(q, &self.drive);
-            }
-            let moved = size(system, &self.step);
-            if damping == 0.0 && moved <= self.options.tolerance * size(system, q).max(system.length_scale) {
+            // converged, or as close as rounding lets it come
+            if region.shift == 0.0 && (length < SETTLED || (!resolved && length > 0.5 * last)) {
                 return Ok(());
             }
-            needed = damping;
-            damping = if damping <= least { 0.0 } else { damping / 4.0 };
+            last = if region.shift == 0.0 { length } else { f64::INFINITY };
+            region.shift = if region.shift / 8.0 < region.least[1] { 0.0 } else { region.shift / 8.0 };
         }
-        Err(self.lost(system, s, done.iterations, q))
+        Err(Unsettled::Budget)
     }
 
-    /// True when `step` leads from `q`, at the potential `height`, down; that becomes the height there. What is too short to
-    /// be told from rounding counts as down.
-    fn descends(&mut self, system: &System, q: &[Pose], height: &mut f64) -> bool {
+    /// One factorization: the step from `q`, where it is accepted.
+    fn try_step(&mut self, system: &System, q: &[Pose], region: &mut Region) -> Result<Option<Accepted>, Unsettled> {
+        let units = region.units;
+        system.tangent(q, &self.drive, &mut self.tangent, &mut self.residual);
+        if region.least[0] == 0.0 {
+            let median = units.median_stiffness(&self.tangent);
+            region.least = LEAST_SHIFT.map(|least| least * median);
+        }
+        let raise = |region: &mut Region, factor: f64| {
+            region.shift = (factor * region.shift).max(region.least[0]);
+            let bounded = region.shift < MOST_SHIFT / LEAST_SHIFT[0] * region.least[0];
+            if bounded { Ok(None) } else { Err(Unsettled::Stuck) }
+        };
+        units.add_shift(region.shift, &mut self.tangent);
+        system.model.project_matrix(&mut self.tangent);
+        if !self.is_definite(system) {
+            return raise(region, 4.0);
+        }
+        for (step, r) in self.step.iter_mut().zip(&self.residual) {
+            *step = -r;
+        }
+        self.tangent.solve(&system.model.pattern, &mut self.step);
+        let length = units.size(&self.step);
+        if length > 1.5 * region.radius {
+            return raise(region, (length / region.radius).clamp(2.0, 8.0));
+        }
         for ((trial, q), step) in self.trial.iter_mut().zip(q).zip(&self.step) {
-            *trial = q - step;
+            *trial = q + step;
         }
         let there = system.potential(&self.trial, &self.drive);
-        let down = there <= *height + 1e-12 * (height.abs() + there.abs());
-        let short = size(system, &self.step) <= 1e-6 * system.length_scale;
-        if down || short {
-            *height = there;
+        if length < UNTESTED {
+            // what noise of the energy made small may grow again
+            region.radius = (2.0 * region.radius).min(RADIUS[1]);
+            region.energy = there;
+            return Ok(Some(Accepted { length, resolved: false }));
         }
-        down || short
+        let work: f64 = self.residual.iter().zip(&self.step).map(|(r, d)| -r.dot(d)).sum();
+        let predicted = 0.5 * (work + region.shift * units.weigh(&self.step));
+        let noise = ROUNDING * (region.energy.abs() + there.abs());
+        let ratio = if predicted <= noise && there - region.energy <= noise {
+            1.0
+        } else {
+            (region.energy - there) / predicted
+        };
+        if ratio.is_nan() || ratio < RATIO[0] || self.closes_too_far(system, q) || self.overturns(system, q) {
+            region.radius = region.radius.min(length) / 3.0;
+            if region.radius < LEAST_RADIUS {
+                return Err(Unsettled::Stuck);
+            }
+            return raise(region, 3.0);
+        }
+        if ratio > RATIO[2] {
+            region.radius = (2.0 * region.radius).min(RADIUS[1]);
+        } else if ratio < RATIO[1] {
+            region.radius *= 0.5;
+        }
+        region.energy = there;
+        Ok(Some(Accepted { length, resolved: predicted > noise }))
     }
 
-    /// Moves `q` a little along its softest direction. A bifurcation (a straight beam that buckles) leaves the system
-    /// balanced on an unstable branch, from which nothing would fall; this is the imperfection that every real part has.
-    fn disturb(&mut self, system: &System, q: &mut [Pose]) {
-        let mut damping = 0.0;
-        for _ in 0..200 {
-            system.tangent(q, &self.drive, &mut self.tangent, &mut self.residual);
-            let first = 1e-6 * mean_ratio(system, &self.tangent);
-            self.add_damping(system, damping);
-            system.model.project_matrix(&mut self.tangent);
-            if matches!(self.tangent.factor(&system.model.pattern), Ok(i) if i.negative == 0) {
-                break;
-            }
-            damping = if damping == 0.0 { first } else { 3.0 * damping };
-        }
-        // inverse iteration from a fixed vector without symmetry
-        let lightest = lightest(system);
-        for (j, x) in self.step.iter_mut().enumerate() {
-            let m = fall_mass(system, j, lightest);
-            *x = Pose::new(m.x, m.y * (1.0 + 0.37 * ((j * 7) % 5) as f64), m.z / system.length_scale);
-        }
-        for _ in 0..3 {
-            system.model.project(&mut self.step);
-            self.tangent.solve(&system.model.pattern, &mut self.step);
-            let scale = 1e-3 * system.length_scale / size(system, &self.step);
-            for (j, x) in self.step.iter_mut().enumerate() {
-                self.trial[j] = *x * scale;
-                *x = fall_mass(system, j, lightest).component_mul(&self.trial[j]);
-            }
-        }
-        if self.trial.iter().all(|x| x.iter().all(|v| v.is_finite())) {
-            for (q, x) in q.iter_mut().zip(&self.trial) {
-                *q += x;
-            }
-        }
+    /// Factors the tangent; true where it is positive definite, motions aside that are free from the start.
+    pub(super) fn is_definite(&mut self, system: &System) -> bool {
+        let pattern = &system.model.pattern;
+        let inertia = if self.free_from_start {
+            system.model.factor_holding(&mut self.tangent, &mut self.held)
+        } else {
+            self.tangent.factor(pattern)
+        };
+        inertia.is_ok_and(|inertia| inertia.negative == 0)
     }
 
-    /// `tangent += damping · mass-like weights`.
-    fn add_damping(&mut self, system: &System, damping: f64) {
-        if damping > 0.0 {
-            let lightest = lightest(system);
-            for (j, block) in self.tangent.diagonal.iter_mut().enumerate() {
-                let m = fall_mass(system, j, lightest);
-                for i in 0..3 {
-                    block[(i, i)] += damping * m[i];
-                }
-            }
-        }
+    /// True where the step to `trial` turns the ends of a segment so far against each other, and further than at `from`, that its law has a
+    /// valley of its own there: it stretches without strain.
+    fn overturns(&self, system: &System, from: &[Pose]) -> bool {
+        let turned =
+            |beam: &BeamLine, k: usize, q: &[Pose]| (beam.points[k + 1].rotation(q) - beam.points[k].rotation(q)).abs();
+        let over = |beam: &BeamLine, k: usize| {
+            let there = turned(beam, k, &self.trial);
+            there > OVERTURNED && there > turned(beam, k, from)
+        };
+        !system.model.linear && system.beams.iter().any(|beam| (0..beam.segments()).any(|k| over(beam, k)))
     }
-}
 
-/// Mass-like weights of the overdamped motion; bodies without mass get `lightest` [kg].
-fn fall_mass(system: &System, body: usize, lightest: f64) -> Pose {
-    let m = system.model.mass(body);
-    let turning = lightest * system.length_scale * system.length_scale;
-    Pose::new(m.x.max(lightest), m.y.max(lightest), m.z.max(turning))
-}
-
-/// The smallest mass of a body that has some [kg]; 1 where none has: the overdamped motion knows ratios alone.
-fn lightest(system: &System) -> f64 {
-    let masses = (0..system.bodies()).map(|j| system.model.mass(j).x).filter(|m| *m > 0.0);
-    let least = masses.fold(f64::INFINITY, f64::min);
-    if least.is_finite() { least } else { 1.0 }
-}
-
-/// A typical stiffness over mass, to begin damping with.
-fn mean_ratio(system: &System, tangent: &BlockMatrix<f64, 3>) -> f64 {
-    let lightest = lightest(system);
-    let ratio = |(j, block): (usize, &Block)| block[(0, 0)].abs() / fall_mass(system, j, lightest).x;
-    tangent.diagonal.iter().enumerate().map(ratio).fold(f64::INFINITY, f64::min)
+    /// True where the step to `trial` changes the distance of a gap by so much that it may lead across.
+    fn closes_too_far(&self, system: &System, from: &[Pose]) -> bool {
+        let far = |gap: usize| {
+            let (before, after) = (system.room(gap, from), system.room(gap, &self.trial));
+            (after - before).abs() > CLOSING * before.abs().max(after.abs())
+        };
+        let acts = |gap: &usize| {
+            let member = &system.members[*gap];
+            member.touching().is_some() || (member.closes() && self.drive.volts[*gap] != 0.0)
+        };
+        (0..system.members.len()).filter(acts).any(far)
+    }
 }

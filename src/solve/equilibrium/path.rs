@@ -9,6 +9,10 @@ pub trait LoadPath {
     fn at(&self, s: f64, drive: &mut Drive);
     /// d(drive)/ds at `s`.
     fn slope(&self, s: f64, slope: &mut Drive);
+    /// True where it begins under load, so that `s` is no measure of the load.
+    fn begins_loaded(&self) -> bool {
+        false
+    }
 }
 
 /// The smallest share of a way from rest at which sources are taken [1]: nothing at all would have no slope.
@@ -60,6 +64,10 @@ impl<'a> SourcePath<'a> {
 }
 
 impl LoadPath for SourcePath<'_> {
+    fn begins_loaded(&self) -> bool {
+        self.load[0] != 0.0 || self.from.iter().any(|v| *v != 0.0)
+    }
+
     fn at(&self, s: f64, drive: &mut Drive) {
         let e = self.electrics;
         let [share, _] = self.share(s);

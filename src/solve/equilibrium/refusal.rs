@@ -1,0 +1,144 @@
+//! Why no equilibrium was found, as a physical reason where one can be measured.
+
+use super::fall::Unsettled;
+use super::loss::MAX_LOSSES;
+use super::{Equilibrium, Path};
+use crate::domains::{Domain, System};
+use crate::multibody::factor::ZeroPivot;
+use crate::multibody::planar::Pose;
+use crate::solve::SolveError;
+
+/// A body that gives way so many times as far as others hangs on next to nothing.
+const UNHELD: f64 = 1e8;
+/// Rotation of the end of a segment from its chord beyond which its law means nothing [rad].
+const TURNED: f64 = 1.0;
+/// Axial strain beyond which a segment is no beam [1].
+const CRUSHED: f64 = 0.3;
+/// Longest displacement of a part that is still there, in lengths of the longest beam.
+const GONE: f64 = 100.0;
+
+impl Equilibrium {
+    /// The reason why the search ended at the displacement `q` beyond the last stable equilibrium at `share`.
+    pub(super) fn lost(&mut self, system: &System, share: f64, why: Unsettled, done: &Path, q: &[Pose]) -> SolveError {
+        let reason = (self.touching_without_contact(system, q))
+            .or_else(|| Self::beyond_beams(system, q))
+            .or_else(|| self.unheld(system, q))
+            .or_else(|| self.gone(system, q))
+            .unwrap_or_else(|| self.unsettled(system, why, q));
+        Self::refused(share, done, reason)
+    }
+
+    /// A load that is far more than the part bears.
+    pub(super) fn too_far(&self, system: &System, share: f64, done: &Path, at: Option<ZeroPivot>) -> SolveError {
+        let body = at.map_or(String::new(), |pivot| system.model.bodies[pivot.body].name.to_string());
+        let reason = format!(
+            "\"{body}\" is deformed so far there that rounding hides what resists it: the load is too large for this part"
+        );
+        Self::refused(share, done, reason)
+    }
+
+    /// A path that loses stability again and again.
+    pub(super) fn too_many(&self, _: &System, share: f64, done: &Path) -> SolveError {
+        let reason = format!(
+            "{MAX_LOSSES} stability losses lie below that load, as where a part is crumpled: the load is far beyond what the part bears"
+        );
+        Self::refused(share, done, reason)
+    }
+
+    fn refused(share: f64, done: &Path, reason: String) -> SolveError {
+        let first = done.passed.first().map(|passed| passed.share);
+        let passed = first.map_or(String::new(), |first| {
+            format!(" (the part as drawn loses its stability at {first:.4} of the load)")
+        });
+        SolveError::Lost { share, passed, reason }
+    }
+
+    fn touching_without_contact(&self, system: &System, q: &[Pose]) -> Option<String> {
+        (0..system.members.len())
+            .find(|&gap| {
+                let member = &system.members[gap];
+                member.closes()
+                    && member.touching().is_none()
+                    && system.distance(gap, q) <= 0.1 * system.distance(gap, &self.before)
+            })
+            .map(|_| "two electrodes touch and no contact is declared".into())
+    }
+
+    /// The segment that is farthest beyond what a beam segment describes, in words; none where all are beams.
+    pub fn beyond_beams(system: &System, q: &[Pose]) -> Option<String> {
+        let linear = system.model.linear;
+        if linear {
+            return None;
+        }
+        let states = system.beams.iter().flat_map(|beam| {
+            (0..beam.segments()).filter_map(move |k| {
+                let state = beam.segment(k, q, linear);
+                let turn = state.turns[0].abs().max(state.turns[1].abs());
+                let over = (turn / TURNED).max(state.strain.abs() / CRUSHED);
+                (over > 1.0).then_some((over, beam, k, turn, state.strain))
+            })
+        });
+        let (_, beam, k, turn, strain) = states.max_by(|a, b| a.0.total_cmp(&b.0))?;
+        let place = format!("segment {} of beam {}", k + 1, beam.name);
+        Some(if turn > TURNED {
+            format!(
+                "{place} is turned {:.0}° from its chord where the search ended: finer segments are needed (--segments), or the load is beyond \
+                 beams (strain {strain:.2})",
+                turn.to_degrees()
+            )
+        } else {
+            format!("{place} comes to a strain of {strain:.2} where the search ended: the load is beyond beams")
+        })
+    }
+
+    fn gone(&self, system: &System, q: &[Pose]) -> Option<String> {
+        let size = system.beams.iter().map(|beam| beam.length).fold(system.length_scale, f64::max);
+        let moved = |body: &usize| q[*body].x.hypot(q[*body].y);
+        let body = (0..q.len()).max_by(|a, b| moved(a).total_cmp(&moved(b))).filter(|b| !(moved(b) < GONE * size))?;
+        let name = &system.model.bodies[body].name;
+        Some(format!("\"{name}\" moves away without end: nothing that this load cannot overcome holds it"))
+    }
+
+    fn unsettled(&mut self, system: &System, why: Unsettled, q: &[Pose]) -> String {
+        system.residual(q, &self.drive, &mut self.residual);
+        let size = |body: &usize| self.residual[*body].amax();
+        let worst = (0..self.residual.len()).max_by(|a, b| size(a).total_cmp(&size(b))).unwrap_or(0);
+        let name = system.model.bodies.get(worst).map_or(String::new(), |body| body.name.to_string());
+        let force = self.residual.get(worst).map_or(0.0, |r| r.amax());
+        match why {
+            Unsettled::Budget => format!(
+                "beyond it the part falls on and on, farthest from equilibrium at \"{name}\" ({force:.1e} N): no stable equilibrium near"
+            ),
+            Unsettled::Stuck => format!(
+                "beyond it rounding hides which way the energy falls, farthest from equilibrium at \"{name}\" ({force:.1e} N): the stiffness of \
+                 its parts differs too much, or the load is beyond beams"
+            ),
+        }
+    }
+
+    /// Names the body that gives way most under a force on every body, if it does so far more than most.
+    fn unheld(&mut self, system: &System, q: &[Pose]) -> Option<String> {
+        let model = &system.model;
+        system.tangent(q, &self.drive, &mut self.tangent, &mut self.residual);
+        model.project_matrix(&mut self.tangent);
+        model.factor_holding(&mut self.tangent, &mut self.held).ok()?;
+        for (j, x) in self.step.iter_mut().enumerate() {
+            *x = Pose::new(1.0, 1.0 + 0.1 * (j % 7) as f64, 0.0);
+        }
+        model.project(&mut self.step);
+        self.tangent.solve(&model.pattern, &mut self.step);
+        let moved: Vec<f64> = self.step.iter().map(|p| p.x.hypot(p.y)).collect();
+        let mut sorted = moved.clone();
+        sorted.sort_by(f64::total_cmp);
+        let typical = sorted[sorted.len() / 2].max(f64::MIN_POSITIVE);
+        // the middle body may hang on the same threads: then all are soft, and the stiffest is what to compare with
+        let stiff = sorted[sorted.len() / 20].max(f64::MIN_POSITIVE);
+        let softest = (0..moved.len()).max_by(|&a, &b| moved[a].total_cmp(&moved[b])).unwrap_or(0);
+        let over = moved[softest] / typical.min(stiff);
+        if over < UNHELD {
+            return None;
+        }
+        let name = &model.bodies[softest].name;
+        Some(format!("the part with \"{name}\" is nearly unheld: it gives way {over:.0e} times as far as what is held"))
+    }
+}
