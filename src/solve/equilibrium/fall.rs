@@ -9,10 +9,13 @@ use crate::domains::System;
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::{Block, Pose};
 use crate::solve::SolveError;
+use nalgebra::Vector2;
 
 /// Smallest damping that is tried, as a share of the softest translation of a body by its own joints: what keeps a part back just
 /// beyond a fold is a direction much softer than that.
 const LEAST_DAMPING: f64 = 1e-14;
+/// Smallest ratio of a body's two stiffnesses that is told from rounding.
+const LEAST_RATIO: f64 = 1e-9;
 /// A step is taken, down or not, after its damping was raised so often.
 const STUBBORN: usize = 60;
 
@@ -47,7 +50,7 @@ impl Equilibrium {
             crate::budget::check();
             done.iterations += 1;
             system.tangent(q, &self.drive, &mut self.tangent, &mut self.residual);
-            let least = LEAST_DAMPING * mean_ratio(system, &self.tangent);
+            let least = LEAST_DAMPING * softest_ratio(system, &self.tangent);
             if !least.is_finite() {
                 return Err(self.lost(system, s, done.iterations, q));
             }
@@ -111,7 +114,7 @@ impl Equilibrium {
         let mut damping = 0.0;
         for _ in 0..200 {
             system.tangent(q, &self.drive, &mut self.tangent, &mut self.residual);
-            let first = 1e-6 * mean_ratio(system, &self.tangent);
+            let first = 1e-6 * softest_ratio(system, &self.tangent);
             self.add_damping(system, damping);
             system.model.project_matrix(&mut self.tangent);
             if matches!(self.tangent.factor(&system.model.pattern), Ok(i) if i.negative == 0) {
@@ -169,9 +172,42 @@ fn lightest(system: &System) -> f64 {
     if least.is_finite() { least } else { 1.0 }
 }
 
-/// A typical stiffness over mass, to begin damping with.
-fn mean_ratio(system: &System, tangent: &BlockMatrix<f64, 3>) -> f64 {
+/// The smallest stiffness over mass of a body along its softest free direction, its neighbours held, to begin damping with [1/s²].
+/// Independent of the axes of the drawing.
+fn softest_ratio(system: &System, tangent: &BlockMatrix<f64, 3>) -> f64 {
     let lightest = lightest(system);
-    let ratio = |(j, block): (usize, &Block)| block[(0, 0)].abs() / fall_mass(system, j, lightest).x;
-    tangent.diagonal.iter().enumerate().map(ratio).fold(f64::INFINITY, f64::min)
+    let ratio = |(j, block): (usize, &Block)| {
+        softest(block, system.model.bodies[j].free.as_deref()).map(|k| k / fall_mass(system, j, lightest).x)
+    };
+    let least = tangent.diagonal.iter().enumerate().filter_map(ratio).fold(f64::INFINITY, f64::min);
+    if least.is_finite() {
+        return least;
+    }
+    let turning = |(j, block): (usize, &Block)| block[(2, 2)].abs() / fall_mass(system, j, lightest).z;
+    tangent.diagonal.iter().enumerate().map(turning).fold(f64::INFINITY, f64::min)
+}
+
+/// The smallest stiffness of a block against translations that `free` leaves [N/m]; none where a body cannot translate, or nothing resists.
+fn softest(block: &Block, free: Option<&Block>) -> Option<f64> {
+    let along = |d: Vector2<f64>| {
+        let k = block.fixed_view::<2, 2>(0, 0);
+        (d.dot(&(k * d))).abs()
+    };
+    if let Some(free) = free {
+        let plane = free.fixed_view::<2, 2>(0, 0);
+        match plane.trace() {
+            none if none < 0.5 => return None,
+            // the free direction: the longer column of its projector
+            one if one < 1.5 => {
+                let [x, y] = [plane.column(0).into_owned(), plane.column(1).into_owned()];
+                let longer = if x.norm_squared() >= y.norm_squared() { x } else { y };
+                return Some(along(longer.normalize())).filter(|k| *k > 0.0);
+            }
+            _ => {}
+        }
+    }
+    let (a, b, c) = (block[(0, 0)], block[(1, 0)], block[(1, 1)]);
+    let (mean, apart) = (0.5 * (a + c), (0.25 * (a - c) * (a - c) + b * b).sqrt());
+    // where they cancel, rounding says nothing of the softer one
+    Some((mean.abs() - apart).abs().max(LEAST_RATIO * (mean.abs() + apart))).filter(|k| *k > 0.0)
 }
