@@ -16,7 +16,9 @@ use serde::Serialize;
 /// Pull-in and release voltage of a gap.
 ///
 /// The equilibrium is followed up to where it loses its stability and a gap closes, and down again to where the last closed
-/// gap lets go. JSON: "pull_in_v" [V]; "release_v" [V], null when it never lets go; "held": false when no contact holds it.
+/// gap opens. Where the closed part snaps further below --max, the way down begins beyond that. JSON: "pull_in_v" [V]; "release_v" [V], null
+/// when it stays closed at 0 V; "snaps_v": voltages of further snaps; "release_before_snaps_v": release without those; "held": false when
+/// no contact holds it.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  bimorph pullin switch.net --max 50\n  \
                         bimorph pullin switch.net --source drive --set gap=1.5u --json")]

@@ -133,6 +133,12 @@ pub trait Domain {
         self.distance(at)
     }
 
+    /// Force with which its sides bear on each other [N].
+    fn bearing(&self, at: At<'_>) -> f64 {
+        let _ = at;
+        0.0
+    }
+
     /// Energy stored where its sides touch [J].
     fn contact_energy(&self, at: At<'_>) -> f64 {
         let _ = at;

@@ -137,6 +137,10 @@ impl Domain for Electrodes {
         self.contact.map(|c| [c.touch, c.least()])
     }
 
+    fn bearing(&self, at: At<'_>) -> f64 {
+        self.pressed(self.approach.value(at.q, at.linear)).0
+    }
+
     fn contact_energy(&self, at: At<'_>) -> f64 {
         self.contact.map_or(0.0, |contact| contact.energy(self.distance(at)))
     }

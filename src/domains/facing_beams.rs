@@ -152,6 +152,11 @@ impl Domain for FacingBeams {
         Some([self.facing.touch, self.facing.least()])
     }
 
+    fn bearing(&self, at: At<'_>) -> f64 {
+        let force = self.facing.contact(&self.values(at)).0;
+        force[0].abs() + force[2].abs()
+    }
+
     fn contact_energy(&self, at: At<'_>) -> f64 {
         self.facing.contact_energy(&self.values(at))
     }

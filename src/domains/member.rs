@@ -146,6 +146,10 @@ impl Domain for Member {
         each!(self, m => m.room(at))
     }
 
+    fn bearing(&self, at: At<'_>) -> f64 {
+        each!(self, m => m.bearing(at))
+    }
+
     fn contact_energy(&self, at: At<'_>) -> f64 {
         each!(self, m => m.contact_energy(at))
     }

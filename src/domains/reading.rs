@@ -1,6 +1,7 @@
 //! What is read of a system's gaps, by their number.
 
 use super::domain::Domain;
+use super::member::Member;
 use super::system::System;
 use crate::multibody::planar::Pose;
 
@@ -58,6 +59,16 @@ impl System {
     /// True when a gap is so far closed that its contact force acts.
     pub fn touches(&self, gap: usize, q: &[Pose]) -> bool {
         self.touching(gap).is_some_and(|[touch, _]| self.distance(gap, q) < touch)
+    }
+
+    /// What the balance of forces is measured in where parts touch [N]: the largest force of contact; at a touch that bears next to
+    /// nothing, a thousandth of the attraction there. 0 where nothing touches. `volts` of each gap.
+    pub fn contact_scale(&self, q: &[Pose], volts: &[f64]) -> f64 {
+        let of = |(g, (gap, volts)): (usize, (&Member, &f64))| {
+            let bearing = gap.bearing(self.at(q));
+            if bearing > 0.0 { bearing.max(1e-3 * self.pull(g, q, *volts).abs()) } else { 0.0 }
+        };
+        self.members.iter().zip(volts).enumerate().map(of).fold(0.0, f64::max)
     }
 
     /// The first gap that is closed beyond the range of its law of contact, with the distance that is left [m].

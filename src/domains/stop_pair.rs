@@ -88,6 +88,10 @@ impl Domain for StopPair {
         self.distance(at).max(0.0) + TOUCH
     }
 
+    fn bearing(&self, at: At<'_>) -> f64 {
+        self.stop.bearing(&self.ways, self.approach.value(at.q, at.linear)).0.abs()
+    }
+
     fn contact_energy(&self, at: At<'_>) -> f64 {
         let u = self.approach.value(at.q, at.linear);
         let side = |way: Option<f64>, u: f64| way.map_or(0.0, |w| self.stop.energy(w - u));

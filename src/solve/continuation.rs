@@ -33,6 +33,9 @@ use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
 use family::Blend;
 
+/// Step below which the path goes on although its point at a given s was not found [1].
+const NEAREST: f64 = 1e-10;
+
 impl Continuation {
     /// Storage for a system.
     pub fn new(system: &System, options: ContinuationOptions) -> Self {
@@ -71,14 +74,28 @@ impl Continuation {
             let longest = self.options.longest.max(self.options.growth * here.s.abs());
             step = step.min(longest / here.ds.abs().max(1e-3));
             let Some((next, cost)) = self.advance(family, &here, &mut step) else { break PathEnd::Lost };
-            // what is critical beyond the last s is none of this path
-            if next.s >= self.options.target
-                && let Some(last) = self.land(family, &traced, &next)
-                && last.negative == here.negative
-                && here.ds * next.ds > 0.0
+            if next.s >= self.options.target {
+                match self.land(family, &here, &next, self.options.target) {
+                    // what is critical beyond the last s is none of this path
+                    Some(last) if last.negative == here.negative && here.ds * next.ds > 0.0 => {
+                        traced.points.push(last);
+                        break PathEnd::Arrived;
+                    }
+                    None if step > NEAREST => {
+                        step *= 0.5;
+                        continue;
+                    }
+                    _ => {}
+                }
+            }
+            // the same contact is an equilibrium at the opposite voltage: only one that is still there without any goes on to that
+            if let Some(still) = family.still()
+                && (here.s - still) * (next.s - still) < 0.0
+                && step > NEAREST
+                && self.land(family, &here, &next, still).is_none()
             {
-                traced.points.push(last);
-                break PathEnd::Arrived;
+                step *= 0.5;
+                continue;
             }
             let lost = next.negative > here.negative;
             let branched = self.note(family, &here, &next, step, &mut traced);
@@ -88,7 +105,9 @@ impl Continuation {
             let arrived = next.s >= self.options.target && branched.is_none();
             here = branched.unwrap_or(next);
             if arrived {
-                let last = self.land(family, &traced, &here);
+                let before = Place { q: traced.points.last().map_or_else(Vec::new, |p| p.q.clone()), ..here.clone() };
+                let before = Place { s: traced.points.last().map_or(0.0, |p| p.s), ..before };
+                let last = self.land(family, &before, &here, self.options.target);
                 traced.points.push(last.unwrap_or_else(|| point(&here)));
                 break PathEnd::Arrived;
             }
@@ -153,19 +172,19 @@ impl Continuation {
         branch
     }
 
-    /// The point at the last s exactly, from the two points around it; none where none is found.
-    fn land(&mut self, family: &mut Blend, traced: &Traced, past: &Place) -> Option<PathPoint> {
-        let before = traced.points.last()?;
-        let share = if past.s > before.s { (self.options.target - before.s) / (past.s - before.s) } else { 1.0 };
+    /// The point at `s` exactly, from the two points around it; none where none is found, or only one of another branch.
+    fn land(&mut self, family: &mut Blend, before: &Place, past: &Place, s: f64) -> Option<PathPoint> {
+        let share = if past.s == before.s { 1.0 } else { (s - before.s) / (past.s - before.s) };
         let mut guess = past.clone();
         for (q, before) in guess.q.iter_mut().zip(&before.q) {
             *q = before + (*q - before) * share;
         }
-        guess.s = self.options.target;
+        guess.s = s;
         let zeros = vec![Pose::zeros(); guess.q.len()];
         let plane = Plane { from: &guess, dq: &zeros, ds: 1.0, distance: 0.0 };
         let (place, _) = self.correct(family, &plane, guess.clone()).ok()?;
-        Some(PathPoint { s: self.options.target, ..point(&place) })
+        let near = self.is_between(family, (before, past), (&guess, &place));
+        near.then(|| PathPoint { s, ..point(&place) })
     }
 }
 

@@ -29,6 +29,9 @@ use path::LoadPath;
 
 /// Corrections below this share of the displacement that no longer shrink are rounding.
 const STALLED: f64 = 1e-5;
+/// Largest residual force in such a place, as a fraction of the largest contact force, where parts touch. Contact softens towards
+/// the touch, and Newton's method then takes a quarter of the way each time: that is no rounding.
+const UNBALANCED: f64 = 1e-6;
 
 /// Smallest load step where the present load is next to nothing, as a fraction of the path.
 const LEAST_STEP: f64 = 1e-10;
@@ -156,8 +159,9 @@ impl Equilibrium {
         let mut free_at_first = None;
         self.free_from_start = false;
         while s < 1.0 {
-            let step = f64::min(ds, 1.0 - s);
-            let to = if 1.0 - s - step < 1e-12 { 1.0 } else { s + step };
+            let station = path.station(s);
+            let step = f64::min(ds, station - s);
+            let to = if station - s - step < 1e-12 { station } else { s + step };
             self.predict(system, path, s, to - s, q)?;
             // held where the step begins; what a wild trial holds says nothing
             let free = self.held.first().copied();
@@ -229,6 +233,7 @@ impl Equilibrium {
             let Ok(inertia) = system.model.factor_holding(&mut self.tangent, &mut self.held) else {
                 return Corrected::No;
             };
+            let unbalanced = self.residual.iter().map(|r| r.xy().norm_squared()).fold(0.0, f64::max).sqrt();
             std::mem::swap(&mut self.step, &mut self.residual);
             self.tangent.solve(&system.model.pattern, &mut self.step);
             let correction = size(system, &self.step);
@@ -240,7 +245,9 @@ impl Equilibrium {
             }
             let reach = size(system, &self.trial).max(1e-6 * system.length_scale);
             // converged, or as close as rounding lets it come: quadratic convergence that has come to a stand
-            let stalled = correction <= STALLED * reach && correction > 0.1 * last;
+            let stalled = correction <= STALLED * reach
+                && correction > 0.1 * last
+                && balanced(system.contact_scale(&self.trial, &self.drive.volts), unbalanced);
             last = correction;
             if correction <= self.options.tolerance * reach || stalled {
                 if inertia.negative > 0 {
@@ -271,6 +278,11 @@ impl Equilibrium {
     }
 }
 
+/// True where nothing touches, and where the largest force that is left over is small next to that of contact.
+pub(super) fn balanced(contact: f64, unbalanced: f64) -> bool {
+    contact == 0.0 || unbalanced <= UNBALANCED * contact
+}
+
 /// Largest displacement of a body: translation [m], or rotation times the length scale.
 fn size(system: &System, x: &[Pose]) -> f64 {
     x.iter().map(|p| extent(system, p)).fold(0.0, f64::max)
@@ -282,6 +294,6 @@ fn distance(system: &System, a: &[Pose], b: &[Pose]) -> f64 {
 
 fn extent(system: &System, p: &Pose) -> f64 {
     // a comparison with NaN must not hide it
-    let e = p.x.abs().max(p.y.abs()).max(p.z.abs() * system.length_scale);
+    let e = (p.x * p.x + p.y * p.y).sqrt().max(p.z.abs() * system.length_scale);
     if p.iter().all(|v| v.is_finite()) { e } else { f64::INFINITY }
 }

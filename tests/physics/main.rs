@@ -3,6 +3,7 @@
 mod backbending;
 mod baselines;
 mod beams;
+mod closed_branches;
 mod contact;
 mod dashpot;
 mod drawn;
@@ -20,6 +21,7 @@ mod mesh;
 mod mode_errors;
 mod motion;
 mod near_folds;
+mod orientation;
 mod paths;
 mod relative;
 mod relative_motion;

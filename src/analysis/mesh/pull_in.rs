@@ -3,7 +3,7 @@
 use super::super::AnalysisError;
 use super::super::gap_pieces::{OF_DEFLECTION, OF_PULL_IN};
 use super::super::linear_stress::left_out;
-use super::super::pull_in::{PullInResult, pull_in};
+use super::super::pull_in::{PullInResult, pull_in, pull_in_with};
 use super::super::statics::{OperatingPoint, operating_point};
 use super::meshed::{chosen, meshed, on};
 use super::warnings::{of_pieces, of_stress};
@@ -71,10 +71,12 @@ pub(super) fn for_pull_in(
     port: Option<&str>,
     max: f64,
 ) -> Result<(ModelOrder, OfMeshes), AnalysisError> {
-    let mut known = Vec::new();
+    let mut known: OfMeshes = Vec::new();
     let mut analyse = |segments: &[usize]| {
         let model = meshed(compiled, segments)?;
-        let found = pull_in(&model, port, max)?;
+        // a coarse mesh snaps where a fine one does, and more often
+        let snaps = known.first().is_none_or(|(_, first)| !first.snaps_v.is_empty());
+        let found = pull_in_with(&model, port, max, snaps)?;
         let outputs = pull_in_outputs(&found);
         known.push((segments.to_vec(), found));
         Ok::<_, AnalysisError>(outputs)

@@ -12,6 +12,10 @@ pub struct PullInResult {
     /// Voltage at which the last of the closed gaps lets go on the way down [V]; none when it stays closed at 0 V, or when
     /// nothing holds the part after pull-in.
     pub release_v: Option<f64>,
+    /// Voltages between pull-in and the largest one at which the closed part snaps further [V]: `release_v` is that beyond the last.
+    pub snaps_v: Vec<f64>,
+    /// Voltage of release from the state to which pull-in itself leads [V], where the part can snap further.
+    pub release_before_snaps_v: Option<f64>,
     /// False when nothing holds the part after pull-in: no gap closes on contact.
     pub held: bool,
     /// Largest estimated relative error by the mesh [1]; none without an estimate.

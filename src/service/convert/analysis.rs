@@ -142,6 +142,9 @@ pub fn pull_in_from_wire(wire: proto::PullInResponse) -> PullInResult {
         pull_in_v: wire.pull_in_v,
         release_v: wire.release_v,
         held: !wire.unheld,
+        // what a server says of these is among the warnings
+        snaps_v: Vec::new(),
+        release_before_snaps_v: None,
         estimated_error: wire.estimated_error,
         warnings: wire.warnings,
     }

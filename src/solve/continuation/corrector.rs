@@ -9,6 +9,12 @@ use crate::domains::System;
 use crate::multibody::BlockMatrix;
 use crate::multibody::factor::ZeroPivot;
 use crate::multibody::planar::Pose;
+use crate::solve::equilibrium::balanced;
+
+/// Corrections below the first fraction of the displacement are rounding, and those below the second that no longer shrink.
+const ROUNDING: [f64; 2] = [1e-12, 1e-10];
+/// How many times as many iterations a light touch may take.
+const IN_CONTACT: usize = 4;
 
 /// Position and unit tangent.
 #[derive(Debug, Clone, Default)]
@@ -51,7 +57,7 @@ pub(super) fn inner(system: &System, a: &[Pose], b: &[Pose]) -> f64 {
 
 /// Largest displacement [m]: translation, or rotation times the length scale.
 fn extent(system: &System, p: &Pose) -> f64 {
-    let e = p.x.abs().max(p.y.abs()).max(p.z.abs() * system.length_scale);
+    let e = (p.x * p.x + p.y * p.y).sqrt().max(p.z.abs() * system.length_scale);
     if p.iter().all(|v| v.is_finite()) { e } else { f64::INFINITY }
 }
 
@@ -65,11 +71,15 @@ impl Continuation {
         mut at: Place,
     ) -> Result<(Place, usize), Option<ZeroPivot>> {
         let mut last = f64::INFINITY;
-        for count in 1..=self.options.iterations {
+        let mut most = self.options.iterations;
+        let mut count = 0;
+        while count < most {
             crate::budget::check();
+            count += 1;
             self.iterations += 1;
             at.negative = self.linearize(family, &at)?;
             let system = family.system();
+            let unbalanced = self.residual.iter().map(|r| r.xy().norm_squared()).fold(0.0, f64::max).sqrt();
             self.tangent.solve(&system.model.pattern, &mut self.residual);
             self.tangent.solve(&system.model.pattern, &mut self.slope);
             let mut off = plane.ds * (at.s - plane.from.s) - plane.distance;
@@ -96,9 +106,16 @@ impl Continuation {
             // rounding: corrections that are small and no longer shrink. In stiff contacts they shrink by a quarter each time
             let small = correction <= 1e-6 * reach && correction > 0.8 * last;
             let stalled = small || (correction <= 1e-8 * reach && correction > 0.1 * last);
+            let (fast, stands) = (correction <= 0.1 * last, correction > 0.9 * last);
             last = correction;
             if correction <= self.options.tolerance * reach || stalled {
-                return Ok((at, count));
+                // contact softens towards the touch, and Newton's method takes a quarter of the way each time there: a correction
+                // is small long before forces balance
+                let rounding = correction <= ROUNDING[0] * reach || (correction <= ROUNDING[1] * reach && stands);
+                if fast || rounding || balanced(family.contact_scale(&at.q), unbalanced) {
+                    return Ok((at, count));
+                }
+                most = IN_CONTACT * self.options.iterations;
             }
         }
         Err(None)

@@ -41,6 +41,7 @@ pub struct Blend {
     rise: Vec<f64>,
     ends: [End; 2],
     before: Vec<Pose>,
+    still: Option<f64>,
 }
 
 impl Blend {
@@ -80,6 +81,7 @@ impl Blend {
             rise: vec![0.0; e.heating.heaters.len()],
             ends: [end(from, from_sources), end(to, to_sources)],
             before: vec![Pose::zeros(); from.bodies()],
+            still: still(from, from_sources, to_sources),
         };
         blend.set(0.0);
         Ok(blend)
@@ -113,9 +115,19 @@ impl Blend {
         self.system.electrics.steady(&self.sources, &mut self.rise, &mut self.drive);
     }
 
+    /// Where every gap is without voltage, if the family comes through such an s with voltages on both sides.
+    pub fn still(&self) -> Option<f64> {
+        self.still
+    }
+
     /// The system at the present s.
     pub fn system(&self) -> &System {
         &self.system
+    }
+
+    /// [`System::contact_scale`] at the present s.
+    pub fn contact_scale(&self, q: &[Pose]) -> f64 {
+        self.system.contact_scale(q, &self.drive.volts)
     }
 
     /// Tangent (held directions projected) and residual at the present s.
@@ -135,4 +147,20 @@ impl Blend {
         }
         self.set(s);
     }
+}
+
+/// Where no gap has a voltage.
+fn still(system: &System, from: &[f64], to: &[f64]) -> Option<f64> {
+    let rows = &system.electrics.gap_rows;
+    let gap = |g: usize, u: &[f64]| u.iter().enumerate().map(|(i, v)| rows[(g, i)] * v).sum::<f64>();
+    let volts = (0..rows.nrows()).map(|g| [gap(g, from), gap(g, to)]).filter(|[a, b]| *a != 0.0 || *b != 0.0);
+    let mut at = None;
+    for [a, b] in volts {
+        let s = a / (a - b);
+        if !s.is_finite() || at.is_some_and(|at: f64| (at - s).abs() > 1e-12 * (1.0 + at.abs())) {
+            return None;
+        }
+        at = Some(s);
+    }
+    at
 }

@@ -35,7 +35,8 @@ pub struct ContinuationOptions {
     pub aside: f64,
     /// End where stability is lost, at a fold or a bifurcation; default false.
     pub stop_at_loss: bool,
-    /// Smallest step, in s and in length scales, default 1e-9: below it the path is lost.
+    /// Smallest step, in s and in length scales, default 1e-12: below it the path is lost. Where contact ends a path turns within
+    /// 1e-7 of a gap.
     pub smallest: f64,
     /// Smallest cosine between the tangents at both ends of a step, default 0.98. Larger: more points where the path bends.
     pub straightness: f64,
@@ -58,7 +59,7 @@ impl Default for ContinuationOptions {
             closing: 0.2,
             aside: 0.5,
             stop_at_loss: false,
-            smallest: 1e-9,
+            smallest: 1e-12,
             straightness: 0.98,
             points: PATH_POINTS.count(),
             lowest: -1.0,

@@ -1,6 +1,7 @@
 //! One step along a path: how long it may be, and whether it stayed on its branch.
 
 use super::corrector::{Continuation, Place, Plane, dot, inner};
+use crate::domains::System;
 use crate::solve::family::Blend;
 
 impl Continuation {
@@ -29,14 +30,30 @@ impl Continuation {
     /// True when a step stayed on its branch: it closed or opened no gap by much, and ends near where the tangent led.
     fn keeps_branch(&self, family: &Blend, here: &Place, next: &Place, step: f64) -> bool {
         let system = family.system();
-        let leap = (0..system.members.len()).filter(|&g| system.touching(g).is_some()).any(|g| {
-            let (a, b) = (system.room(g, &here.q), system.room(g, &next.q));
-            (a - b).abs() > self.options.closing * a.min(b)
-        });
+        let leap = self.leaps(system, here, next);
         let off = next.q.iter().zip(&here.q).zip(&here.dq).map(|((a, b), dq)| a - b - dq * step);
         let off: f64 = off.map(|x| dot(system, &x, &x)).sum::<f64>() / here.q.len() as f64;
         let aside = (off + (next.s - here.s - here.ds * step).powi(2)).sqrt();
         !leap && aside <= self.options.aside * step
+    }
+
+    /// True where a gap changes more from one place to the other than it may in a step.
+    fn leaps(&self, system: &System, here: &Place, next: &Place) -> bool {
+        (0..system.members.len()).filter(|&g| system.touching(g).is_some()).any(|g| {
+            let (a, b) = (system.room(g, &here.q), system.room(g, &next.q));
+            (a - b).abs() > self.options.closing * a.min(b)
+        })
+    }
+
+    /// True when a `place` lies on the branch through the two `ends` of a step, between which it was expected at `guess`.
+    pub(super) fn is_between(&self, family: &Blend, ends: (&Place, &Place), (guess, place): (&Place, &Place)) -> bool {
+        let system = family.system();
+        let apart = |a: &Place, b: &Place| -> f64 {
+            let all = a.q.iter().zip(&b.q).map(|(a, b)| a - b);
+            (all.map(|x| dot(system, &x, &x)).sum::<f64>() / a.q.len().max(1) as f64).sqrt()
+        };
+        let step = apart(ends.0, ends.1).hypot(ends.0.s - ends.1.s);
+        !self.leaps(system, ends.0, place) && apart(guess, place) <= self.options.aside * step
     }
 
     /// The point at arc length `distance` from `here`, with its tangent.

@@ -13,10 +13,19 @@ pub trait LoadPath {
     fn begins_loaded(&self) -> bool {
         false
     }
+    /// The next value of s beyond `s` at which a step has to end: 1, or where an electrode's voltage vanishes before that. What it holds closed
+    /// opens there, and at the opposite voltage the same contact is an equilibrium again.
+    fn station(&self, s: f64) -> f64 {
+        let _ = s;
+        1.0
+    }
 }
 
 /// The smallest share of a way from rest at which sources are taken [1]: nothing at all would have no slope.
 const LEAST: f64 = 1e-30;
+
+/// What is left of a way to a station that is taken for none [1].
+const SMALLEST: f64 = 1e-12;
 
 /// Source voltages and dead loads that go from one value to another, heaters at their steady temperature.
 ///
@@ -85,6 +94,14 @@ impl LoadPath for SourcePath<'_> {
             *value = if s >= 1.0 { to } else { from + s * (to - from) };
         }
         drive.turning = 0.0;
+    }
+
+    fn station(&self, s: f64) -> f64 {
+        if self.from_rest {
+            return 1.0;
+        }
+        let crossing = |[from, to]: &[f64; 2]| if from * to < 0.0 { from / (from - to) } else { 1.0 };
+        self.volts.iter().map(crossing).filter(|at| at - s > SMALLEST).fold(1.0, f64::min)
     }
 
     fn slope(&self, s: f64, slope: &mut Drive) {

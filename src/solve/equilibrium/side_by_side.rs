@@ -149,6 +149,15 @@ impl LaneEquilibrium {
                 let reach = reaches[lane].max(1e-6 * scale);
                 let stalled = correction <= STALLED * reach && correction > 0.1 * last[lane];
                 last[lane] = correction;
+                // where parts touch, what has come to a stand has to balance, too: alone it goes on
+                if stalled && correction > options.tolerance * reach {
+                    let touching = !system.members.is_empty()
+                        && system.contact_scale(&self.lane(&self.trial, lane), &drives[lane].volts) > 0.0;
+                    if touching {
+                        course[lane] = Course::GivenUp;
+                        continue;
+                    }
+                }
                 if correction <= options.tolerance * reach || stalled {
                     let stable = self.negative.lane(lane) == 0.0;
                     let near = away[lane] <= 0.5 * predicted[lane] + 1e-3 * scale;
@@ -238,7 +247,7 @@ impl LaneEquilibrium {
         for k in 0..self.trial.len() {
             for lane in 0..LANES {
                 let (x, y, z) = (at(self, k, 0, lane), at(self, k, 1, lane), at(self, k, 2, lane));
-                let extent = x.abs().max(y.abs()).max(z.abs() * scale[lane]);
+                let extent = (x * x + y * y).sqrt().max(z.abs() * scale[lane]);
                 // a comparison with NaN must not hide it
                 let finite = x * 0.0 + y * 0.0 + z * 0.0 == 0.0;
                 largest[lane] = largest[lane].max(if finite { extent } else { f64::INFINITY });
