@@ -279,7 +279,7 @@ fn slips() {
     );
     warning(
         "anchor p1 [a] []\nanchor p1 [b] []\nanchor p1 [c] []\nanchor p1 [d] []\n\
-         gap2de p1 [a b c d] [l=100u w1=2u w2=2u gap=4u R=1]\neground * [c] []\nv port * [a c] []",
+         gap2dforce p1 [a b c d] [l=100u w1=2u w2=2u gap=4u]\neground * [c] []\nv port * [a c] []",
         "W015",
         "bends nothing",
     );

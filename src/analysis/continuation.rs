@@ -1,7 +1,6 @@
 //! Equilibrium paths: how a mechanism's equilibria go on while one load, voltage, temperature or stress grows, past folds
 //! and through bifurcations.
 use super::contact_range::{comb_beyond_told, within_contact_range};
-use super::gap_pieces;
 use super::signal::{Signal, View};
 use super::statics::{OperatingPoint, beam_motions, node_motions, operating_point, source_vector, told_at, too_hot};
 use super::{AnalysisError, BeamMotions, NodeMotions, Watch};
@@ -76,7 +75,6 @@ pub struct ContinuationResult {
     pub iterations: usize,
     /// The gap along beams that leaves out most for want of pieces, and the largest share of its distance on the way.
     #[serde(skip)]
-    pub in_pieces: Option<(String, f64)>,
     /// What is to be known of the path.
     pub warnings: Vec<String>,
 }
@@ -134,7 +132,6 @@ pub fn trace(
     for point in &traced.points {
         within_contact_range(compiled, &point.q)?;
     }
-    let mut in_pieces: Option<(String, f64)> = None;
     let value = |s: f64| if s == 1.0 { request.to } else { request.from + s * (request.to - request.from) };
     let mut columns: Vec<Vec<f64>> = vec![Vec::with_capacity(traced.points.len()); signals.len()];
     let zeros = vec![Pose::zeros(); system.bodies()];
@@ -147,11 +144,6 @@ pub fn trace(
         let view = View { q: &point.q, v: &zeros, rise: &rise, volts: &drive.volts };
         for (column, signal) in columns.iter_mut().zip(&signals) {
             column.push(signal.value(compiled, &view));
-        }
-        if let Some((name, share)) = gap_pieces::left_out(compiled, &point.q, &drive.volts)
-            && in_pieces.as_ref().is_none_or(|(_, most)| share > *most)
-        {
-            in_pieces = Some((name.to_owned(), share));
         }
     }
     let critical = |kind: Event| -> Vec<CriticalPoint> {
@@ -180,7 +172,6 @@ pub fn trace(
         last_curves: traced.points.last().map(|p| beam_motions(compiled, &p.q)).unwrap_or_default(),
         unknowns: system.model.unknowns(),
         iterations: traced.iterations,
-        in_pieces,
         warnings,
     })
 }

@@ -6,7 +6,7 @@ pub(crate) mod contact_range;
 pub mod continuation;
 pub mod formulation;
 pub mod frame;
-mod gap_pieces;
+mod gap_shape;
 pub mod harmonic;
 pub mod integrator;
 pub mod joint_transient;

@@ -1,6 +1,5 @@
 //! Natural frequencies and shapes about the operating point.
 use super::contact_range::comb_beyond_told;
-use super::gap_pieces;
 use super::loose_parts;
 use super::rotary_left_out;
 use super::sensitivity::About;
@@ -128,12 +127,10 @@ fn shapeless(compiled: &Compiled, count: usize, voltages: &PortVoltages) -> Resu
         // neither loads nor built-in strain
         drive.load = 0.0;
     }
-    let (mut way, mut in_pieces) = (Vec::new(), None);
+    let mut way = Vec::new();
     let q = if loaded {
         let point = operating_point(compiled, voltages)?;
         way = told_at(compiled, &point);
-        let share = gap_pieces::left_out(compiled, &point.q, &point.volts);
-        in_pieces = share.map(|(name, share)| (name.to_owned(), share));
         way.extend(comb_beyond_told(compiled, &point.q));
         way.extend(too_hot(compiled, &point));
         let (mut rise, mut driven) = (point.rise.clone(), system.electrics.drive());
@@ -180,16 +177,9 @@ fn shapeless(compiled: &Compiled, count: usize, voltages: &PortVoltages) -> Resu
     let modes = (&found.lambda[..count.min(found.lambda.len())], found.shapes.as_slice());
     let about = About { compiled, q: &q, drive: &drive, stressed: !as_sugar, modes };
     let per_deflection = if loaded { about.to_deflection() } else { Vec::new() };
-    let in_pieces = in_pieces.map(|(name, share)| {
-        // f goes as the fourth root of what is left of the voltage: by so much more than in proportion
-        let left = 1.0 - 4.0 * share * gap_pieces::OF_PULL_IN * about.to_voltage();
-        let next_to_fold = if left > 0.0 { left.powf(-0.25) - 1.0 } else { f64::INFINITY };
-        (name, next_to_fold.max(share * gap_pieces::OF_DEFLECTION))
-    });
     let way = way.into_iter().map(|way| format!("the equilibrium that these modes are about: {way}"));
     let rigid = rigid.iter().take(count).filter(|rigid| **rigid).count();
-    let warnings =
-        gap_pieces::told(compiled, in_pieces).into_iter().chain(way).chain(loose_parts::told(system, rigid)).collect();
+    let warnings = way.chain(loose_parts::told(system, rigid)).collect();
     let result = judged(compiled, count, &q, (errors, warnings), &mut found);
     Ok((ModesResult { per_deflection, ..result }, q, found.shapes))
 }

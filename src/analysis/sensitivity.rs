@@ -1,12 +1,11 @@
-//! How much faster frequencies move than the equilibrium that they are about, and than the voltages that hold it.
+//! How much faster frequencies move than the equilibrium that they are about.
 //!
 //! Next to a fold the lowest frequency goes to zero as the fourth root of what is left of the voltage: an error of the deflection there is
 //! one of a hundred times that in the frequency. Seen by moving the equilibrium by a share of itself, mode by mode:
 //! ```text
 //! d ln f / d ln q = xᵀ·[K(q·(1 + δ)) − K(q·(1 − δ))]·x / (4·δ·λ),   xᵀMx = 1
 //! ```
-//! and by raising the voltages across gaps, with the equilibrium that goes along: dq = −K⁻¹·dr. The shape stays as it is, by which the
-//! quotient changes in the second order only (Rayleigh).
+//! The shape stays as it is, by which the quotient changes in the second order only (Rayleigh).
 
 use crate::compile::Compiled;
 use crate::domains::Drive;
@@ -15,8 +14,6 @@ use crate::multibody::planar::Pose;
 
 /// δ of the equilibrium: far above rounding, far below what a gap closes by.
 const STEP: f64 = 1e-5;
-/// δ of the voltages, to which the equilibrium next to a fold answers far more than evenly.
-const RAISED: f64 = 1e-8;
 /// A mode below this share of the highest one is one without stiffness, whose frequency is rounding.
 const FREE: f64 = 1e-9;
 
@@ -30,36 +27,6 @@ pub(super) struct About<'a> {
     pub(super) modes: (&'a [f64], &'a [Vec<Pose>]),
 }
 
-/// d ln q / d ln V of an equilibrium, by its largest displacements [1]; infinite where the tangent is singular.
-pub(super) fn deflection_to_voltage(compiled: &Compiled, q: &[Pose], drive: &Drive) -> f64 {
-    let Some((way, _)) = raised(compiled, q, drive) else { return f64::INFINITY };
-    let linear = compiled.parts.system.model.linear;
-    let reach = |q: &[Pose], linear: bool| {
-        let moved = compiled.parts.nodes.iter().flatten().map(|p| p.displacement(q, linear).norm());
-        moved.fold(0.0, f64::max)
-    };
-    let (moved, whole) = (reach(&way, true), reach(q, linear));
-    if whole > 0.0 { moved / (RAISED * whole) } else { 0.0 }
-}
-
-/// The way that an equilibrium goes when the voltages across gaps rise by a little, and what drives it there; none where its tangent is
-/// singular.
-fn raised(compiled: &Compiled, q: &[Pose], drive: &Drive) -> Option<(Vec<Pose>, Drive)> {
-    let system = &compiled.parts.system;
-    let (model, pattern) = (&system.model, &system.model.pattern);
-    let raised = Drive { volts: drive.volts.iter().map(|v| v * (1.0 + RAISED)).collect(), ..drive.clone() };
-    let (mut tangent, mut before) = (BlockMatrix::new(pattern), q.to_vec());
-    system.tangent(q, drive, &mut tangent, &mut before);
-    let mut way = q.to_vec();
-    system.residual(q, &raised, &mut way);
-    way.iter_mut().zip(&before).for_each(|(after, before)| *after = before - *after);
-    model.project_matrix(&mut tangent);
-    model.project(&mut way);
-    tangent.factor(pattern).ok()?;
-    tangent.solve(pattern, &mut way);
-    Some((way, raised))
-}
-
 impl About<'_> {
     /// |d ln f / d ln q| of each mode [1].
     pub(super) fn to_deflection(self) -> Vec<f64> {
@@ -68,14 +35,6 @@ impl About<'_> {
         }
         let moved = |factor: f64| self.quotients(&self.q.iter().map(|q| q * factor).collect::<Vec<_>>(), self.drive);
         self.changes(&moved(1.0 + STEP), &moved(1.0 - STEP), 2.0 * STEP)
-    }
-
-    /// d ln f / d ln V of the worst mode, V the voltages across gaps [1]; infinite where the tangent is singular.
-    pub(super) fn to_voltage(self) -> f64 {
-        let Some((way, raised)) = raised(self.compiled, self.q, self.drive) else { return f64::INFINITY };
-        let there: Vec<Pose> = self.q.iter().zip(&way).map(|(q, way)| q + way).collect();
-        let changes = self.changes(&self.quotients(&there, &raised), &self.quotients(self.q, self.drive), RAISED);
-        changes.into_iter().fold(0.0, f64::max)
     }
 
     /// The relative change of each frequency from `less` to `more`, over `apart`.

@@ -16,7 +16,7 @@ const HELD: &str = "W048";
 
 impl Session {
     /// What this state warns of and none before it did, or not a tenth as much: fingers of combs that go through their other side, beams hotter than
-    /// any solid bears, a motion that rings out of step and, in equilibria, gaps along beams in too few pieces and what a linear
+    /// any solid bears, a motion that rings out of step and, in equilibria, gaps along beams in too few segments and what a linear
     /// model leaves out.
     pub(super) fn warns(&mut self, compiled: &Compiled, state: &Snapshot) -> Vec<Diagnostic> {
         let electrics = &Self::system(&self.ports.system, compiled).electrics;
@@ -32,7 +32,7 @@ impl Session {
             ..OperatingPoint::default()
         };
         let found = match state.elapsed == 0.0 {
-            true => told_still(compiled, point),
+            true => told_still(compiled, &point),
             false => told_moving(compiled, &point).into_iter().map(|warning| (warning, 1.0)).collect(),
         };
         let mut told: Vec<Diagnostic> =

@@ -23,6 +23,7 @@
 //! | [`beam`] | a cut beam in the drawing: bodies, masses, joints, points |
 //! | [`cubic`] | the cubic beam element, and the next term of its dynamic stiffness |
 //! | [`frame`] | the same drawing as a linear frame of cubic beam elements: a baseline |
+//! | `stations` | where along each beam the bodies of its segments measure |
 //! | [`ports`] | resistors, heaters, sources and ports → network and quadratic forms of temperature |
 
 pub(crate) mod bar;
@@ -42,6 +43,7 @@ pub mod ports;
 pub mod rigid;
 pub mod scheme;
 mod sprung;
+mod stations;
 pub mod yielded;
 
 pub use crate::options::{Junctions, Scheme};
@@ -151,7 +153,8 @@ pub fn discretize_like(
     for spring in &structure.springs {
         lay_spring(spring, options.undamped, &rigid, &mut joints, &mut dampers);
     }
-    let gaps = rigid.gaps(structure, options.as_sugar);
+    let stations = stations::of_beams(structure, &beams, &ends, &rigid);
+    let gaps = rigid.gaps(structure, options.as_sugar, &stations);
     lay_dampers(&gaps, options.undamped, &mut dampers);
     let acting = Acting { structure, joints: &joints, dampers: &dampers, members: &gaps, elements: &[] };
     free_rotation::hold(&acting, &mut rigid);
@@ -224,14 +227,8 @@ fn line(drawn: &crate::structure::Beam, points: &Arc<[Point]>) -> BeamLine {
 
 /// The pairs of bodies that gaps couple.
 fn couplings(gaps: &[Laid<'_, Member>]) -> Vec<(BodyId, BodyId)> {
-    let (mut pairs, mut bodies) = (Vec::new(), Vec::new());
-    for laid in gaps {
-        bodies.clear();
-        laid.member.bodies(|body| bodies.push(body));
-        for (i, a) in bodies.iter().enumerate() {
-            pairs.extend(bodies[..i].iter().map(|b| (*a, *b)));
-        }
-    }
+    let mut pairs = Vec::new();
+    gaps.iter().for_each(|laid| laid.member.pairs(|a, b| pairs.push((a, b))));
     pairs
 }
 

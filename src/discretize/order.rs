@@ -10,6 +10,7 @@
 //! With a band this is where [`model_order`](crate::refine::model_order) starts from.
 
 use super::error::{DiscretizeError, MOST_SEGMENTS};
+use crate::domains::BeamRows;
 use crate::options::CompileOptions;
 use crate::structure::{Beam, Structure};
 
@@ -41,12 +42,28 @@ pub fn check(beam: &Beam) -> Result<(), DiscretizeError> {
 /// # Errors
 /// See [`check`].
 pub fn a_priori(structure: &Structure, options: &CompileOptions) -> Result<Vec<usize>, DiscretizeError> {
-    let count = |beam: &Beam| {
+    let held = held_under_gaps(structure);
+    let count = |(index, beam): (usize, &Beam)| {
         check(beam)?;
-        let count = options.segments.unwrap_or_else(|| segments(beam, options.band, options.tol));
+        let least = if held.contains(&index) { 2 } else { 1 };
+        let count = options.segments.unwrap_or_else(|| segments(beam, options.band, options.tol).max(least));
         Ok(options.scheme.segments(count))
     };
-    structure.beams.iter().map(count).collect()
+    structure.beams.iter().enumerate().map(count).collect()
+}
+
+/// The beams along gaps with both ends anchored: nothing of a single segment moves there.
+fn held_under_gaps(structure: &Structure) -> Vec<usize> {
+    if structure.beam_gaps.is_empty() {
+        return Vec::new();
+    }
+    let mut anchored = vec![false; structure.nodes.len()];
+    for support in structure.supports.iter().filter(|support| support.held == [true; 3]) {
+        anchored[support.node.0] = true;
+    }
+    let beams = BeamRows::new(structure);
+    let held = |&index: &usize| [structure.beams[index].a, structure.beams[index].b].iter().all(|n| anchored[n.0]);
+    structure.beam_gaps.iter().flat_map(|gap| beams.along(gap)).filter(held).collect()
 }
 
 /// kL at the edge of a band [Hz].

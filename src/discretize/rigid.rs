@@ -4,7 +4,7 @@
 //! Until [`Assembly::finish_bodies`] every point is given from its group's reference point (the position of the group's
 //! first node); after it, from the centre of mass, in which the mass matrix is diagonal and constant.
 
-use crate::domains::{Drawing, Laid, Member, Point};
+use crate::domains::{Drawing, Laid, Member, Point, Station};
 use crate::multibody::planar::JointFrame;
 use crate::multibody::{Body, BodyId, BodyName, Drag, Joint};
 use crate::sets::Sets;
@@ -160,9 +160,9 @@ impl Assembly {
         self.frame_at(self.point(a), self.point(b), middle, Vector2::new(angle.cos(), angle.sin()))
     }
 
-    /// What acts across gaps; `chord`: facing beams as SUGAR has them.
-    pub fn gaps<'a>(&self, structure: &'a Structure, chord: bool) -> Vec<Laid<'a, Member>> {
-        Member::lay(&Drawing { structure, point: &|node: NodeId| self.point(node.0), chord })
+    /// What acts across gaps; `chord`: facing beams as SUGAR has them; `stations`: where the segments of each beam are joined.
+    pub fn gaps<'a>(&self, structure: &'a Structure, chord: bool, stations: &[Vec<Station>]) -> Vec<Laid<'a, Member>> {
+        Member::lay(&Drawing { structure, point: &|node: NodeId| self.point(node.0), chord, stations })
     }
 
     /// The frame of a joint at a drawn position, whose x axis lies along `axis`.

@@ -45,6 +45,15 @@ pub trait Domain {
     /// `see` is told each body that forces act on.
     fn bodies(&self, see: impl FnMut(BodyId));
 
+    /// `see` is called with each pair of bodies that the tangent couples; some come more than once.
+    fn pairs(&self, mut see: impl FnMut(BodyId, BodyId)) {
+        let mut bodies = Vec::new();
+        self.bodies(|body| bodies.push(body));
+        for (i, a) in bodies.iter().enumerate() {
+            bodies[..i].iter().for_each(|b| see(*a, *b));
+        }
+    }
+
     /// `r += ∂Π/∂q`, held directions not removed.
     fn add_force(&self, at: At<'_>, given: Self::Given, r: &mut [Pose]);
 
@@ -105,10 +114,11 @@ pub trait Domain {
         false
     }
 
-    /// The mean load along facing beams that closes them at `volts`, less that of contact [N/m], and the least distance [m].
-    fn line_load(&self, at: At<'_>, volts: f64) -> Option<(f64, f64)> {
-        let _ = (at, volts);
-        None
+    /// `r +=` the change of the forces by the shape that beams take within segments under the load along them, which forces on the
+    /// bodies leave out; the sum of the changes' sizes [N].
+    fn add_shape_force(&self, at: At<'_>, given: Self::Given, r: &mut [Pose]) -> f64 {
+        let _ = (at, given, r);
+        0.0
     }
 
     /// Distance left between its two sides [m]; infinite where it has none.

@@ -7,6 +7,15 @@ use crate::multibody::Damper;
 use crate::structure::{GapVoltage, NodeId, Placed, Structure};
 use nalgebra::Vector2;
 
+/// A point along a beam that one body carries.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Station {
+    /// Distance from where the beam, or what lies along it, begins [m].
+    pub at: f64,
+    /// The material point.
+    pub point: Point,
+}
+
 /// A drawing, as domains read it.
 #[derive(Clone, Copy)]
 pub struct Drawing<'a, 'p> {
@@ -16,6 +25,8 @@ pub struct Drawing<'a, 'p> {
     pub point: &'p dyn Fn(NodeId) -> Point,
     /// Facing beams as SUGAR has them.
     pub chord: bool,
+    /// For each beam, the points along it that its segments are joined at; empty where only nodes are known.
+    pub stations: &'p [Vec<Station>],
 }
 
 impl<'a> Drawing<'a, '_> {

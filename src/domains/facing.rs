@@ -1,40 +1,19 @@
-//! Two facing beams: C = ∫ ε·h·α/g(s) ds along their length, and contact along it.
+//! A stretch of two facing beams: C = ∫ ε·h·α/g(s) ds along its length, and contact along it.
 //!
 //! The gap is g(s) = g₀ + w(s), with w the cubic (Hermite) interpolation of the relative displacement and rotation of the
 //! two pairs of ends: z = (w₁, φ₁, w₂, φ₂). Parallel beams get exactly SUGAR's nodal forces and moments, pl/2 and pl²/12
 //! (its `gap2d`); tilted ones differ in second order, because here forces, stiffness and charge come from one potential.
 //! With [`Facing::chord`] they do not: as SUGAR has it, the gap is then measured along the straight lines between the ends, while
 //! its pressure acts through the cubics, so that the forces are the derivatives of no energy.
-//! α is SUGAR's fringe factor 1 + 1.12·g₀/h. Quadrature of the field: Gauss–Legendre with six points; of the contact
-//! pressure: Gauss–Lobatto with nine points, among them the ends, where tilted beams touch first, and the middle.
+//! α is SUGAR's fringe factor 1 + 1.12·g₀/h. Quadrature of the field is Gauss–Legendre, of the contact pressure Gauss–Lobatto,
+//! whose points include the ends, where tilted beams touch first ([`super::quadrature`]): six and nine points on a gap of one
+//! stretch, three and five on each of several.
 
 use super::contact::Contact;
+use super::quadrature::{Abscissa, GAUSS_3, GAUSS_6, LOBATTO_5, LOBATTO_9};
 use nalgebra::{Matrix4, Vector4};
 
-/// Abscissae and weights of six-point Gauss–Legendre quadrature on 0…1.
-const GAUSS: [(f64, f64); 6] = [
-    (0.033_765_242_898_423_99, 0.085_662_246_189_585_17),
-    (0.169_395_306_766_867_74, 0.180_380_786_524_069_3),
-    (0.380_690_406_958_401_55, 0.233_956_967_286_345_52),
-    (0.619_309_593_041_598_4, 0.233_956_967_286_345_52),
-    (0.830_604_693_233_132_3, 0.180_380_786_524_069_3),
-    (0.966_234_757_101_576, 0.085_662_246_189_585_17),
-];
-
-/// Abscissae and weights of nine-point Gauss–Lobatto quadrature on 0…1.
-const LOBATTO: [(f64, f64); 9] = [
-    (0.0, 0.013_888_888_888_888_89),
-    (0.050_121_002_294_270_02, 0.082_747_680_780_404_59),
-    (0.161_406_860_244_631_2, 0.137_269_356_250_081_2),
-    (0.318_441_268_086_910_9, 0.173_214_255_486_522_97),
-    (0.5, 0.185_759_637_188_208_62),
-    (0.681_558_731_913_089_1, 0.173_214_255_486_522_97),
-    (0.838_593_139_755_368_8, 0.137_269_356_250_081_2),
-    (0.949_878_997_705_73, 0.082_747_680_780_404_59),
-    (1.0, 0.013_888_888_888_888_89),
-];
-
-/// Constants of a pair of facing beams.
+/// Constants of a stretch of facing beams.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Facing {
     /// Length [m].
@@ -49,6 +28,8 @@ pub struct Facing {
     pub touch: f64,
     /// The gap along the straight lines between the ends, as SUGAR measures it, instead of that along the cubics.
     pub chord: bool,
+    /// The gap consists of this stretch alone, which takes more points.
+    pub alone: bool,
 }
 
 /// C(z) with gradient and Hessian.
@@ -65,20 +46,62 @@ pub struct FacingCapacitance {
 impl Facing {
     /// Capacitance at the relative end displacements z = (w₁, φ₁, w₂, φ₂); positive w opens the gap.
     pub fn at(&self, z: &Vector4<f64>) -> FacingCapacitance {
-        let mut c = FacingCapacitance { value: 0.0, gradient: Vector4::zeros(), hessian: Matrix4::zeros() };
-        let closest = self.least();
-        for (s, weight) in GAUSS {
-            let (n, m) = (self.shape(s), self.measure(s));
-            let g = self.gap + m.dot(z);
-            let k = self.strength * self.length * weight;
-            let d = g.max(closest);
-            c.value += k * (1.0 / d + (d - g) / (d * d));
-            c.gradient -= n * (k / (d * d));
-            if g > closest {
-                c.hessian += (n * m.transpose() + m * n.transpose()) * (k / (d * d * d));
+        let (mut value, mut gradient, mut hessian) = (0.0, Vector4::zeros(), Matrix4::zeros());
+        self.field(z, |node, [c, slope, curvature]| {
+            let n = Vector4::from(node.shape);
+            value += c;
+            gradient += n * slope;
+            if self.chord {
+                let m = measure(node);
+                hessian += (n * m.transpose() + m * n.transpose()) * (0.5 * curvature);
+            } else {
+                hessian += n * (n * curvature).transpose();
             }
+        });
+        let scale = self.scale();
+        let hessian = Matrix4::from_fn(|i, j| hessian[(i, j)] * (scale[i] * scale[j]));
+        FacingCapacitance { value, gradient: gradient.component_mul(&scale), hessian }
+    }
+
+    /// C(z) alone [F].
+    pub fn capacitance(&self, z: &Vector4<f64>) -> f64 {
+        let mut value = 0.0;
+        self.field(z, |_, [c, ..]| value += c);
+        value
+    }
+
+    /// Its gradient alone.
+    #[inline]
+    pub fn gradient(&self, z: &Vector4<f64>) -> Vector4<f64> {
+        let mut gradient = Vector4::zeros();
+        self.field(z, |node, [_, slope, _]| gradient += Vector4::from(node.shape) * slope);
+        gradient.component_mul(&self.scale())
+    }
+
+    /// Change of ∂Π/∂z at `volts` where the distance at the fraction s of the stretch is smaller by `bent(s)` [m].
+    pub fn shape_force(&self, z: &Vector4<f64>, volts: f64, bent: impl Fn(f64) -> f64) -> Vector4<f64> {
+        let mut change = Vector4::zeros();
+        self.field(z, |node, [.., curvature]| {
+            change += Vector4::from(node.shape) * (0.5 * volts * volts * curvature * bent(node.at));
+        });
+        change.component_mul(&self.scale())
+    }
+
+    /// `see` gets each point of the field's rule with what it adds to C [F], and the derivatives of that with the distance there.
+    #[inline(always)]
+    fn field(&self, z: &Vector4<f64>, mut see: impl FnMut(&Abscissa, [f64; 3])) {
+        let closest = self.least();
+        let (scaled, along) = (z.component_mul(&self.scale()), self.strength * self.length);
+        let rule: &[Abscissa] = if self.alone { &GAUSS_6 } else { &GAUSS_3 };
+        for node in rule {
+            let n = if self.chord { measure(node) } else { Vector4::from(node.shape) };
+            let g = self.gap + n.dot(&scaled);
+            let d = g.max(closest);
+            let (inverse, k) = (1.0 / d, along * node.weight);
+            let slope = -k * inverse * inverse;
+            let curvature = if g > closest { -2.0 * slope * inverse } else { 0.0 };
+            see(node, [k * inverse + slope * (g - d), slope, curvature]);
         }
-        c
     }
 
     /// Least distance that the law of contact knows [m]; the field goes on along its tangent below.
@@ -86,34 +109,37 @@ impl Facing {
         Contact { touch: self.touch, area: 0.0 }.least()
     }
 
-    /// The cubic's weights at the share `s` of the length: g(s) = g₀ + n·z.
+    /// What the shape functions of a unit length take z by.
     #[inline]
-    fn shape(&self, s: f64) -> Vector4<f64> {
-        let l = self.length;
-        Vector4::new(
-            1.0 - 3.0 * s * s + 2.0 * s * s * s,
-            l * (s - 2.0 * s * s + s * s * s),
-            3.0 * s * s - 2.0 * s * s * s,
-            l * (s * s * s - s * s),
-        )
+    fn scale(&self) -> Vector4<f64> {
+        Vector4::new(1.0, self.length, 1.0, self.length)
     }
 
-    /// The weights with which the gap is measured there: g(s) = g₀ + m·z.
+    /// The distance at a point of a rule [m].
     #[inline]
-    fn measure(&self, s: f64) -> Vector4<f64> {
-        if self.chord { Vector4::new(1.0 - s, 0.0, s, 0.0) } else { self.shape(s) }
+    fn distance(&self, node: &Abscissa, z: &Vector4<f64>) -> f64 {
+        self.gap + Vector4::from(node.shape).dot(&z.component_mul(&self.scale()))
     }
 
-    /// Smallest distance among the points where contact is looked at [m], and its derivative with z.
+    fn lobatto(&self) -> &'static [Abscissa] {
+        if self.alone { &LOBATTO_9 } else { &LOBATTO_5 }
+    }
+
+    /// Smallest distance among the points of the contact's rule [m], and its derivative with z.
     pub fn closest(&self, z: &Vector4<f64>) -> (f64, Vector4<f64>) {
-        let at = LOBATTO.map(|(s, _)| (self.gap + self.shape(s).dot(z), s));
-        let (g, s) = at.into_iter().fold((f64::INFINITY, 0.0), |a, b| if b.0 < a.0 { b } else { a });
-        (g, self.shape(s))
+        let mut found = (f64::INFINITY, &self.lobatto()[0]);
+        for node in self.lobatto() {
+            let g = self.distance(node, z);
+            if g < found.0 {
+                found = (g, node);
+            }
+        }
+        (found.0, Vector4::from(found.1.shape).component_mul(&self.scale()))
     }
 
     /// True when the cubic stays above the touching distance, as its Bernstein coefficients do.
     #[inline]
-    fn apart(&self, z: &Vector4<f64>) -> bool {
+    pub fn apart(&self, z: &Vector4<f64>) -> bool {
         let third = self.length / 3.0;
         let least = z[0].min(z[0] + third * z[1]).min(z[2] - third * z[3]).min(z[2]);
         self.gap + least >= self.touch
@@ -129,11 +155,11 @@ impl Facing {
         if self.apart(z) {
             return (first, second);
         }
-        for (s, weight) in LOBATTO {
-            let n = self.shape(s);
-            let g = self.gap + n.dot(z);
+        for node in self.lobatto() {
+            let g = self.distance(node, z);
             if g < self.touch {
-                let (force, slope) = self.piece(weight).force(g);
+                let n = Vector4::from(node.shape).component_mul(&self.scale());
+                let (force, slope) = self.piece(node.weight).force(g);
                 first -= n * force;
                 second -= n * n.transpose() * slope;
             }
@@ -143,16 +169,37 @@ impl Facing {
 
     /// Energy stored in the contact [J].
     pub fn contact_energy(&self, z: &Vector4<f64>) -> f64 {
-        LOBATTO.iter().map(|&(s, weight)| self.piece(weight).energy(self.gap + self.shape(s).dot(z))).sum()
+        if self.apart(z) {
+            return 0.0;
+        }
+        self.lobatto().iter().map(|node| self.piece(node.weight).energy(self.distance(node, z))).sum()
     }
+}
+
+/// The weights with which the gap along a straight line is measured, of a unit length.
+fn measure(node: &Abscissa) -> Vector4<f64> {
+    Vector4::new(1.0 - node.at, 0.0, node.at, 0.0)
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::quadrature::hermite;
     use super::*;
 
     fn facing() -> Facing {
-        Facing { length: 100e-6, gap: 2e-6, strength: 8.854e-12 * 2e-6, height: 2e-6, touch: 0.1e-6, chord: false }
+        Facing {
+            length: 100e-6,
+            gap: 2e-6,
+            strength: 8.854e-12 * 2e-6,
+            height: 2e-6,
+            touch: 0.1e-6,
+            chord: false,
+            alone: true,
+        }
+    }
+
+    fn shape(length: f64, s: f64) -> Vector4<f64> {
+        Vector4::from(hermite(s)).component_mul(&Vector4::new(1.0, length, 1.0, length))
     }
 
     /// Parallel beams: C = εhl/g, and the work-equivalent nodal loads of a uniform pressure, l/2 and l²/12 (SUGAR gap2d).
@@ -177,7 +224,7 @@ mod tests {
             let s = f64::from(k) / f64::from(n);
             let weight = if k == 0 || k == n { 1.0 } else { 2.0 + 2.0 * f64::from(k % 2) };
             let g = f.gap + (1.0 - s) * z[0] + s * z[2];
-            sum -= f.shape(s) * (weight / (3.0 * f64::from(n)) * f.strength * f.length / (g * g));
+            sum -= shape(f.length, s) * (weight / (3.0 * f64::from(n)) * f.strength * f.length / (g * g));
         }
         let loads = f.at(&z).gradient;
         assert!((loads - sum).abs().component_div(&sum.abs()).max() < 1e-12, "{loads} {sum}");

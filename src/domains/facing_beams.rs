@@ -1,70 +1,203 @@
-//! Two beams that face each other: the field and the contact of [`super::facing`], over the four bodies at their ends.
+//! Two rows of beams that face each other: the field and the contact of [`super::facing`], stretch by stretch, over the bodies
+//! of the segments that both are cut into.
 
-use super::approach::{Approach, Point};
+use super::approach::Point;
 use super::contact::touching_distance;
 use super::domain::{At, Domain};
 use super::drawn::{Drawing, Drawn};
 use super::facing::Facing;
-use super::facing_ends;
+use super::facing_side::{Deflection, Flank, Opening, Walk, Weights, back, onto, values};
+use super::facing_stretches::{BeamRows, stretches};
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, BodyId, Pattern};
 use crate::structure::GapVoltage;
-use nalgebra::{SMatrix, Vector2, Vector4};
+use nalgebra::{Matrix4, Vector2, Vector4};
 
-/// Two facing beams with ends a–c and b–d.
+/// Facing beams: the upper side runs from a to b, the lower one from c to d.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FacingBeams {
-    /// Approaches of the ends: a against c, b against d, along the direction that opens the gap.
-    pub ends: [Approach; 2],
-    /// Sign of the slope that a positive rotation makes along the beams.
-    pub side: f64,
-    /// Constants.
-    pub facing: Facing,
+    /// Direction in which the gap opens.
+    pub frame: Opening,
+    /// The upper side, then the lower one.
+    pub sides: [Flank; 2],
+    /// From a to b.
+    stretches: Vec<Stretch>,
 }
 
+/// A part of the gap over which both sides are single cubics.
+#[derive(Debug, Clone, PartialEq)]
+struct Stretch {
+    facing: Facing,
+    segments: [usize; 2],
+    weights: [Weights; 2],
+}
+
+/// A stretch at a configuration.
+struct Local<'a> {
+    stretch: &'a Stretch,
+    /// Its relative end displacements and slopes.
+    z: Vector4<f64>,
+    /// The ends of its segments, upper then lower.
+    ends: [&'a [Deflection; 2]; 2],
+}
+
+/// The sides' parts in a relative displacement.
+const SIGNS: [f64; 2] = [1.0, -1.0];
+
 impl FacingBeams {
-    /// z of [`super::facing`].
-    fn values(&self, at: At<'_>) -> Vector4<f64> {
-        facing_ends::values(at.linear, &self.ends, self.side, at.q)
+    /// Calls `each` for the stretches in turn.
+    #[inline(always)]
+    fn along(&self, at: At<'_>, mut each: impl FnMut(&Local<'_>)) {
+        let [mut upper, mut lower] = [0, 1].map(|i| Walk::new(self.frame, &self.sides[i], at.q, at.linear));
+        for stretch in &self.stretches {
+            let ends = [upper.to(stretch.segments[0]), lower.to(stretch.segments[1])];
+            let part = |side: usize| match self.sides[side].fixed {
+                true => Vector4::zeros(),
+                false => onto(&stretch.weights[side], values(ends[side])),
+            };
+            each(&Local { stretch, z: part(0) - part(1), ends });
+        }
     }
 
-    /// Its change.
-    fn changes(&self, at: At<'_>, dq: &[Pose]) -> Vector4<f64> {
-        facing_ends::changes(at.linear, &self.ends, self.side, at.q, dq)
+    /// The sides that move.
+    #[inline]
+    fn moving(&self) -> impl Iterator<Item = usize> + use<> {
+        let fixed = [self.sides[0].fixed, self.sides[1].fixed];
+        (0..2).filter(move |side| !fixed[*side])
+    }
+
+    /// The points at the ends of a stretch's segments.
+    #[inline]
+    fn points(&self, stretch: &Stretch, side: usize) -> [&Point; 2] {
+        let segment = stretch.segments[side];
+        [&self.sides[side].stations[segment].point, &self.sides[side].stations[segment + 1].point]
     }
 
     /// `r +=` the forces of what is `first` per z.
-    fn add(&self, at: At<'_>, first: Vector4<f64>, r: &mut [Pose]) {
-        let f = facing_ends::rows(at.linear, &self.ends, self.side, at.q).0.transpose() * first;
-        for (i, id) in facing_ends::bodies(&self.ends).into_iter().enumerate() {
-            if let BodyId::Free(k) = id {
-                r[k] += f.fixed_rows::<3>(3 * i);
+    #[inline]
+    fn add(&self, local: &Local<'_>, first: Vector4<f64>, r: &mut [Pose]) {
+        for side in self.moving() {
+            let first = back(&local.stretch.weights[side], first) * SIGNS[side];
+            for (end, point) in self.points(local.stretch, side).into_iter().enumerate() {
+                if let BodyId::Free(k) = point.body {
+                    r[k] += self.frame.force(&local.ends[side][end], [first[2 * end], first[2 * end + 1]]);
+                }
             }
         }
+    }
+
+    /// Change of z.
+    fn change(&self, local: &Local<'_>, dq: &[Pose]) -> Vector4<f64> {
+        let [upper, lower] = [0, 1].map(|side| {
+            let points = self.points(local.stretch, side);
+            let [a, b] = [0, 1].map(|end| self.frame.change(&local.ends[side][end], points[end], dq));
+            onto(&local.stretch.weights[side], Vector4::new(a[0], a[1], b[0], b[1]))
+        });
+        upper - lower
+    }
+
+    /// The stretch with the smallest distance, that distance [m], and its derivative with z.
+    fn closest(&self, at: At<'_>, mut each: impl FnMut(&Local<'_>, f64, Vector4<f64>)) {
+        let mut least = f64::INFINITY;
+        self.along(at, |local| {
+            let (distance, weights) = local.stretch.facing.closest(&local.z);
+            if distance < least {
+                least = distance;
+                each(local, distance, weights);
+            }
+        });
+    }
+
+    /// `tangent +=` what `first` and `second` per z of a stretch add.
+    fn add_stiffness(
+        &self,
+        local: &Local<'_>,
+        (first, second): (Vector4<f64>, Matrix4<f64>),
+        pattern: &Pattern,
+        tangent: &mut BlockMatrix<f64, 3>,
+    ) {
+        let weights = &local.stretch.weights;
+        for (one, other) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+            if self.sides[one].fixed || self.sides[other].fixed {
+                continue;
+            }
+            let ids = [one, other].map(|side| self.points(local.stretch, side).map(|point| point.body));
+            let mut h = second * (SIGNS[one] * SIGNS[other]);
+            if let Some(weights) = &weights[one] {
+                h = weights.tr_mul(&h);
+            }
+            if let Some(weights) = &weights[other] {
+                h *= **weights;
+            }
+            for (i, j) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+                let (BodyId::Free(row), BodyId::Free(column)) = (ids[0][i], ids[1][j]) else { continue };
+                if row < column {
+                    continue;
+                }
+                let part = h.fixed_view::<2, 2>(2 * i, 2 * j).into_owned();
+                let block = self.frame.block(&local.ends[one][i], &local.ends[other][j], &part);
+                if row == column {
+                    tangent.diagonal[row] += block;
+                } else if let Some(at) = pattern.block(row, column) {
+                    tangent.below[at] += block;
+                }
+            }
+        }
+        for side in self.moving() {
+            let first = back(&weights[side], first) * SIGNS[side];
+            for (end, point) in self.points(local.stretch, side).into_iter().enumerate() {
+                if let BodyId::Free(k) = point.body {
+                    tangent.diagonal[k][(2, 2)] += first[2 * end] * local.ends[side][end].bend;
+                }
+            }
+        }
+    }
+
+    /// ∂Π/∂z of a stretch: the field at `volts`, and the contact.
+    #[inline]
+    fn first(local: &Local<'_>, volts: f64) -> Vector4<f64> {
+        let facing = &local.stretch.facing;
+        let field = if volts == 0.0 { Vector4::zeros() } else { facing.gradient(&local.z) * (-0.5 * volts * volts) };
+        if facing.apart(&local.z) { field } else { field + facing.contact(&local.z).0 }
     }
 }
 
 impl Drawn for FacingBeams {
     fn lay<'a>(drawing: &Drawing<'a, '_>, mut put: impl FnMut(&'a str, Option<&'a GapVoltage>, Self)) {
-        for pair in &drawing.structure.beam_gaps {
-            let normal = pair.angle + pair.side * std::f64::consts::FRAC_PI_2;
-            let axis = [normal.cos(), normal.sin()];
-            let [a, b, c, d] = pair.nodes;
-            let ends = [drawing.approach(a, c, axis), drawing.approach(b, d, axis)];
+        let drawn = &drawing.structure.beam_gaps;
+        if drawn.is_empty() {
+            return;
+        }
+        let beams = BeamRows::new(drawing.structure);
+        for gap in drawn {
+            let normal = gap.angle + gap.side * std::f64::consts::FRAC_PI_2;
+            let frame = Opening { axis: Vector2::new(normal.cos(), normal.sin()), side: gap.side };
+            let [a, b, c, d] = gap.nodes;
+            let sides = [[a, b], [c, d]].map(|nodes| beams.side(drawing, gap, nodes));
+            let cut = stretches(&sides);
             let facing = Facing {
-                length: pair.length,
-                gap: pair.gap,
-                strength: pair.permittivity * pair.height * pair.fringe,
-                height: pair.height,
-                touch: pair.touch.unwrap_or(touching_distance(pair.gap)),
+                length: gap.length,
+                gap: gap.gap,
+                strength: gap.permittivity * gap.height * gap.fringe,
+                height: gap.height,
+                touch: gap.touch.unwrap_or(touching_distance(gap.gap)),
                 chord: drawing.chord,
+                alone: cut.len() == 1,
             };
-            put(&pair.name, Some(&pair.voltage), Self { ends, side: pair.side, facing });
+            let stretches = cut.into_iter().map(|cut| Stretch {
+                facing: Facing { length: cut.length, ..facing },
+                segments: cut.segments,
+                weights: cut.weights,
+            });
+            put(&gap.name, Some(&gap.voltage), Self { frame, sides, stretches: stretches.collect() });
         }
     }
 
-    fn moved(self, to: &dyn Fn(Point) -> Point) -> Self {
-        Self { ends: self.ends.map(|end| end.moved(to)), ..self }
+    fn moved(mut self, to: &dyn Fn(Point) -> Point) -> Self {
+        for station in self.sides.iter_mut().flat_map(|side| &mut side.stations) {
+            station.point = to(station.point);
+        }
+        self
     }
 }
 
@@ -72,84 +205,131 @@ impl Domain for FacingBeams {
     type Given = f64;
 
     fn bodies(&self, see: impl FnMut(BodyId)) {
-        facing_ends::bodies(&self.ends).into_iter().for_each(see);
+        self.sides.iter().flat_map(|side| &side.stations).map(|station| station.point.body).for_each(see);
+    }
+
+    fn pairs(&self, mut see: impl FnMut(BodyId, BodyId)) {
+        for stretch in &self.stretches {
+            let ids = [0, 1].map(|side| self.points(stretch, side).map(|point| point.body));
+            let ids = [ids[0][0], ids[0][1], ids[1][0], ids[1][1]];
+            for (i, a) in ids.iter().enumerate() {
+                ids[..i].iter().for_each(|b| see(*a, *b));
+            }
+        }
     }
 
     fn add_force(&self, at: At<'_>, volts: f64, r: &mut [Pose]) {
-        let z = self.values(at);
-        let mut first = self.facing.at(&z).gradient * (-0.5 * volts * volts);
-        first += self.facing.contact(&z).0;
-        self.add(at, first, r);
+        self.along(at, |local| {
+            if volts != 0.0 || !local.stretch.facing.apart(&local.z) {
+                self.add(local, Self::first(local, volts), r);
+            }
+        });
     }
 
     fn add_force_change(&self, at: At<'_>, volts: f64, change: f64, r: &mut [Pose]) {
-        let first = self.facing.at(&self.values(at)).gradient * (-volts * change);
-        self.add(at, first, r);
+        self.along(at, |local| {
+            let first = local.stretch.facing.gradient(&local.z) * (-volts * change);
+            self.add(local, first, r);
+        });
     }
 
     fn add_tangent(&self, at: At<'_>, volts: f64, pattern: &Pattern, tangent: &mut BlockMatrix<f64, 3>) {
-        let z = self.values(at);
-        let (field, (touch, stiffness)) = (self.facing.at(&z), self.facing.contact(&z));
         let factor = -0.5 * volts * volts;
-        let first = field.gradient * factor + touch;
-        let hz = field.hessian * factor + stiffness;
-        let (rows, bend) = facing_ends::rows(at.linear, &self.ends, self.side, at.q);
-        let mut h: SMatrix<f64, 12, 12> = rows.transpose() * hz * rows;
-        for i in 0..4 {
-            // bodies a, b, c, d; ends 0 (a, c) and 1 (b, d)
-            h[(3 * i + 2, 3 * i + 2)] += first[2 * (i % 2)] * bend[i];
-        }
-        add_quad(pattern, &facing_ends::bodies(&self.ends), &h, tangent);
+        self.along(at, |local| {
+            let facing = &local.stretch.facing;
+            let (mut first, mut second) = (Vector4::zeros(), Matrix4::zeros());
+            if volts != 0.0 {
+                let field = facing.at(&local.z);
+                (first, second) = (field.gradient * factor, field.hessian * factor);
+            }
+            if !facing.apart(&local.z) {
+                let (force, stiffness) = facing.contact(&local.z);
+                first += force;
+                second += stiffness;
+            } else if volts == 0.0 {
+                return;
+            }
+            self.add_stiffness(local, (first, second), pattern, tangent);
+        });
     }
 
     fn levers(&self, at: At<'_>, volts: f64, mut lever: impl FnMut(Point, Vector2<f64>)) {
-        let z = self.values(at);
-        let first = self.facing.at(&z).gradient * (-0.5 * volts * volts) + self.facing.contact(&z).0;
-        self.ends[0].levers(first[0], &mut lever);
-        self.ends[1].levers(first[2], &mut lever);
+        self.along(at, |local| {
+            let first = Self::first(local, volts);
+            for side in self.moving() {
+                let first = back(&local.stretch.weights[side], first) * SIGNS[side];
+                for (end, point) in self.points(local.stretch, side).into_iter().enumerate() {
+                    lever(*point, self.frame.axis * -first[2 * end]);
+                }
+            }
+        });
     }
 
     fn capacitance(&self, at: At<'_>) -> f64 {
-        self.facing.at(&self.values(at)).value
+        let mut sum = 0.0;
+        self.along(at, |local| sum += local.stretch.facing.capacitance(&local.z));
+        sum
     }
 
     fn capacitance_change(&self, at: At<'_>, dq: &[Pose]) -> f64 {
-        self.facing.at(&self.values(at)).gradient.dot(&self.changes(at, dq))
+        let mut sum = 0.0;
+        self.along(at, |local| sum += local.stretch.facing.gradient(&local.z).dot(&self.change(local, dq)));
+        sum
     }
 
     fn pull(&self, at: At<'_>) -> f64 {
-        let gradient = self.facing.at(&self.values(at)).gradient;
-        -(gradient[0] + gradient[2])
+        let mut sum = Vector4::zeros();
+        self.along(at, |local| sum += local.stretch.facing.gradient(&local.z));
+        -(sum[0] + sum[2])
     }
 
     fn pull_and_change(&self, at: At<'_>, dq: &[Pose]) -> (f64, f64) {
-        let c = self.facing.at(&self.values(at));
-        let dz = c.hessian * self.changes(at, dq);
-        (-(c.gradient[0] + c.gradient[2]), -(dz[0] + dz[2]))
+        let (mut sum, mut change) = (Vector4::zeros(), Vector4::zeros());
+        self.along(at, |local| {
+            let c = local.stretch.facing.at(&local.z);
+            sum += c.gradient;
+            change += c.hessian * self.change(local, dq);
+        });
+        (-(sum[0] + sum[2]), -(change[0] + change[2]))
+    }
+
+    fn add_shape_force(&self, at: At<'_>, volts: f64, r: &mut [Pose]) -> f64 {
+        let (mut begin, mut size) = (0.0, 0.0);
+        self.along(at, |local| {
+            let Stretch { facing, segments, .. } = local.stretch;
+            let first = Self::first(local, volts);
+            let load = (first[0] + first[2]) / facing.length;
+            let bent = |s: f64| -> f64 {
+                (0..2).map(|side| self.sides[side].bent(segments[side], begin + s * facing.length, load)).sum()
+            };
+            let change = facing.shape_force(&local.z, volts, bent);
+            size += change[0].abs() + change[2].abs();
+            self.add(local, change, r);
+            begin += facing.length;
+        });
+        size
     }
 
     fn closes(&self) -> bool {
         true
     }
 
-    fn line_load(&self, at: At<'_>, volts: f64) -> Option<(f64, f64)> {
-        let z = self.values(at);
-        let force = self.facing.at(&z).gradient * (-0.5 * volts * volts) + self.facing.contact(&z).0;
-        Some(((force[0] + force[2]).abs() / self.facing.length, self.facing.closest(&z).0))
-    }
-
     /// The smallest along the beams.
     fn distance(&self, at: At<'_>) -> f64 {
-        self.facing.closest(&self.values(at)).0
+        let mut least = f64::INFINITY;
+        self.closest(at, |_, distance, _| least = distance);
+        least
     }
 
     fn distance_change(&self, at: At<'_>, dq: &[Pose]) -> f64 {
-        let (_, weights) = self.facing.closest(&self.values(at));
-        weights.dot(&self.changes(at, dq))
+        let mut change = 0.0;
+        self.closest(at, |local, _, weights| change = weights.dot(&self.change(local, dq)));
+        change
     }
 
     fn touching(&self) -> Option<[f64; 2]> {
-        Some([self.facing.touch, self.facing.least()])
+        let facing = &self.stretches.first()?.facing;
+        Some([facing.touch, facing.least()])
     }
 
     fn bearing(&self, at: At<'_>) -> f64 {
@@ -158,28 +338,18 @@ impl Domain for FacingBeams {
     }
 
     fn contact_energy(&self, at: At<'_>) -> f64 {
-        self.facing.contact_energy(&self.values(at))
+        let mut sum = 0.0;
+        self.along(at, |local| sum += local.stretch.facing.contact_energy(&local.z));
+        sum
     }
 
     fn contact_work(&self, at: At<'_>, dq: &[Pose]) -> f64 {
-        let force = self.facing.contact(&self.values(at)).0;
-        if force.x == 0.0 && force.z == 0.0 { 0.0 } else { force.dot(&self.changes(at, dq)) }
-    }
-}
-
-/// Adds the tangent over four bodies.
-fn add_quad(pattern: &Pattern, ids: &[BodyId; 4], h: &SMatrix<f64, 12, 12>, tangent: &mut BlockMatrix<f64, 3>) {
-    for (i, &row) in ids.iter().enumerate() {
-        for (j, &column) in ids.iter().enumerate() {
-            let (BodyId::Free(row), BodyId::Free(column)) = (row, column) else { continue };
-            let block = h.fixed_view::<3, 3>(3 * i, 3 * j);
-            if row == column {
-                tangent.diagonal[row] += block;
-            } else if row > column
-                && let Some(at) = pattern.block(row, column)
-            {
-                tangent.below[at] += block;
+        let mut sum = 0.0;
+        self.along(at, |local| {
+            if !local.stretch.facing.apart(&local.z) {
+                sum += local.stretch.facing.contact(&local.z).0.dot(&self.change(local, dq));
             }
-        }
+        });
+        sum
     }
 }

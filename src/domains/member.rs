@@ -78,6 +78,10 @@ impl Domain for Member {
         each!(self, m => m.bodies(see));
     }
 
+    fn pairs(&self, see: impl FnMut(BodyId, BodyId)) {
+        each!(self, m => m.pairs(see));
+    }
+
     #[inline]
     fn add_force(&self, at: At<'_>, given: f64, r: &mut [Pose]) {
         each!(self, m => m.add_force(at, given, r));
@@ -126,8 +130,8 @@ impl Domain for Member {
         each!(self, m => m.closes())
     }
 
-    fn line_load(&self, at: At<'_>, volts: f64) -> Option<(f64, f64)> {
-        each!(self, m => m.line_load(at, volts))
+    fn add_shape_force(&self, at: At<'_>, given: f64, r: &mut [Pose]) -> f64 {
+        each!(self, m => m.add_shape_force(at, given, r))
     }
 
     fn distance(&self, at: At<'_>) -> f64 {

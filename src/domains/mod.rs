@@ -19,8 +19,9 @@
 //! | [`drawn`], [`element`] | from a drawing to them; elements of their own |
 //! | [`electrodes`], [`facing_beams`], [`stop_pair`] | combs and plates; beams that face each other; stops |
 //! | [`load`], [`moving_frame`] | dead loads, and forces that sources give; the motion of the frame |
-//! | [`facing`] | two facing beams: pressure along a gap that varies over their length |
-//! | `facing_ends` | where facing beams measure |
+//! | [`facing`] | a stretch of two facing beams: pressure along a gap that varies over their length |
+//! | `facing_side`, `facing_stretches` | where facing beams measure; how the segments of both sides cut a gap |
+//! | [`quadrature`] | rules of integration along it |
 //! | [`network`] | potentials of a resistive network driven by ports and sources |
 //! | `laplacian` | potentials in a network of conductors |
 //! | [`thermal`] | mean temperature rise of beams that carry current |
@@ -48,7 +49,8 @@ pub mod element;
 pub mod energy;
 pub mod facing;
 pub mod facing_beams;
-mod facing_ends;
+mod facing_side;
+mod facing_stretches;
 mod input;
 pub mod inputs;
 pub mod lag;
@@ -57,6 +59,7 @@ pub mod load;
 pub mod member;
 pub mod moving_frame;
 pub mod network;
+pub mod quadrature;
 mod reading;
 mod side;
 pub mod stop;
@@ -67,9 +70,10 @@ pub mod thermal;
 pub use approach::Point;
 pub use beam_line::BeamLine;
 pub use domain::{At, Domain, Law};
-pub use drawn::{Drawing, Laid};
+pub use drawn::{Drawing, Laid, Station};
 pub use drive::{Drive, Ramp};
 pub use element::Element;
+pub use facing_stretches::BeamRows;
 pub use input::Input;
 pub use lag::Lags;
 pub use load::Load;

@@ -39,10 +39,10 @@ impl System {
         volts * slope * dv + 0.5 * volts * volts * change
     }
 
-    /// The mean load with which voltage closes a gap between facing beams, less that of contact [N/m], and the least distance [m]; none for
-    /// other gaps.
-    pub fn line_load(&self, gap: usize, q: &[Pose], volts: f64) -> Option<(f64, f64)> {
-        self.members[gap].line_load(self.at(q), volts)
+    /// `r +=` the change of a gap's forces by the shape that beams take within segments under the load along them; the sum of the
+    /// changes' sizes [N].
+    pub fn add_shape_force(&self, gap: usize, q: &[Pose], volts: f64, r: &mut [Pose]) -> f64 {
+        self.members[gap].add_shape_force(self.at(q), volts, r)
     }
 
     /// Distance at which the parts of a gap touch, and the least one that its law of contact knows [m]; none: they never do.

@@ -5,8 +5,9 @@ use super::drawing::{Drawing, Fact};
 use super::sink::Sink;
 use super::suggest::did_you_mean;
 use super::value::short;
+use crate::domains::BeamRows;
 use crate::sets::Sets;
-use crate::structure::{GapVoltage, NodeId, Structure};
+use crate::structure::{BeamGap, GapVoltage, NodeId, Structure};
 use std::collections::HashSet;
 use std::ops::RangeInclusive;
 
@@ -84,19 +85,24 @@ pub(crate) fn check(drawing: &Drawing, sink: &mut Sink) {
     gaps_between_anchors(drawing, sink);
 }
 
-/// A gap along beams acts on their ends; where those are anchored it bends nothing.
+/// A gap whose nodes are all anchored bends nothing, unless beams lie between them.
 fn gaps_between_anchors(drawing: &Drawing, sink: &mut Sink) {
     let structure = &drawing.structure;
     let mut anchored = vec![false; structure.nodes.len()];
     for support in structure.supports.iter().filter(|support| support.held == [true; 3]) {
         anchored[support.node.0] = true;
     }
-    let held: Vec<_> = structure.beam_gaps.iter().filter(|g| g.nodes.iter().all(|n| anchored[n.0])).collect();
+    let all = |gap: &&BeamGap| gap.nodes.iter().all(|node| anchored[node.0]);
+    let beams = BeamRows::new(structure);
+    let held: Vec<_> = structure.beam_gaps.iter().filter(all).filter(|g| beams.along(g).next().is_none()).collect();
     if let Some(gap) = held.first() {
         let more = if held.len() > 1 { format!(" ({} such gaps in all)", held.len()) } else { String::new() };
-        let message =
-            format!("`{}` acts on the ends of its beams, which are all anchored: it bends nothing{more}", gap.name);
-        let help = "divide the beams: draw several gaps in a row between further nodes";
+        let message = format!(
+            "`{}`: its nodes are all anchored, and no beams as long as the gap lie between them: it bends nothing{more}",
+            gap.name
+        );
+        let help =
+            "draw the beam between the gap's nodes, in a straight line, or give the gap the length `l` of that beam";
         sink.warning("W015", drawing.first_named[gap.nodes[0].0], message, help);
     }
 }

@@ -10,7 +10,7 @@ use super::groups::{Groups, MARGIN};
 use super::look::{Seen, look};
 use super::order_error::{relative, strain_shares};
 use crate::discretize::{DiscretizeError, Discretized, discretize_with};
-use crate::domains::Point;
+use crate::domains::{BeamRows, Point};
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, BodyId};
 use crate::options::CompileOptions;
@@ -30,12 +30,12 @@ pub(super) fn stiffen(
     let modes = elastic.modes;
     let shares = strain_shares(bare, options, &elastic.parts, &elastic.lambda[..modes], &elastic.shapes[..modes]);
     let grounded = |node: NodeId| elastic.parts.nodes[node.0].is_some_and(|p| p.body == BodyId::Ground);
-    let electrodes: Vec<(NodeId, NodeId)> =
-        structure.beam_gaps.iter().flat_map(|g| [(g.nodes[0], g.nodes[1]), (g.nodes[2], g.nodes[3])]).collect();
+    let along = BeamRows::new(structure);
+    let electrodes: Vec<usize> = structure.beam_gaps.iter().flat_map(|gap| along.along(gap)).collect();
     let plain = |b: &usize| {
         let beam = &structure.beams[*b];
         let strained = beam.heater.is_some() || beam.temperature.is_some() || beam.material.stress != 0.0;
-        let electrode = electrodes.contains(&(beam.a, beam.b)) || electrodes.contains(&(beam.b, beam.a));
+        let electrode = electrodes.contains(b);
         !strained && !electrode && !grounded(beam.a) && !grounded(beam.b)
     };
     let rise = |mode: usize, g: &[usize]| 0.5 * g.iter().map(|&b| shares[mode][b]).sum::<f64>();

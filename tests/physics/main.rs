@@ -14,6 +14,7 @@ mod excited;
 mod formulations;
 mod free_coordinates;
 mod gaps;
+mod gaps_along_beams;
 mod integrators;
 mod joint_integrators;
 mod junctions;

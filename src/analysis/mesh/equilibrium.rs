@@ -7,9 +7,8 @@
 //! displacement. The finer mesh starts from the state of the coarser one, so that both are on one branch.
 
 pub(super) use super::super::chart::error::SMALL;
-use super::super::gap_pieces::{OF_DEFLECTION, OF_PULL_IN};
+use super::super::gap_shape;
 use super::super::linear_stress::left_out;
-use super::super::sensitivity::deflection_to_voltage;
 use super::super::statics::{
     OperatingPoint, StaticResult, beam_motions, operating_point, operating_point_near, result_at,
 };
@@ -18,7 +17,7 @@ use super::finer::MOST_NEAR_LIMIT;
 use super::hidden::{Hidden, hidden};
 use super::meshed::{chosen, meshed, on};
 use super::softening;
-use super::warnings::{near_buckling, of_fingers, of_heat, of_share_in_pieces, of_stress, worst_in_pieces};
+use super::warnings::{near_buckling, of_fingers, of_heat, of_segments, of_stress};
 use crate::compile::Compiled;
 use crate::netlist::Diagnostic;
 use crate::refine::carry::carried;
@@ -289,15 +288,21 @@ pub fn static_fitted(
 ) -> Result<(Compiled, StaticResult, BeamMotions), AnalysisError> {
     let (order, point) = order(compiled, voltages, compiled.order.segments.clone())?;
     let mut fitted = on(compiled, order)?;
-    let (point, told) = told_of_static(&fitted, point);
+    let told = told_of_static(&fitted, &point);
     fitted.warnings.items.extend(told);
     let (result, curves) = (result_at(&fitted, &point), beam_motions(&fitted, &point.q));
     Ok((fitted, result, curves))
 }
 
-/// What an equilibrium is warned of beside its mesh, as a device comes to it, each with how much it tells of: a share that grows [1], or 1.
-pub(crate) fn told_still(fitted: &Compiled, point: OperatingPoint) -> Vec<(Diagnostic, f64)> {
-    told_with_sizes(fitted, point).1
+/// What an equilibrium of a circuit is warned of, each with its size: an error that grows [1], or 1. Beside what [`told_of_static`] warns of,
+/// the mesh along its gaps, which was chosen without any voltage.
+pub(crate) fn told_still(fitted: &Compiled, point: &OperatingPoint) -> Vec<(Diagnostic, f64)> {
+    let share = stress_left_out(fitted, point);
+    let worst = gap_shape::left_out(fitted, point);
+    let segments = worst.and_then(|worst| Some((of_segments(fitted, &worst)?, worst.1)));
+    let stress = of_stress(fitted, share).map(|warning| (warning, share.unwrap_or(1.0)));
+    let others = told_moving(fitted, point).into_iter().map(|warning| (warning, 1.0));
+    stress.into_iter().chain(segments).chain(others).collect()
 }
 
 /// What a state in motion is warned of that an equilibrium is, too, where it is seen at once.
@@ -305,32 +310,13 @@ pub(crate) fn told_moving(fitted: &Compiled, point: &OperatingPoint) -> Vec<Diag
     of_fingers(fitted, point).into_iter().chain(of_heat(fitted, point)).collect()
 }
 
-/// What an equilibrium is warned of beside its mesh: what a linear model leaves out, gaps in too few pieces, and combs and temperatures beyond
-/// their range.
-pub(super) fn told_of_static(fitted: &Compiled, point: OperatingPoint) -> (OperatingPoint, Vec<Diagnostic>) {
-    let (point, told) = told_with_sizes(fitted, point);
-    (point, told.into_iter().map(|(warning, _)| warning).collect())
+/// What an equilibrium is warned of beside its mesh: what a linear model leaves out, and combs and temperatures beyond their range.
+pub(super) fn told_of_static(fitted: &Compiled, point: &OperatingPoint) -> Vec<Diagnostic> {
+    let stress = of_stress(fitted, stress_left_out(fitted, point));
+    stress.into_iter().chain(told_moving(fitted, point)).chain(near_buckling(point)).collect()
 }
 
-fn told_with_sizes(fitted: &Compiled, point: OperatingPoint) -> (OperatingPoint, Vec<(Diagnostic, f64)>) {
-    let share = if fitted.options.linear { left_out(fitted, &point, &point.q) } else { None };
-    let times = if fitted.structure.beam_gaps.is_empty() {
-        OF_DEFLECTION
-    } else {
-        let electrics = &fitted.parts.system.electrics;
-        let (mut rise, mut drive) = (point.rise.clone(), electrics.drive());
-        electrics.steady(&point.sources, &mut rise, &mut drive);
-        // next to a fold it moves far faster than the voltage
-        OF_DEFLECTION.max(OF_PULL_IN * deflection_to_voltage(fitted, &point.q, &drive))
-    };
-    let points = [(point, times)];
-    let worst = worst_in_pieces(fitted, &points);
-    let sizes = (share.unwrap_or(1.0), worst.as_ref().map_or(1.0, |worst| worst.1));
-    let stress = of_stress(fitted, share).map(|warning| (warning, sizes.0));
-    let pieces = of_share_in_pieces(fitted, worst).map(|warning| (warning, sizes.1));
-    let point = &points[0].0;
-    let others = of_fingers(fitted, point).into_iter().chain(of_heat(fitted, point)).chain(near_buckling(point));
-    let told = stress.into_iter().chain(pieces).chain(others.map(|warning| (warning, 1.0))).collect();
-    let [(point, _)] = points;
-    (point, told)
+/// What a linear model leaves out of the deflection [1].
+fn stress_left_out(fitted: &Compiled, point: &OperatingPoint) -> Option<f64> {
+    if fitted.options.linear { left_out(fitted, point, &point.q) } else { None }
 }

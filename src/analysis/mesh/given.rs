@@ -64,7 +64,8 @@ pub(crate) fn searched(compiled: &Compiled, request: &Request<'_>) -> Result<Jud
     let own = fitted(compiled, request)?;
     let (answer, warnings) = match *request {
         Request::Static { voltages } => {
-            let (point, told) = told_of_static(&own, operating_point(&own, voltages)?);
+            let point = operating_point(&own, voltages)?;
+            let told = told_of_static(&own, &point);
             let result = result_at(&own, &point);
             let warnings = coded(told).into_iter().chain(result.told()).collect();
             (Answer::Static(result), warnings)
@@ -113,7 +114,7 @@ pub(crate) fn judged_static(
 }
 
 fn judged_at(compiled: &Compiled, point: OperatingPoint, estimated_error: Option<f64>) -> Judged {
-    let (point, told) = told_of_static(compiled, point);
+    let told = told_of_static(compiled, &point);
     let result = result_at(compiled, &point);
     let warnings = coded(told).into_iter().chain(result.told()).collect();
     let answer = Answer::Static(result);

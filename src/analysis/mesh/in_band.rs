@@ -76,7 +76,7 @@ pub(super) fn fitted(compiled: &Compiled, options: &HarmonicOptions) -> Result<C
     let order = order(compiled, &fewer)?;
     let mut fitted = on(compiled, order)?;
     let point = Exact::new(&fitted, options)?.into_point();
-    let (_, told) = told_of_static(&fitted, point);
+    let told = told_of_static(&fitted, &point);
     fitted.warnings.items.extend(told);
     Ok(fitted)
 }

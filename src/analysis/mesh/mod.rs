@@ -33,7 +33,6 @@ mod swung;
 mod warnings;
 mod yielded;
 
-use super::gap_pieces::OF_DEFLECTION;
 use super::linear_stress::left_out;
 use super::signal::Signal;
 use super::statics::{OperatingPoint, operating_point};
@@ -52,7 +51,7 @@ use meshed::on;
 pub use path::path_fitted;
 use pull_in::for_pull_in;
 pub use pull_in::pull_in_fitted;
-use warnings::{of_fingers, of_heat, of_pieces, of_stress};
+use warnings::{of_fingers, of_heat, of_stress};
 
 pub(crate) use equilibrium::{told_moving, told_still};
 pub use in_circuit::{in_circuit, twice};
@@ -126,17 +125,15 @@ pub fn fitted_in_time(
     Ok((moving, start))
 }
 
-/// What a run leaves out: the stiffness of stress in a linear model, what beams bend between the ends of a gap along them, and combs and
-/// temperatures beyond their range, as far as that is seen where the run goes to.
+/// What a run leaves out: the stiffness of stress in a linear model, and combs and temperatures beyond their range, as far as that is
+/// seen where the run goes to.
 pub(crate) fn told_of_run(moving: &Compiled, start: Option<&Compiled>, voltages: &PortVoltages) -> Vec<Diagnostic> {
     let share = if moving.options.linear { left_out_in_time(moving, start, voltages) } else { None };
     let drawn = &moving.structure;
-    let some = !(drawn.beam_gaps.is_empty() && drawn.combs.is_empty() && moving.parts.heaters.is_empty());
+    let some = !(drawn.combs.is_empty() && moving.parts.heaters.is_empty());
     let end = if some { operating_point(moving, voltages).ok() } else { None };
-    let points: Vec<(OperatingPoint, f64)> = end.map(|end| (end, OF_DEFLECTION)).into_iter().collect();
-    let there = points.first().map(|(end, _)| end);
-    let told = of_stress(moving, share).into_iter().chain(of_pieces(moving, &points));
-    let told = told.chain(there.and_then(|end| of_fingers(moving, end)));
+    let there = end.as_ref();
+    let told = of_stress(moving, share).into_iter().chain(there.and_then(|end| of_fingers(moving, end)));
     told.chain(there.and_then(|end| of_heat(moving, end))).collect()
 }
 

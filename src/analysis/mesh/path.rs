@@ -4,13 +4,12 @@
 //! once more the other way.
 
 use super::super::continuation::{ContinuationRequest, ContinuationResult, CriticalPoint, Growing, trace};
-use super::super::gap_pieces::OF_DEFLECTION;
 use super::super::linear_stress::left_out;
 use super::super::statics::operating_point;
 use super::super::{AnalysisError, PortVoltages, Watch};
 use super::equilibrium::{ROUNDING, SMALL, size};
 use super::meshed::{chosen, meshed, on};
-use super::warnings::{of_share_in_pieces, of_stress};
+use super::warnings::of_stress;
 use crate::compile::Compiled;
 use crate::refine::doubling::{self, Output};
 use crate::refine::model_order::ModelOrder;
@@ -53,8 +52,7 @@ pub fn path_fitted(
     let order = ModelOrder { estimated_error: order.estimated_error.filter(|e| compared && e.is_finite()), ..order };
     let mut fitted = on(compiled, order)?;
     let share = if fitted.options.linear { left_out_at_end(&fitted, request) } else { None };
-    let worst = result.in_pieces.as_ref().map(|(name, share)| (name.clone(), OF_DEFLECTION * share));
-    let told: Vec<_> = of_stress(&fitted, share).into_iter().chain(of_share_in_pieces(&fitted, worst)).collect();
+    let told = of_stress(&fitted, share);
     fitted.warnings.items.extend(told);
     Ok((fitted, result))
 }

@@ -1,12 +1,11 @@
 //! The mesh for pull-in: both voltages, compared with those of twice the segments.
 
 use super::super::AnalysisError;
-use super::super::gap_pieces::{OF_DEFLECTION, OF_PULL_IN};
 use super::super::linear_stress::left_out;
 use super::super::pull_in::{PullInResult, pull_in, pull_in_with};
-use super::super::statics::{OperatingPoint, operating_point};
+use super::super::statics::operating_point;
 use super::meshed::{chosen, meshed, on};
-use super::warnings::{of_pieces, of_stress};
+use super::warnings::of_stress;
 use crate::compile::Compiled;
 use crate::netlist::Diagnostic;
 use crate::refine::doubling::{self, Output};
@@ -42,27 +41,12 @@ pub fn pull_in_fitted(
     Ok((fitted, result))
 }
 
-/// What a pull-in is warned of beside its mesh: what a linear model leaves out at its voltage, and gaps in too few pieces.
+/// What a pull-in is warned of beside its mesh: what a linear model leaves out at its voltage.
 pub(super) fn told_of_pull_in(fitted: &Compiled, result: &PullInResult) -> Vec<Diagnostic> {
-    let points = points_of_pull_in(fitted, result);
     let before = || operating_point(fitted, &[(result.port.clone(), NEXT * result.pull_in_v)]).ok();
     let point = if fitted.options.linear { before() } else { None };
     let share = point.and_then(|point| left_out(fitted, &point, &point.q));
-    of_stress(fitted, share).into_iter().chain(of_pieces(fitted, &points)).collect()
-}
-
-/// Where gaps along beams may have too few pieces for a pull-in, and how much that counts: next to the fold; and closed, where as
-/// much is left out as at release, but for V².
-pub(super) fn points_of_pull_in(fitted: &Compiled, result: &PullInResult) -> Vec<(OperatingPoint, f64)> {
-    if fitted.structure.beam_gaps.is_empty() {
-        return Vec::new();
-    }
-    let release = result.release_v.map_or(0.0, |volts| (volts / result.pull_in_v).powi(2));
-    let at = |(volts, times): (f64, f64)| {
-        let point = operating_point(fitted, &[(result.port.clone(), volts * result.pull_in_v)]);
-        point.ok().map(|point| (point, times))
-    };
-    [(NEXT, OF_PULL_IN), (1.02, OF_DEFLECTION * release)].into_iter().filter_map(at).collect()
+    of_stress(fitted, share).into_iter().collect()
 }
 
 /// The mesh for pull-in, and the results of every mesh that was looked at.

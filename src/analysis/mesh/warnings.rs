@@ -1,7 +1,6 @@
 //! What fitting a model to a request warns of.
 
 use super::super::contact_range::comb_beyond_told;
-use super::super::gap_pieces;
 use super::super::rotary_left_out;
 use super::super::statics::{OperatingPoint, too_hot};
 use crate::compile::Compiled;
@@ -9,8 +8,8 @@ use crate::netlist::Diagnostic;
 
 /// Code of the warning that a mesh does not hold the tolerance.
 pub(crate) const WARNING: &str = "W040";
-/// Code of the warning that a gap along beams has too few pieces.
-const PIECES: &str = "W042";
+/// Code of the warning that beams along a gap have too few segments for what a circuit does to them.
+const SEGMENTS: &str = "W042";
 /// Code of the warning that a linear model leaves out what its stress does.
 const STRESS: &str = "W041";
 /// Code of the warning that the fingers of a comb go through its other side.
@@ -30,7 +29,7 @@ pub fn warnings(fitted: &Compiled) -> impl Iterator<Item = String> {
         .warnings
         .items
         .iter()
-        .filter(|d| [WARNING, STRESS, PIECES, FINGERS, HEAT, STEPS, ROTARY, BUCKLING].contains(&d.code.as_str()))
+        .filter(|d| [WARNING, STRESS, SEGMENTS, FINGERS, HEAT, STEPS, ROTARY, BUCKLING].contains(&d.code.as_str()))
         .map(|d| d.message.clone())
 }
 
@@ -57,21 +56,6 @@ pub(super) fn of_stress(compiled: &Compiled, share: Option<f64>) -> Option<Diagn
         "the linear model leaves out what stress does to stiffness: the part would buckle".into()
     };
     Some(Diagnostic::warning(STRESS, message, "leave --linear away; modes have the stiffness of stress with it too"))
-}
-
-/// Where a gap along beams has too few pieces at one of these equilibria, whose results are off by so many times the share of its
-/// distance that is left out.
-pub(super) fn of_pieces(compiled: &Compiled, points: &[(OperatingPoint, f64)]) -> Option<Diagnostic> {
-    of_share_in_pieces(compiled, worst_in_pieces(compiled, points))
-}
-
-/// The gap that leaves out most at one of these equilibria, and how far it may be off [1].
-pub(super) fn worst_in_pieces(compiled: &Compiled, points: &[(OperatingPoint, f64)]) -> Option<(String, f64)> {
-    let one = |(point, times): &(OperatingPoint, f64)| {
-        let (name, share) = gap_pieces::left_out(compiled, &point.q, &point.volts)?;
-        Some((name.to_owned(), times * share))
-    };
-    points.iter().filter_map(one).max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 /// Where the fingers of a comb go through its other side at an equilibrium.
@@ -119,8 +103,19 @@ pub(super) fn of_heat(compiled: &Compiled, point: &OperatingPoint) -> Option<Dia
     Some(Diagnostic::warning(HEAT, message, "volts, not millivolts; `thermcond` in W/m/K, `sheetresistance` in Ω"))
 }
 
-/// The same where the gap that leaves out most is known, and how far it may be off.
-pub(super) fn of_share_in_pieces(compiled: &Compiled, worst: Option<(String, f64)>) -> Option<Diagnostic> {
-    let message = gap_pieces::told(compiled, worst)?;
-    Some(Diagnostic::warning(PIECES, message, "divide the beams: draw several gaps in a row between further nodes"))
+/// Where segments are too long for the field along them, with the gap that leaves out most and the error of the deflection [1].
+pub(super) fn of_segments(compiled: &Compiled, worst: &(String, f64)) -> Option<Diagnostic> {
+    let (name, error) = worst;
+    if *error <= compiled.options.tol {
+        return None;
+    }
+    let message = if error.is_finite() {
+        format!(
+            "segments along `{name}`: estimated error of the deflection {error:.1e}, tolerance {:e}",
+            compiled.options.tol
+        )
+    } else {
+        format!("segments along `{name}`: the gap may pull in at this voltage with more of them")
+    };
+    Some(Diagnostic::warning(SEGMENTS, message, "give the model more `segments`"))
 }
