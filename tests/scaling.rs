@@ -14,7 +14,14 @@ use topologies::{NAMES, bodies_per_unit, named};
 
 /// A mechanism with nothing but joints: no gaps, no loads, no sources.
 fn system(model: Model) -> System {
-    System { model, members: Vec::new(), loads: Vec::new(), electrics: Arc::default(), length_scale: 2e-6, beams: Arc::default() }
+    System {
+        model,
+        members: Vec::new(),
+        loads: Vec::new(),
+        electrics: Arc::default(),
+        length_scale: 2e-6,
+        beams: Arc::default(),
+    }
 }
 
 /// What a model costs: bodies, joints, blocks below the diagonal, block products of a factorization and of a solve.

@@ -43,8 +43,14 @@ fn bytes(name: &str, coordinates: usize) -> (usize, usize, usize) {
     let drawing = topologies::sized(name, coordinates);
     let _profiler = dhat::Profiler::builder().testing().build();
     let model = drawing.model();
-    let system =
-        System { model, members: Vec::new(), loads: Vec::new(), electrics: Arc::default(), length_scale: 2e-6, beams: Arc::default() };
+    let system = System {
+        model,
+        members: Vec::new(),
+        loads: Vec::new(),
+        electrics: Arc::default(),
+        length_scale: 2e-6,
+        beams: Arc::default(),
+    };
     let n = system.bodies();
     let kept: (_, Motion, Motion) = (Rodas4::new(&system, &[]), Motion::zeros(n), Motion::zeros(n));
     let stats = dhat::HeapStats::get();

@@ -59,6 +59,14 @@ impl FacingBeams {
         }
     }
 
+    /// The sum of `of` over the stretches.
+    #[inline]
+    fn sum(&self, at: At<'_>, mut of: impl FnMut(&Local<'_>) -> f64) -> f64 {
+        let mut sum = 0.0;
+        self.along(at, |local| sum += of(local));
+        sum
+    }
+
     /// The sides that move.
     #[inline]
     fn moving(&self) -> impl Iterator<Item = usize> + use<> {
@@ -266,15 +274,11 @@ impl Domain for FacingBeams {
     }
 
     fn capacitance(&self, at: At<'_>) -> f64 {
-        let mut sum = 0.0;
-        self.along(at, |local| sum += local.stretch.facing.capacitance(&local.z));
-        sum
+        self.sum(at, |local| local.stretch.facing.capacitance(&local.z))
     }
 
     fn capacitance_change(&self, at: At<'_>, dq: &[Pose]) -> f64 {
-        let mut sum = 0.0;
-        self.along(at, |local| sum += local.stretch.facing.gradient(&local.z).dot(&self.change(local, dq)));
-        sum
+        self.sum(at, |local| local.stretch.facing.gradient(&local.z).dot(&self.change(local, dq)))
     }
 
     fn pull(&self, at: At<'_>) -> f64 {
@@ -333,23 +337,20 @@ impl Domain for FacingBeams {
     }
 
     fn bearing(&self, at: At<'_>) -> f64 {
-        let force = self.facing.contact(&self.values(at)).0;
-        force[0].abs() + force[2].abs()
+        self.sum(at, |local| {
+            let force = local.stretch.facing.contact(&local.z).0;
+            force[0].abs() + force[2].abs()
+        })
     }
 
     fn contact_energy(&self, at: At<'_>) -> f64 {
-        let mut sum = 0.0;
-        self.along(at, |local| sum += local.stretch.facing.contact_energy(&local.z));
-        sum
+        self.sum(at, |local| local.stretch.facing.contact_energy(&local.z))
     }
 
     fn contact_work(&self, at: At<'_>, dq: &[Pose]) -> f64 {
-        let mut sum = 0.0;
-        self.along(at, |local| {
-            if !local.stretch.facing.apart(&local.z) {
-                sum += local.stretch.facing.contact(&local.z).0.dot(&self.change(local, dq));
-            }
-        });
-        sum
+        self.sum(at, |local| match local.stretch.facing.apart(&local.z) {
+            true => 0.0,
+            false => local.stretch.facing.contact(&local.z).0.dot(&self.change(local, dq)),
+        })
     }
 }
