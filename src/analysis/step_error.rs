@@ -1,72 +1,51 @@
-//! How far the steps of a run in time may be off by its end.
+//! How far the steps of a run in time are off, and a run within the tolerance.
 //!
-//! Control of each step bounds what a step adds, not what becomes of it: phases add up, and parts that swing far exchange
-//! energy. So the run has a companion at ten times the tolerance (or in steps of twice the length), and the difference of the two
-//! is measured signal by signal ([`largest_error`]). Were the error proportional to the tolerance, a ninth of the difference would be the
-//! error of the finer run; found are ratios of the two errors from 1 (the single bimorph let go from 7 µm) to 12, so half of it is told, and of
-//! methods of second order, whose ratios are about two, all of it.
+//! Control of each step bounds what a step adds, not what becomes of it: phases add up, and parts that swing far exchange energy. So a run
+//! carries the error of its motion along (`crate::solve::time::defect`), and reports the root mean square error of the worst signal, of its
+//! amplitude. A run whose error is beyond what the mesh leaves of the tolerance is made again at
+//! ```text
+//! t₂ = t₁·min(max((0.7·room/e₁)^(1/q), 0.01), 0.7)
+//! ```
+//! with q = 0.6 at first, and then as the two runs before say, within 0.35 and 1: ever higher modes carry the error, so it falls by less
+//! than in proportion to the tolerance. There are five runs at most, none of which takes more than some seconds; the samples of a run that
+//! does are sent as they come, and it is not made again.
 //!
-//! Where the error is beyond what the mesh leaves of the tolerance, and the run is short, it is made again at a tenth of the tolerance, with the run before as its companion: of
-//! a method of order four or more that costs it less than twice the steps. What takes long is told as it comes, once, with its warning.
-//!
-//! A companion has a third to a half of the steps. One that would take long is given up after 3e6 unknowns times steps, and its difference
-//! is continued in proportion to time, as phases go.
+//! What has no such estimate is compared with a [`companion`]: other methods, equal steps, frames that turn, and models whose parts may
+//! touch, where the error is propagated up to the first contact only.
 
-use super::chart::error::{half_range, largest_error};
+mod companion;
+mod run;
+mod samples;
+
 use super::integrator::Integrator;
-use super::transient::options::STEP_SHARE;
+pub(super) use super::transient::error_log::least;
 use super::transient::{TransientOptions, TransientResult, transient};
 use super::{AnalysisError, Watch};
 use crate::compile::{Compiled, Formulation};
-use crate::equations::bodies::FLOOR;
+use companion::{companion, compared};
+pub use run::Run;
+use run::{AT_THE_END, LOOSER, MOST_AGAIN, MOST_KEPT, room};
+pub(crate) use run::{beyond, unknown};
+use samples::{Kept, Picked, resolved};
+use std::cell::Cell;
 
-/// How much looser a companion is.
-const LOOSER: f64 = 10.0;
-/// Loosest tolerance of a companion.
-const LOOSEST: f64 = 0.3;
-/// Share of the difference that is told.
-const SHARE: f64 = 0.5;
-/// The same for methods of second order, and explicit ones, whose error falls little with the tolerance.
-const SHARE_OF_SECOND: f64 = 1.0;
-/// What is added to what proportion says, where the companion is hardly looser.
-const RESERVE: f64 = 1.2;
-/// Unknowns times steps of a companion, at most.
-const MOST_WORK: f64 = 3e6;
-/// The same of a run that is made again: some seconds.
-const MOST_AGAIN: f64 = 1e7;
-/// Times the steps of a run that one at a tenth of its tolerance takes, of the methods that are run again.
-const MORE: f64 = 2.0;
-/// How much sharper than asked for the steps of a run may be.
-const MOST_SHARPER: f64 = 99.0;
-/// Share of the tolerance that is left to steps in any case.
-const LEAST_ROOM: f64 = 0.3;
-/// Samples of a run that is run again, at most.
-const MOST_KEPT: usize = 1 << 20;
-/// Where the estimate of a single run is made.
-const AT_THE_END: &str = "by the end of the run";
-/// Output times that a companion must have reached to say something.
-const FEWEST: usize = 16;
-/// Output times that are compared, at most about twice as many: evenly spaced ones of a run that has more.
-const ENOUGH: usize = 1000;
-/// Times what the floor of a step's error is that a motion has to swing for a companion to tell anything.
-const RESOLVED: f64 = 10.0;
-/// Share of the scene below which a swing is rounding, whatever swings beside it [1].
-const ROUNDING: f64 = 1e-12;
-/// What swings by less than this share of the scene is rounding: a symmetric part moves so across its axis [1].
-const STILL: f64 = 1e-9;
-
-/// Makes a run: with its options, told of each sample and of its progress.
-pub type Run<'r, T> = &'r mut dyn FnMut(
-    &TransientOptions<'_>,
-    &mut dyn FnMut(f64, &[f64]),
-    Watch<'_>,
-) -> Result<(TransientResult, T), AnalysisError>;
+/// Fraction of the room that the next run aims at.
+const AIM: f64 = 0.7;
+/// The exponent with which an error is supposed to fall with the tolerance, and the range in which two runs teach another.
+const EXPONENT: f64 = 0.6;
+const EXPONENTS: (f64, f64) = (0.35, 1.0);
+/// Least and largest ratio of the tolerances of two runs.
+const RATIOS: (f64, f64) = (0.01, 0.7);
+/// Runs at most.
+const RUNS: usize = 5;
+/// Error of two runs from which on a third is not made: nothing is predictable.
+const HOPELESS: f64 = 0.3;
 
 /// Makes the run that `options` ask for, with [`TransientResult::step_error`], and a warning where that is beyond the tolerance.
-/// `model` is what moves; `sample` and `watch` are told of the run, not of its companion.
+/// `model` is what moves; `sample` receives the samples of the run that is reported, and `watch` the progress of each run in turn.
 ///
 /// # Errors
-/// Those of the run; a companion that fails is none, and leaves the run without the estimate.
+/// Those of the run; another run that fails is none, and leaves the run without what it would have brought.
 pub fn with_step_error<T>(
     options: &TransientOptions<'_>,
     model: &Compiled,
@@ -77,7 +56,7 @@ pub fn with_step_error<T>(
     held(options, model, run, sample, watch).map(|(result, more, _)| (result, more))
 }
 
-/// The same, with the tolerance that the steps of the run followed.
+/// As above, with the tolerance that the steps of the run followed.
 fn held<T>(
     options: &TransientOptions<'_>,
     model: &Compiled,
@@ -85,231 +64,123 @@ fn held<T>(
     sample: &mut dyn FnMut(f64, &[f64]),
     watch: Watch<'_>,
 ) -> Result<(TransientResult, T, f64), AnalysisError> {
-    let unknowns = model.unknowns() as f64;
-    let (companion, whole) = companion(options, model.unknowns(), run, watch)?;
-    let steps = companion.as_ref().map_or(0, |c| c.counters.steps) as f64;
-    // what takes long is told as it comes, and once
-    let again = whole
+    if !propagates(options, model) {
+        let first = companion(options, model.unknowns(), run, watch)?;
+        return compared(options, model, first, run, sample, watch);
+    }
+    let estimated = TransientOptions { estimate: true, ..options.clone() };
+    let made = first(&estimated, model, run, sample, watch)?;
+    let made = sharper(made, &estimated, model, run, watch)?;
+    made.kept.tell(sample);
+    let Made { mut result, more, tol, .. } = made;
+    result.warnings.extend(match result.step_error {
+        Some(error) => beyond(options, error, AT_THE_END),
+        None => Some(unknown(options)),
+    });
+    Ok((result, more, tol))
+}
+
+/// Whether a run of this model propagates its error.
+fn propagates(options: &TransientOptions<'_>, model: &Compiled) -> bool {
+    let system = &model.parts.system;
+    Formulation::of_run(model, options).1 == Integrator::Rodas4
         && options.step.is_none()
-        && is_high(Formulation::of_run(model, options).1)
-        && MORE * MORE * steps * unknowns <= MOST_AGAIN
-        && options.points * options.signals.len() <= MOST_KEPT;
-    if !again {
-        let mut made = once(options, model, (companion, whole), run, sample, watch)?;
-        made.result.warnings.extend(made.result.step_error.and_then(|e| beyond(options, e, AT_THE_END)));
-        return Ok((made.result, made.more, options.tol));
-    }
-    let mut now = options.clone();
-    let mut kept = Kept::default();
-    let mut made = once(&now, model, (companion, whole), run, &mut |t, values| kept.keep(t, values), watch)?;
-    let room = room(options.tol, made.result.estimated_error);
-    while made.result.step_error.is_some_and(|error| error > room)
-        && MORE * made.result.counters.steps as f64 * unknowns <= MOST_AGAIN
-        && now.tol > options.tol / MOST_SHARPER
-    {
-        let sharper = TransientOptions { tol: now.tol / LOOSER, ..options.clone() };
-        let mut others = Kept::default();
-        let companion = (Some(made.picked.clone()), true);
-        match once(&sharper, model, companion, run, &mut |t, values| others.keep(t, values), watch) {
-            Ok(found) if found.result.step_error.is_some() => (made, kept, now) = (found, others, sharper),
-            Err(AnalysisError::Cancelled) => return Err(AnalysisError::Cancelled),
-            _ => break,
-        }
-    }
-    kept.tell(sample);
-    made.result.warnings.extend(made.result.step_error.and_then(|e| beyond(options, e, AT_THE_END)));
-    Ok((made.result, made.more, now.tol))
+        && options.points >= 2
+        && !options.signals.is_empty()
+        && !system.turns()
+        && (0..system.members.len()).all(|member| system.touching(member).is_none())
 }
 
-/// What a tolerance leaves to the steps of a run whose mesh may be off by so much.
-fn room(tol: f64, mesh: Option<f64>) -> f64 {
-    match mesh {
-        Some(mesh) if mesh <= tol => (tol - mesh).max(LEAST_ROOM * tol),
-        _ => tol,
-    }
-}
-
-/// A run with its estimate, and what a sharper one is compared with.
+/// A run with its samples and the tolerance of its steps.
 struct Made<T> {
     result: TransientResult,
     more: T,
-    picked: TransientResult,
+    kept: Kept,
+    tol: f64,
+    /// Its samples have been sent.
+    long: bool,
 }
 
-/// One run, compared with its companion, which may have come to its end.
-fn once<T>(
+/// The first run. Its samples are kept, since it may be made again, until it takes more than some seconds.
+///
+/// # Errors
+/// Those of the run.
+fn first<T>(
     options: &TransientOptions<'_>,
     model: &Compiled,
-    (companion, whole): (Option<TransientResult>, bool),
     run: Run<'_, T>,
     sample: &mut dyn FnMut(f64, &[f64]),
     watch: Watch<'_>,
 ) -> Result<Made<T>, AnalysisError> {
-    let reached = companion.as_ref().map_or(0, |c| c.signals.first().map_or(0, |s| s.2.len()));
-    let mut picked = Picked::new(options, reached);
-    let mut both = |t: f64, values: &[f64]| {
+    let unknowns = model.unknowns() as f64;
+    let long = Cell::new(options.points * options.signals.len() > MOST_KEPT);
+    let (mut kept, mut picked) = (Kept::default(), Picked::new(options, usize::MAX));
+    let mut keep = |t: f64, values: &[f64]| {
         picked.see(values);
-        sample(t, values);
-    };
-    let (mut result, more) = run(options, &mut both, watch)?;
-    // what both do not resolve they have in common
-    let resolved = options.step.is_some() || resolved(&picked, &result, options, model);
-    let signals = picked.signals(&result.signals);
-    let picked = TransientResult { signals, counters: result.counters, ..TransientResult::default() };
-    // one that took the same steps proves nothing
-    let other = |c: &TransientResult| c.counters.steps != result.counters.steps;
-    match companion.filter(|c| (whole || reached >= FEWEST) && other(c) && resolved) {
-        Some(companion) => {
-            let apart = largest_error(&picked, &companion, &|unit| least(unit, options, model));
-            let share = ((reached - 1) * stride(options)) as f64 / (options.points - 1) as f64;
-            let (_, method) = Formulation::of_run(model, options);
-            result.step_error = Some(told_of(options, method) * apart / share.min(1.0));
+        if long.get() {
+            std::mem::take(&mut kept).tell(sample);
+            sample(t, values);
+        } else {
+            kept.keep(t, values);
         }
-        None => result.warnings.extend((!options.signals.is_empty()).then(|| unknown(options))),
-    }
-    Ok(Made { result, more, picked })
+    };
+    let mut steps = 0.0;
+    let mut count = |fraction: f64| {
+        steps += 1.0;
+        long.set(long.get() || steps * unknowns > MOST_AGAIN);
+        watch(fraction)
+    };
+    let (mut result, more) = run(options, &mut keep, &mut count)?;
+    result.step_error = result.step_error.filter(|_| resolved(&picked, &result, options, model));
+    Ok(Made { result, more, kept, tol: options.tol, long: long.get() })
 }
 
-/// Samples that nobody was told of yet.
-#[derive(Default)]
-struct Kept {
-    t: Vec<f64>,
-    values: Vec<f64>,
-}
-
-impl Kept {
-    fn keep(&mut self, t: f64, values: &[f64]) {
-        crate::budget::lay_out(size_of_val(values) + size_of::<f64>());
-        self.t.push(t);
-        self.values.extend(values);
-    }
-
-    fn tell(&self, sample: &mut dyn FnMut(f64, &[f64])) {
-        let width = (self.values.len() / self.t.len().max(1)).max(1);
-        self.t.iter().zip(self.values.chunks(width)).for_each(|(t, values)| sample(*t, values));
-    }
-}
-
-/// Whether the displacements of a run swing by more than what the floor of a step's error hides, in the run as in its companion; or by rounding.
-fn resolved(picked: &Picked, result: &TransientResult, options: &TransientOptions<'_>, model: &Compiled) -> bool {
-    let length = model.parts.system.length_scale;
-    let lengths = result.signals.iter().zip(&picked.columns).filter(|((_, unit, _), _)| unit == "m");
-    let most = lengths.map(|(_, column)| half_range(column)).fold(0.0, f64::max);
-    most < ROUNDING * length || most > RESOLVED * STEP_SHARE * options.tol * FLOOR * length
-}
-
-/// The tolerance of a companion.
-fn loose(options: &TransientOptions<'_>) -> f64 {
-    (LOOSER * options.tol).min(LOOSEST)
-}
-
-/// Share of the difference that is told: of a companion that is hardly looser, more than all of it, since the error is in proportion to
-/// the tolerance at best.
-fn told_of(options: &TransientOptions<'_>, method: Integrator) -> f64 {
-    let share = if is_high(method) { SHARE } else { SHARE_OF_SECOND };
-    match options.step {
-        Some(_) => SHARE,
-        None => share.max(RESERVE / (loose(options) / options.tol - 1.0)),
-    }
-}
-
-/// Of a method whose error falls fast with the length of its steps.
-fn is_high(method: Integrator) -> bool {
-    matches!(method, Integrator::Rodas4 | Integrator::Radau5 | Integrator::Sdirk4)
-}
-
-/// The amplitude below which a signal of this unit stands still.
-pub(super) fn least(unit: &str, options: &TransientOptions<'_>, model: &Compiled) -> f64 {
-    let length = model.parts.system.length_scale;
-    match unit {
-        "m" => STILL * length,
-        "rad" | "K" => STILL,
-        "m/s" => STILL * length / options.stop,
-        "rad/s" => STILL / options.stop,
-        _ => 0.0,
-    }
-}
-
-/// The companion of a run as far as it came, none where it failed; and whether it came to the end.
+/// Runs at sharper tolerances until one is within what its mesh leaves of the tolerance of `options`.
 ///
 /// # Errors
 /// [`AnalysisError::Cancelled`].
-fn companion<T>(
+fn sharper<T>(
+    mut made: Made<T>,
     options: &TransientOptions<'_>,
-    unknowns: usize,
+    model: &Compiled,
     run: Run<'_, T>,
     watch: Watch<'_>,
-) -> Result<(Option<TransientResult>, bool), AnalysisError> {
-    let tol = loose(options);
-    let looser = options.step.is_some() || tol >= 2.0 * options.tol;
-    if options.signals.is_empty() || options.points < 2 || !looser {
-        return Ok((None, false));
-    }
-    let looser = TransientOptions {
-        tol,
-        step: options.step.map(|step| 2.0 * step),
-        events: Vec::new(),
-        keep: false,
-        ..options.clone()
-    };
-    let mut picked = Picked::new(options, usize::MAX);
-    let mut keep = |_: f64, values: &[f64]| picked.see(values);
-    let (mut steps, mut stopped) = (0.0, false);
-    let mut few = |_: f64| {
-        steps += 1.0;
-        stopped = !watch(0.0);
-        !stopped && steps * unknowns as f64 <= MOST_WORK
-    };
-    let ended = run(&looser, &mut keep, &mut few);
-    let counters = ended.as_ref().map_or_else(|_| Default::default(), |(result, _)| result.counters);
-    if stopped {
-        return Err(AnalysisError::Cancelled);
-    }
-    let whole = ended.is_ok();
-    match ended {
-        Ok(_) | Err(AnalysisError::Cancelled) => {
-            let names: Vec<_> = options.signals.iter().map(|name| (name.clone(), String::new(), Vec::new())).collect();
-            Ok((
-                Some(TransientResult { signals: picked.signals(&names), counters, ..TransientResult::default() }),
-                whole,
-            ))
+) -> Result<Made<T>, AnalysisError> {
+    let room = room(options.tol, made.result.estimated_error);
+    let unknowns = model.unknowns() as f64;
+    let mut exponent = EXPONENT;
+    for _ in 1..RUNS {
+        let ratio = match made.result.step_error {
+            Some(error) if error > room && !made.long => (AIM * room / error).powf(1.0 / exponent),
+            _ => break,
+        };
+        let ratio = ratio.clamp(RATIOS.0, RATIOS.1);
+        // the length of a step goes with the fourth root of its tolerance
+        if made.result.counters.steps as f64 * ratio.powf(-0.25) * unknowns > MOST_AGAIN {
+            break;
         }
-        Err(_) => Ok((None, false)),
-    }
-}
-
-/// One of so many output times is compared.
-fn stride(options: &TransientOptions<'_>) -> usize {
-    ((options.points - 1) / ENOUGH).max(1)
-}
-
-/// Samples of some output times.
-struct Picked {
-    stride: usize,
-    seen: usize,
-    most: usize,
-    columns: Vec<Vec<f64>>,
-}
-
-impl Picked {
-    /// At most `most` of them.
-    fn new(options: &TransientOptions<'_>, most: usize) -> Self {
-        Self { stride: stride(options), seen: 0, most, columns: vec![Vec::new(); options.signals.len()] }
-    }
-
-    fn see(&mut self, values: &[f64]) {
-        let wanted = self.seen.is_multiple_of(self.stride);
-        if wanted && self.columns.first().is_some_and(|column| column.len() < self.most) {
-            crate::budget::lay_out(size_of_val(values));
-            self.columns.iter_mut().zip(values).for_each(|(column, value)| column.push(*value));
+        let options = TransientOptions { tol: ratio * made.tol, ..options.clone() };
+        let (mut kept, mut picked) = (Kept::default(), Picked::new(&options, usize::MAX));
+        let mut keep = |t: f64, values: &[f64]| {
+            picked.see(values);
+            kept.keep(t, values);
+        };
+        let (mut result, more) = match run(&options, &mut keep, watch) {
+            Ok(found) => found,
+            Err(AnalysisError::Cancelled) => return Err(AnalysisError::Cancelled),
+            Err(_) => break,
+        };
+        result.step_error = result.step_error.filter(|_| resolved(&picked, &result, &options, model));
+        let errors = made.result.step_error.zip(result.step_error);
+        made = Made { result, more, kept, tol: options.tol, long: false };
+        if let Some((before, after)) = errors {
+            exponent = ((before / after).ln() / -ratio.ln()).clamp(EXPONENTS.0, EXPONENTS.1);
+            if before.min(after) > HOPELESS {
+                break;
+            }
         }
-        self.seen += 1;
     }
-
-    /// Them as the signals of a result.
-    fn signals(self, of: &[(String, String, Vec<f64>)]) -> Vec<(String, String, Vec<f64>)> {
-        of.iter().zip(self.columns).map(|((name, unit, _), column)| (name.clone(), unit.clone(), column)).collect()
-    }
+    Ok(made)
 }
 
 /// The estimate alone, for one of several runs that are alike, at `points` output times; and the tolerance that their steps have to follow
@@ -319,22 +190,13 @@ pub(crate) fn step_error(options: &TransientOptions<'_>, model: &Compiled, watch
         Ok((transient(model, options, sample, watch)?, ()))
     };
     let found = held(options, model, &mut run, &mut |_, _| (), watch);
-    found.map_or((None, options.tol), |(result, (), tol)| (result.step_error, tol))
-}
-
-/// What to say of steps that nothing was compared with.
-pub(crate) fn unknown(options: &TransientOptions<'_>) -> String {
-    format!("nothing tells how far the steps in time are off: the tolerance {:e} is not confirmed", options.tol)
-}
-
-/// What to say of steps whose estimate is beyond the tolerance; `place` says where it was made.
-pub(crate) fn beyond(options: &TransientOptions<'_>, error: f64, place: &str) -> Option<String> {
-    if error <= options.tol {
-        return None;
-    }
-    let way = if options.step.is_some() { "take a shorter --step" } else { "take a smaller --tol" };
-    Some(format!(
-        "the steps in time may be off by {error:.1e} of the amplitude {place}, more than the tolerance {:e}; {way}",
-        options.tol
-    ))
+    // the others need somewhat coarser or sharper steps: whole tenths
+    let tenths = |tol: f64| {
+        let mut held = options.tol;
+        while held > tol {
+            held /= LOOSER;
+        }
+        held
+    };
+    found.map_or((None, options.tol), |(result, (), tol)| (result.step_error, tenths(tol)))
 }

@@ -1,6 +1,7 @@
 //! Motion in time, in the formulation of the model.
 
 mod crossings;
+pub(super) mod error_log;
 pub(super) mod first_step;
 mod folded;
 pub(super) mod options;
@@ -9,13 +10,17 @@ pub(super) mod result;
 mod samples;
 
 use super::formulation::Formulation;
+use super::integrator::Integrator;
 use super::joint_transient::joint_transient;
 use super::{AnalysisError, Watch};
 use crate::compile::Compiled;
 use crate::domains::{Ramp, System};
+use crate::equations::Bodies;
 use crate::solve::baseline::{Solver, SolverKind};
-use crate::solve::time::adaptive::{Advance, Observer};
+use crate::solve::time::adaptive::{Adaptive, Advance, Observer};
+use crate::solve::time::defect::{Estimated, SeeError};
 use crate::solve::time::method::{Motion, Work};
+use crate::solve::time::rodas4::Rodas4;
 pub use first_step::first_step;
 pub use options::TransientOptions;
 use record::{Carrier, record};
@@ -33,6 +38,7 @@ impl Carrier for Compliant<'_> {
         ramp: &Ramp<'_>,
         motion: &mut Motion,
         observe: Observer<'_>,
+        errors: Option<SeeError<'_>>,
     ) -> Result<(Advance, Work), AnalysisError> {
         let options = self.options;
         if options.solver != SolverKind::Recursion && !options.method.takes_solvers() {
@@ -47,6 +53,13 @@ impl Carrier for Compliant<'_> {
         }
         let solver = Solver::new(options.solver, &self.system.model.pattern)?;
         let h = first_step(self.system, options.stop);
+        if let Some(see) = errors.filter(|_| options.method == Integrator::Rodas4 && !self.system.turns()) {
+            let method = Estimated::new(Rodas4::with_solver(solver, self.system, &[]), see);
+            let mut stepper = Adaptive::new(self.system.bodies(), method);
+            let (mut bodies, mut h) = (Bodies::new(self.system, ramp), h);
+            let end = stepper.advance(&mut bodies, motion, &mut h, options.control(), usize::MAX, observe)?;
+            return Ok((end, stepper.work()));
+        }
         let (end, work) = options.method.advance(self.system, solver, ramp, motion, h, options.control(), observe);
         Ok((end?, work))
     }

@@ -139,6 +139,7 @@ impl Tran {
             step: self.step,
             events: self.events.clone(),
             solver: self.solver.linear(),
+            estimate: false,
             keep: true,
         };
         let decides = formulation == Formulation::Auto && self.method.is_none() && self.solver != SolverChoice::Frame;

@@ -24,6 +24,7 @@ mod paths;
 mod relative;
 mod relative_motion;
 mod responses;
+mod run_errors;
 mod scenes;
 mod schemes;
 mod small_parts;

@@ -124,7 +124,7 @@ fn one_step_compared_with_itself() {
     assert!(result.warnings.iter().any(|w| w.contains("nothing tells how far the steps")), "{:?}", result.warnings);
 }
 
-/// With a companion that is hardly looser (0.3 beside 0.15), what is told of the steps is no less than they are off.
+/// Loose steps (0.15, after a first run at 0.3) report their error over 160 periods within a factor of 1.5. Closed form.
 #[test]
 fn loose_steps_tell_enough() {
     let text = OSCILLATOR.replace("damper2d * [f m] [bx=1e-6]", "");
@@ -140,7 +140,8 @@ fn loose_steps_tell_enough() {
     let (result, ()) = with_step_error(&options, &compiled, &mut run, &mut see, &mut |_| true).unwrap();
     let off = |(t, x): &(f64, f64)| (x - 1e-6 * (1e5 * t).cos()).powi(2);
     let error = (samples.iter().map(off).sum::<f64>() / samples.len() as f64).sqrt() / 1e-6;
-    assert!(result.step_error.unwrap() >= error, "{:?} told, {error:e}", result.step_error);
+    let told = result.step_error.unwrap();
+    assert!((1.0 / 1.5..1.5).contains(&(told / error)), "{told:e} reported, {error:e}");
 }
 
 /// A parameter that moves drawn nodes is no load to let go.

@@ -12,6 +12,7 @@ use crate::multibody::rcr::Linkage;
 use crate::multibody::rcr::Reduction;
 use crate::solve::SolveError;
 use crate::solve::time::adaptive::{Advance, Control, Observer, failed};
+use crate::solve::time::defect::SeeError;
 use crate::solve::time::method::{Motion, Work};
 
 /// Joint coordinates on the way.
@@ -44,6 +45,7 @@ impl Carrier for InJoints<'_> {
         ramp: &Ramp<'_>,
         motion: &mut Motion,
         observe: Observer<'_>,
+        _: Option<SeeError<'_>>,
     ) -> Result<(Advance, Work), AnalysisError> {
         let linkage = &self.linkage;
         let loads = JointLoads::new(self.system, linkage, ramp);

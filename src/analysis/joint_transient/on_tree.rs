@@ -13,6 +13,7 @@ use crate::domains::{Ramp, System};
 use crate::equations::{Bodies, Joints};
 use crate::solve::baseline::SolverKind;
 use crate::solve::time::adaptive::{Adaptive, Advance, Observer};
+use crate::solve::time::defect::{Estimated, SeeError};
 use crate::solve::time::joint_rodas4::JointRodas4;
 use crate::solve::time::method::{Motion, Work};
 use std::sync::Arc;
@@ -63,6 +64,7 @@ impl Carrier for OnTree<'_> {
         ramp: &Ramp<'_>,
         motion: &mut Motion,
         observe: Observer<'_>,
+        errors: Option<SeeError<'_>>,
     ) -> Result<(Advance, Work), AnalysisError> {
         let options = self.options;
         if options.solver != SolverKind::Recursion {
@@ -76,8 +78,13 @@ impl Carrier for OnTree<'_> {
         }
         let mut h = first_step(self.system, options.stop);
         let method = JointRodas4::new(Arc::clone(self.joints), h, &[]);
-        let mut stepper = Adaptive::new(self.system.bodies(), method);
         let mut bodies = Bodies::new(self.system, ramp);
+        if let Some(see) = errors {
+            let mut stepper = Adaptive::new(self.system.bodies(), Estimated::new(method, see));
+            let end = stepper.advance(&mut bodies, motion, &mut h, options.control(), usize::MAX, observe)?;
+            return Ok((end, stepper.work()));
+        }
+        let mut stepper = Adaptive::new(self.system.bodies(), method);
         let end = stepper.advance(&mut bodies, motion, &mut h, options.control(), usize::MAX, observe)?;
         Ok((end, stepper.work()))
     }

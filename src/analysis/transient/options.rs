@@ -31,6 +31,9 @@ pub struct TransientOptions<'a> {
     /// What solves the linear systems of the method. The result is the same to rounding; all but the recursion are
     /// baselines, and Radau5 and rk45 have none.
     pub solver: SolverKind,
+    /// Whether the run estimates how far its steps are off, see [`TransientResult::step_error`](super::TransientResult::step_error): Rodas4 with
+    /// steps that follow the tolerance, in a frame that does not turn. The motion is bit-identical.
+    pub estimate: bool,
     /// Whether the result holds the samples, default true; without, only who is told them as they come has them.
     pub keep: bool,
 }
@@ -49,6 +52,7 @@ impl Default for TransientOptions<'_> {
             step: None,
             events: Vec::new(),
             solver: SolverKind::default(),
+            estimate: false,
             keep: true,
         }
     }

@@ -6,6 +6,7 @@ use super::super::stability::Stability;
 use super::super::statics::{operating_point, source_vector, told_at};
 use super::super::{AnalysisError, Watch};
 use super::crossings::Crossings;
+use super::error_log::{ErrorLog, Lost};
 use super::folded;
 use super::options::{TransientOptions, check};
 use super::result::{Counters, TransientResult};
@@ -14,6 +15,7 @@ use crate::compile::Compiled;
 use crate::domains::Ramp;
 use crate::multibody::Body;
 use crate::solve::time::adaptive::{Advance, Observer};
+use crate::solve::time::defect::SeeError;
 use crate::solve::time::method::{Motion, Work};
 
 /// Times of a run at which its stability is looked at, the end included.
@@ -30,7 +32,7 @@ pub(in crate::analysis) trait Carrier {
         Ok(())
     }
 
-    /// Advances it; `observe` sees each step.
+    /// Advances it; `observe` sees each step, and `errors` the error of the motion at its end where the method propagates it.
     ///
     /// # Errors
     /// See [`AnalysisError`].
@@ -39,6 +41,7 @@ pub(in crate::analysis) trait Carrier {
         ramp: &Ramp<'_>,
         motion: &mut Motion,
         observe: Observer<'_>,
+        errors: Option<SeeError<'_>>,
     ) -> Result<(Advance, Work), AnalysisError>;
 }
 
@@ -65,6 +68,7 @@ pub(in crate::analysis) fn record(
     let (asked, held) = ((compiled, options), (&ramp, &volts[..]));
     let mut crossings = Crossings::start(asked, held, (&motion, &rise))?;
     let mut samples = Samples::start(asked, held, &signals, sample, &motion);
+    let mut log = options.estimate.then(|| ErrorLog::start((compiled, options.stop), held, &signals, &motion));
     let mut stability = Stability::new(system);
     let mut looks = 0;
     let mut beyond = None;
@@ -83,7 +87,9 @@ pub(in crate::analysis) fn record(
         }
         watch(((s + h) / options.stop).min(1.0))
     };
-    let (end, work) = carrier.advance(&ramp, &mut motion, &mut observe).map_err(|error| match error {
+    let mut errors = log.as_mut().map(|log| |t: f64, motion: &Motion, error: &Motion| log.see(t, motion, error));
+    let see = errors.as_mut().map(|see| see as SeeError<'_>);
+    let (end, work) = carrier.advance(&ramp, &mut motion, &mut observe, see).map_err(|error| match error {
         AnalysisError::StepFailed { t, dt, detail } => {
             AnalysisError::StepFailed { t, dt, detail: detail + &folded::told(compiled, &motion.q) }
         }
@@ -92,6 +98,7 @@ pub(in crate::analysis) fn record(
     if end == Advance::Stopped {
         return Err(beyond.unwrap_or(AnalysisError::Cancelled));
     }
+    let estimate = log.and_then(|log| log.estimate(options));
     let named = options.signals.iter().zip(&signals).zip(samples.columns);
     Ok(TransientResult {
         t: samples.t,
@@ -106,10 +113,22 @@ pub(in crate::analysis) fn record(
         },
         unknowns: compiled.unknowns(),
         estimated_error: compiled.order.estimated_error,
-        step_error: None,
+        step_error: estimate.as_ref().map(|estimate| estimate.error),
         events: crossings.events,
-        warnings: begun.into_iter().chain(stability.told()).collect(),
+        warnings: begun.into_iter().chain(stability.told()).chain(estimate.and_then(|e| e.lost).map(lost)).collect(),
     })
+}
+
+/// The warning of a signal that is lost.
+fn lost(Lost { signal, t, chaotic }: Lost) -> String {
+    match chaotic {
+        true => format!(
+            "{signal} is not predictable after {t:.2e} s: neighbouring motions part exponentially there, at any tolerance; only its statistics hold"
+        ),
+        false => format!(
+            "the phase of {signal} is lost after {t:.2e} s: by the steps it is off by more than 0.3 of its range; take a smaller --tol"
+        ),
+    }
 }
 
 /// Where a run begins, how much warmer its heaters are there [K], and what there is to tell of that: at rest as drawn, or in the

@@ -48,7 +48,7 @@ pub struct TransientResult {
     pub unknowns: usize,
     /// Largest estimated relative error by the mesh [1]; none without an estimate.
     pub estimated_error: Option<f64>,
-    /// How far the steps in time may be off by the end, of the amplitude [1]; none where they are not compared, see
+    /// Estimated root mean square error of the worst signal by the steps in time, of its amplitude [1]; none without an estimate, see
     /// [`super::step_error`].
     pub step_error: Option<f64>,
     /// Crossings asked for and contacts of gaps, in order of time.

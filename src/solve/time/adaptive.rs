@@ -126,6 +126,8 @@ impl<M, X: Unknown> Adaptive<M, X> {
                 pace.accept(step, error);
                 (steps, *h) = (steps + 1, pace.h);
                 self.steps += 1;
+                let ends = [&self.before, &*motion];
+                self.method.accepted(equations, (pace.t - step, step), ends, &self.carried_before);
                 if !observe(pace.t - step, step, &self.before, motion) {
                     return Ok(Advance::Stopped);
                 }

@@ -17,6 +17,8 @@
 //! Reference: E. Hairer, G. Wanner, "Solving Ordinary Differential Equations II" (1996), §IV.7 (RODAS) and §VI.3 (the direct
 //! approach to differential-algebraic systems).
 
+mod defect;
+mod error;
 mod ports;
 mod stages;
 mod tableau;
@@ -32,6 +34,7 @@ use crate::multibody::relative::columns::Four;
 use crate::multibody::relative::dynamics::Stresses;
 use crate::multibody::relative::geometric::{self, Geometric};
 use crate::multibody::relative::placed::{Placed, place_of};
+use error::Defect;
 use ports::Ports;
 use stages::Stages;
 use std::sync::Arc;
@@ -65,6 +68,8 @@ pub struct JointRodas4 {
     is_placed: bool,
     /// Accelerations are those of the motion to come.
     resumed: bool,
+    /// The error of the motion, where it is wanted.
+    defect: Option<Box<Defect>>,
     /// About the shortest time in which something moves [s].
     shortest: f64,
     work: Work,
@@ -95,6 +100,7 @@ impl JointRodas4 {
             rate: electrics.drive(),
             is_placed: false,
             resumed: false,
+            defect: None,
             shortest,
             work: Work::default(),
             joints,

@@ -32,6 +32,17 @@ pub trait Method<E: Equations> {
         error: &mut Motion<E::Unknown>,
     ) -> Result<(), StepFailure>;
 
+    /// A step of length `h` [s] from time `t` [s] between these ends is accepted; `carried` is what the method carried at its start.
+    fn accepted(
+        &mut self,
+        equations: &mut E,
+        (t, h): (f64, f64),
+        ends: [&Motion<E::Unknown>; 2],
+        carried: &[Motion<E::Unknown>],
+    ) {
+        let _ = (equations, t, h, ends, carried);
+    }
+
     /// What goes from step to step besides the motion: put back when a step is rejected.
     fn carried(&mut self) -> &mut [Motion<E::Unknown>] {
         &mut []

@@ -29,12 +29,14 @@
 //! | [`formulated`] | either, by the formulation of a model |
 //! | [`radau5`] | Radau IIA of order 5: one real and one complex block factorization a step |
 //! | [`average_field`] | average vector field, which keeps the energy |
+//! | [`defect`] | the error of a run with Rodas4, by its defect |
 //! | [`gyration`] | Coriolis' force in a frame that turns |
 //! | [`side_by_side`] | runs of many variants in lanes |
 
 pub mod adaptive;
 pub mod alpha;
 pub mod average_field;
+pub mod defect;
 pub mod dirk;
 pub mod dormand_prince;
 pub mod doubling;

@@ -18,11 +18,13 @@
 //!
 //! Reference: E. Hairer, G. Wanner, "Solving Ordinary Differential Equations II" (1996), §IV.7 and table 7.1 (RODAS).
 
+mod defect;
 pub mod lanes;
 mod ports;
 mod stages;
 pub(in crate::solve) mod tableau;
 
+use super::defect::Propagates;
 pub use super::method::Motion;
 use super::method::{Method, StepFailure, Work};
 use crate::domains::{Drive, System};
@@ -31,6 +33,7 @@ use crate::equations::linear::{LinearSolver, Recursion};
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, forces};
 use crate::solve::time::gyration::{Gyration, held_out, skew};
+use defect::Defect;
 use ports::{Ports, Turning};
 use stages::Stages;
 use tableau::{ALPHA, GAMMA, moves_on};
@@ -48,6 +51,8 @@ pub struct Rodas4<S = Recursion> {
     scratch: Vec<Pose>,
     /// ∂motion/∂(final voltage of a source), one for each source given to [`Rodas4::new`]; advanced with the motion.
     pub sensitivity: Vec<Motion>,
+    /// The error of the motion, where it is wanted.
+    defect: Option<Box<Defect>>,
     work: Work,
 }
 
@@ -70,6 +75,7 @@ impl<S: LinearSolver> Rodas4<S> {
             ports: Ports::new(system, sources),
             scratch: vec![Pose::zeros(); if system.turns() { system.bodies() } else { 0 }],
             sensitivity: vec![Motion::zeros(system.bodies()); sources.len()],
+            defect: None,
             work: Work::default(),
         }
     }
@@ -117,7 +123,9 @@ impl<S: LinearSolver> Method<Bodies<'_>> for Rodas4<S> {
             }
             let (q, force) = self.stages.place(i, motion);
             if i == 0 {
+                self.defect.iter_mut().for_each(|defect| defect.before_forces(force));
                 system.add_tangent(q, &self.drive, &mut self.w, force);
+                self.defect.iter_mut().for_each(|defect| defect.after_forces(force));
                 self.ports.keep_tangent(&self.w);
                 forces::add_inertia(model, 1.0 / (gh * gh), 1.0 / gh, &mut self.w);
                 model.project_matrix(&mut self.w);
@@ -155,6 +163,19 @@ impl<S: LinearSolver> Method<Bodies<'_>> for Rodas4<S> {
 
     fn work(&self) -> Work {
         self.work
+    }
+}
+
+impl<'s, S: LinearSolver> Propagates<'s> for Rodas4<S> {
+    fn begin_error(&mut self) {
+        self.defect = Some(Box::new(Defect::zeros(self.stages.forcing.len())));
+    }
+
+    fn error(&mut self, bodies: &mut Bodies<'s>, (s, h): (f64, f64), ends: [&Motion; 2], _: &[Motion]) -> &Motion {
+        let Self { solver, w, drive, defect, .. } = self;
+        let Bodies { system, ramp, .. } = *bodies;
+        let defect = defect.get_or_insert_with(|| Box::new(Defect::zeros(system.bodies())));
+        defect.advance(system, (ramp, drive), (&*solver, w), (s, h), ends)
     }
 }
 

@@ -225,7 +225,7 @@ class TransientResult:
     warnings: tuple[str, ...] = ()
     """What may surprise about the run."""
     step_error: float | None = None
-    """How far the steps in time may be off by the end, of the amplitude [1]; None where they were not compared."""
+    """Estimated root mean square error of the worst signal by the steps in time, of its amplitude [1]; None without an estimate."""
 
     def __repr__(self) -> str:
         names = ", ".join(f"{name} [{unit}]" for name, unit in self.units.items())

@@ -1,0 +1,181 @@
+//! A run compared with a companion at ten times the tolerance, or in steps of twice the length: of methods that do not propagate their
+//! error, of equal steps, and of parts that touch.
+//!
+//! Were the error proportional to the tolerance, a ninth of the difference would be the error of the finer run; found are ratios of the two
+//! errors from 1 to 12, so half of it is reported, and of methods of second order, whose ratios are about two, all of it.
+//!
+//! Where the error is beyond what the mesh leaves of the tolerance, and the run is short, it is made again at a tenth of the tolerance, with
+//! the run before as its companion: of a method of order four or more that costs it less than twice the steps.
+//!
+//! A companion has a third to a half of the steps. One that would take long is given up after 3e6 unknowns times steps, and its difference
+//! is continued in proportion to time, as phases go.
+
+use super::super::chart::error::largest_error;
+use super::super::integrator::Integrator;
+use super::super::transient::error_log::least;
+use super::super::transient::{TransientOptions, TransientResult};
+use super::super::{AnalysisError, Watch};
+use super::run::{AT_THE_END, LOOSER, MOST_AGAIN, MOST_KEPT, MOST_WORK, Run, beyond, loose, room, unknown};
+use super::samples::{Kept, Picked, resolved, stride};
+use crate::compile::{Compiled, Formulation};
+
+/// Share of the difference that is told.
+const SHARE: f64 = 0.5;
+/// The same for methods of second order, and explicit ones, whose error falls little with the tolerance.
+const SHARE_OF_SECOND: f64 = 1.0;
+/// What is added to what proportion says, where the companion is hardly looser.
+const RESERVE: f64 = 1.2;
+/// Times the steps of a run that one at a tenth of its tolerance takes, of the methods that are run again.
+const MORE: f64 = 2.0;
+/// How much sharper than asked for the steps of a run may be.
+const MOST_SHARPER: f64 = 99.0;
+/// Output times that a companion must have reached to say something.
+const FEWEST: usize = 16;
+
+/// Makes a run whose first one at a looser tolerance, its companion, came as far as this; returns the tolerance of its steps, too.
+pub(super) fn compared<T>(
+    options: &TransientOptions<'_>,
+    model: &Compiled,
+    (companion, whole): (Option<TransientResult>, bool),
+    run: Run<'_, T>,
+    sample: &mut dyn FnMut(f64, &[f64]),
+    watch: Watch<'_>,
+) -> Result<(TransientResult, T, f64), AnalysisError> {
+    let unknowns = model.unknowns() as f64;
+    let steps = companion.as_ref().map_or(0, |c| c.counters.steps) as f64;
+    // what takes long is told as it comes, and once
+    let again = whole
+        && options.step.is_none()
+        && is_high(Formulation::of_run(model, options).1)
+        && MORE * MORE * steps * unknowns <= MOST_AGAIN
+        && options.points * options.signals.len() <= MOST_KEPT;
+    if !again {
+        let mut made = once(options, model, (companion, whole), run, sample, watch)?;
+        made.result.warnings.extend(made.result.step_error.and_then(|e| beyond(options, e, AT_THE_END)));
+        return Ok((made.result, made.more, options.tol));
+    }
+    let mut now = options.clone();
+    let mut kept = Kept::default();
+    let mut made = once(&now, model, (companion, whole), run, &mut |t, values| kept.keep(t, values), watch)?;
+    let room = room(options.tol, made.result.estimated_error);
+    while made.result.step_error.is_some_and(|error| error > room)
+        && MORE * made.result.counters.steps as f64 * unknowns <= MOST_AGAIN
+        && now.tol > options.tol / MOST_SHARPER
+    {
+        let sharper = TransientOptions { tol: now.tol / LOOSER, ..options.clone() };
+        let mut others = Kept::default();
+        let companion = (Some(made.picked.clone()), true);
+        match once(&sharper, model, companion, run, &mut |t, values| others.keep(t, values), watch) {
+            Ok(found) if found.result.step_error.is_some() => (made, kept, now) = (found, others, sharper),
+            Err(AnalysisError::Cancelled) => return Err(AnalysisError::Cancelled),
+            _ => break,
+        }
+    }
+    kept.tell(sample);
+    made.result.warnings.extend(made.result.step_error.and_then(|e| beyond(options, e, AT_THE_END)));
+    Ok((made.result, made.more, now.tol))
+}
+
+/// A run with its estimate, and what a sharper one is compared with.
+struct Made<T> {
+    result: TransientResult,
+    more: T,
+    picked: TransientResult,
+}
+
+/// One run, compared with its companion, which may have come to its end.
+fn once<T>(
+    options: &TransientOptions<'_>,
+    model: &Compiled,
+    (companion, whole): (Option<TransientResult>, bool),
+    run: Run<'_, T>,
+    sample: &mut dyn FnMut(f64, &[f64]),
+    watch: Watch<'_>,
+) -> Result<Made<T>, AnalysisError> {
+    let reached = companion.as_ref().map_or(0, |c| c.signals.first().map_or(0, |s| s.2.len()));
+    let mut picked = Picked::new(options, reached);
+    let mut both = |t: f64, values: &[f64]| {
+        picked.see(values);
+        sample(t, values);
+    };
+    let (mut result, more) = run(options, &mut both, watch)?;
+    // what both do not resolve they have in common
+    let resolved = options.step.is_some() || resolved(&picked, &result, options, model);
+    let signals = picked.signals(&result.signals);
+    let picked = TransientResult { signals, counters: result.counters, ..TransientResult::default() };
+    // one that took the same steps proves nothing
+    let other = |c: &TransientResult| c.counters.steps != result.counters.steps;
+    match companion.filter(|c| (whole || reached >= FEWEST) && other(c) && resolved) {
+        Some(companion) => {
+            let apart = largest_error(&picked, &companion, &|unit| least(unit, options, model));
+            let share = ((reached - 1) * stride(options)) as f64 / (options.points - 1) as f64;
+            let (_, method) = Formulation::of_run(model, options);
+            result.step_error = Some(told_of(options, method) * apart / share.min(1.0));
+        }
+        None => result.warnings.extend((!options.signals.is_empty()).then(|| unknown(options))),
+    }
+    Ok(Made { result, more, picked })
+}
+
+/// Share of the difference that is told: of a companion that is hardly looser, more than all of it, since the error is in proportion to
+/// the tolerance at best.
+fn told_of(options: &TransientOptions<'_>, method: Integrator) -> f64 {
+    let share = if is_high(method) { SHARE } else { SHARE_OF_SECOND };
+    match options.step {
+        Some(_) => SHARE,
+        None => share.max(RESERVE / (loose(options) / options.tol - 1.0)),
+    }
+}
+
+/// Of a method whose error falls fast with the length of its steps.
+fn is_high(method: Integrator) -> bool {
+    matches!(method, Integrator::Rodas4 | Integrator::Radau5 | Integrator::Sdirk4)
+}
+
+/// The companion of a run as far as it came, none where it failed; and whether it came to the end.
+///
+/// # Errors
+/// [`AnalysisError::Cancelled`].
+pub(super) fn companion<T>(
+    options: &TransientOptions<'_>,
+    unknowns: usize,
+    run: Run<'_, T>,
+    watch: Watch<'_>,
+) -> Result<(Option<TransientResult>, bool), AnalysisError> {
+    let tol = loose(options);
+    let looser = options.step.is_some() || tol >= 2.0 * options.tol;
+    if options.signals.is_empty() || options.points < 2 || !looser {
+        return Ok((None, false));
+    }
+    let looser = TransientOptions {
+        tol,
+        step: options.step.map(|step| 2.0 * step),
+        events: Vec::new(),
+        keep: false,
+        ..options.clone()
+    };
+    let mut picked = Picked::new(options, usize::MAX);
+    let mut keep = |_: f64, values: &[f64]| picked.see(values);
+    let (mut steps, mut stopped) = (0.0, false);
+    let mut few = |_: f64| {
+        steps += 1.0;
+        stopped = !watch(0.0);
+        !stopped && steps * unknowns as f64 <= MOST_WORK
+    };
+    let ended = run(&looser, &mut keep, &mut few);
+    let counters = ended.as_ref().map_or_else(|_| Default::default(), |(result, _)| result.counters);
+    if stopped {
+        return Err(AnalysisError::Cancelled);
+    }
+    let whole = ended.is_ok();
+    match ended {
+        Ok(_) | Err(AnalysisError::Cancelled) => {
+            let names: Vec<_> = options.signals.iter().map(|name| (name.clone(), String::new(), Vec::new())).collect();
+            Ok((
+                Some(TransientResult { signals: picked.signals(&names), counters, ..TransientResult::default() }),
+                whole,
+            ))
+        }
+        Err(_) => Ok((None, false)),
+    }
+}

@@ -1,0 +1,81 @@
+//! Samples of a run that its estimate keeps.
+
+use super::super::chart::error::half_range;
+use super::super::transient::options::STEP_SHARE;
+use super::super::transient::{TransientOptions, TransientResult};
+use crate::compile::Compiled;
+use crate::equations::bodies::FLOOR;
+
+/// Output times that are compared, at most about twice as many: evenly spaced ones of a run that has more.
+const ENOUGH: usize = 1000;
+/// Times what the floor of a step's error is that a motion has to swing for an estimate of its steps.
+const RESOLVED: f64 = 10.0;
+/// Share of the scene below which a swing is rounding, whatever swings beside it [1].
+const ROUNDING: f64 = 1e-12;
+
+/// Samples that nobody was told of yet.
+#[derive(Default)]
+pub(super) struct Kept {
+    t: Vec<f64>,
+    values: Vec<f64>,
+}
+
+impl Kept {
+    pub(super) fn keep(&mut self, t: f64, values: &[f64]) {
+        crate::budget::lay_out(size_of_val(values) + size_of::<f64>());
+        self.t.push(t);
+        self.values.extend(values);
+    }
+
+    pub(super) fn tell(&self, sample: &mut dyn FnMut(f64, &[f64])) {
+        let width = (self.values.len() / self.t.len().max(1)).max(1);
+        self.t.iter().zip(self.values.chunks(width)).for_each(|(t, values)| sample(*t, values));
+    }
+}
+
+/// Whether the displacements of a run swing by more than what the floor of a step's error hides, in the run as in its companion; or by rounding.
+pub(super) fn resolved(
+    picked: &Picked,
+    result: &TransientResult,
+    options: &TransientOptions<'_>,
+    model: &Compiled,
+) -> bool {
+    let length = model.parts.system.length_scale;
+    let lengths = result.signals.iter().zip(&picked.columns).filter(|((_, unit, _), _)| unit == "m");
+    let most = lengths.map(|(_, column)| half_range(column)).fold(0.0, f64::max);
+    most < ROUNDING * length || most > RESOLVED * STEP_SHARE * options.tol * FLOOR * length
+}
+
+/// One of so many output times is compared.
+pub(super) fn stride(options: &TransientOptions<'_>) -> usize {
+    ((options.points - 1) / ENOUGH).max(1)
+}
+
+/// Samples of some output times.
+pub(super) struct Picked {
+    stride: usize,
+    seen: usize,
+    most: usize,
+    pub(super) columns: Vec<Vec<f64>>,
+}
+
+impl Picked {
+    /// At most `most` of them.
+    pub(super) fn new(options: &TransientOptions<'_>, most: usize) -> Self {
+        Self { stride: stride(options), seen: 0, most, columns: vec![Vec::new(); options.signals.len()] }
+    }
+
+    pub(super) fn see(&mut self, values: &[f64]) {
+        let wanted = self.seen.is_multiple_of(self.stride);
+        if wanted && self.columns.first().is_some_and(|column| column.len() < self.most) {
+            crate::budget::lay_out(size_of_val(values));
+            self.columns.iter_mut().zip(values).for_each(|(column, value)| column.push(*value));
+        }
+        self.seen += 1;
+    }
+
+    /// Them as the signals of a result.
+    pub(super) fn signals(self, of: &[(String, String, Vec<f64>)]) -> Vec<(String, String, Vec<f64>)> {
+        of.iter().zip(self.columns).map(|((name, unit, _), column)| (name.clone(), unit.clone(), column)).collect()
+    }
+}

@@ -1,0 +1,113 @@
+//! The error of a motion over bodies, see [`crate::solve::time::defect`].
+
+use super::tableau::GAMMA;
+use crate::domains::{Drive, Ramp, System};
+use crate::equations::linear::LinearSolver;
+use crate::multibody::planar::Pose;
+use crate::multibody::{BlockMatrix, forces};
+use crate::solve::method::Motion;
+use crate::solve::time::defect::{Impulses, NODES, cubic_start, propagate, quartic};
+
+/// An acceleration is that of a resolved motion where it would change the rate in a step by no more than this many times the rates at the
+/// ends.
+const RESOLVED: f64 = 10.0;
+
+/// The error, and storage for a step of it.
+#[derive(Debug, Clone)]
+pub(super) struct Defect {
+    error: [Motion; 1],
+    room: [Motion; 1],
+    impulses: Impulses,
+    /// r at the start of the step; then the acceleration there.
+    start: Vec<Pose>,
+    /// P and its rate at a node.
+    at: Motion,
+    rho: Vec<Pose>,
+}
+
+impl Defect {
+    /// Storage for so many bodies, without an error.
+    pub(super) fn zeros(count: usize) -> Self {
+        let zeros = vec![Pose::zeros(); count];
+        Self {
+            error: [Motion::zeros(count)],
+            room: [Motion::zeros(count)],
+            impulses: Impulses::zeros(count),
+            start: zeros.clone(),
+            at: Motion::zeros(count),
+            rho: zeros,
+        }
+    }
+
+    /// What the first stage holds before r is added to it, and after.
+    pub(super) fn before_forces(&mut self, force: &[Pose]) {
+        self.start.copy_from_slice(force);
+    }
+
+    pub(super) fn after_forces(&mut self, force: &[Pose]) {
+        self.start.iter_mut().zip(force).for_each(|(start, force)| *start = force - *start);
+    }
+
+    /// The error at the end of a step that left its factor in `w`.
+    pub(super) fn advance<S: LinearSolver>(
+        &mut self,
+        system: &System,
+        (ramp, drive): (&Ramp<'_>, &mut Drive),
+        (solver, w): (&S, &BlockMatrix<f64, 3>),
+        (s, h): (f64, f64),
+        [before, after]: [&Motion; 2],
+    ) -> &Motion {
+        let model = &system.model;
+        let gh = GAMMA * h;
+        self.accelerate(system, h, before, after);
+        let Self { error, room, impulses, start, at, rho } = self;
+        impulses.clear();
+        for node in NODES {
+            ramp.at(s + node.0 * h, drive);
+            for (k, (rho, a0)) in rho.iter_mut().zip(&*start).enumerate() {
+                let (q, v) = ([&before.q[k], &after.q[k]], [&before.v[k], &after.v[k]]);
+                let [q, v, a] = quartic(node.0, h, q, v, a0);
+                (at.q[k], at.v[k]) = (q, v);
+                *rho = model.mass(k).component_mul(&a);
+            }
+            forces::add_damping(model, &at.v, rho);
+            system.add_residual(&at.q, drive, rho);
+            rho.iter().enumerate().for_each(|(k, rho)| impulses.add(k, node, h, *rho));
+        }
+        propagate(error, room, |number, [x]| {
+            for (k, rho) in rho.iter_mut().enumerate() {
+                at.q[k] = x.q[k] / gh;
+                *rho = model.mass(k).component_mul(&((at.q[k] + x.v[k]) / gh)) + impulses.of(number, k) / gh;
+            }
+            forces::add_damping(model, &at.q, rho);
+            model.project(rho);
+            solver.solve(&model.pattern, w, rho);
+            model.project(rho);
+            for (k, z) in rho.iter().enumerate() {
+                (x.q[k], x.v[k]) = (*z, z / gh - at.q[k]);
+            }
+        });
+        &self.error[0]
+    }
+
+    /// The acceleration at the start of the step; that of a cubic through the ends in directions without mass, and with one so small that
+    /// they follow their springs within the step, where a residue of the springs' balance would be an acceleration.
+    fn accelerate(&mut self, system: &System, h: f64, before: &Motion, after: &Motion) {
+        let model = &system.model;
+        let start = &mut self.start;
+        forces::add_damping(model, &before.v, start);
+        model.project(start);
+        for (k, force) in start.iter_mut().enumerate() {
+            let mass = model.mass(k);
+            for i in 0..3 {
+                let rates = [before.v[k][i], after.v[k][i]];
+                let change = h * force[i].abs();
+                force[i] = if mass[i] > 0.0 && change <= RESOLVED * mass[i] * (rates[0].abs() + rates[1].abs()) {
+                    -force[i] / mass[i]
+                } else {
+                    cubic_start(h, [before.q[k][i], after.q[k][i]], rates)
+                };
+            }
+        }
+    }
+}
