@@ -10,7 +10,7 @@
 //! than in proportion to the tolerance. There are five runs at most, none of which takes more than some seconds; the samples of a run that
 //! does are sent as they come, and it is not made again.
 //!
-//! What has no such estimate is compared with a [`companion`]: other methods, equal steps, frames that turn, and models whose parts may
+//! What has no such estimate is compared with a companion run (`companion.rs`): other methods, equal steps, frames that turn, and models whose parts may
 //! touch, where the error is propagated up to the first contact only.
 
 mod companion;
