@@ -10,7 +10,7 @@
 //! than in proportion to the tolerance. There are five runs at most, none of which takes more than some seconds; the samples of a run that
 //! does are sent as they come, and it is not made again.
 //!
-//! What has no such estimate is compared with a [`companion`]: other methods, equal steps, frames that turn, and models whose parts may
+//! What has no such estimate is compared with a companion run (`companion.rs`): other methods, equal steps, frames that turn, and models whose parts may
 //! touch, where the error is propagated up to the first contact only.
 
 mod companion;
@@ -24,7 +24,7 @@ use super::{AnalysisError, Watch};
 use crate::compile::{Compiled, Formulation};
 use companion::{companion, compared};
 pub use run::Run;
-use run::{AT_THE_END, MOST_AGAIN, MOST_KEPT, room};
+use run::{AT_THE_END, LOOSER, MOST_AGAIN, MOST_KEPT, room};
 pub(crate) use run::{beyond, unknown};
 use samples::{Kept, Picked, resolved};
 use std::cell::Cell;
@@ -190,5 +190,13 @@ pub(crate) fn step_error(options: &TransientOptions<'_>, model: &Compiled, watch
         Ok((transient(model, options, sample, watch)?, ()))
     };
     let found = held(options, model, &mut run, &mut |_, _| (), watch);
-    found.map_or((None, options.tol), |(result, (), tol)| (result.step_error, tol))
+    // the others need somewhat coarser or sharper steps: whole tenths
+    let tenths = |tol: f64| {
+        let mut held = options.tol;
+        while held > tol {
+            held /= LOOSER;
+        }
+        held
+    };
+    found.map_or((None, options.tol), |(result, (), tol)| (result.step_error, tenths(tol)))
 }

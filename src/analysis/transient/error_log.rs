@@ -169,3 +169,17 @@ pub(in crate::analysis) fn least(unit: &str, options: &TransientOptions<'_>, mod
         _ => 0.0,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Phases that add up in proportion to time, or to its square, are lost and not chaotic; an error that grows as exp(t/5) is.
+    #[test]
+    fn powers_are_no_chaos() {
+        let errors = |of: fn(f64) -> f64| (1..=100).map(|k| of(f64::from(k))).collect::<Vec<f64>>();
+        assert!(!grows_fast(&errors(|t| t)) && !grows_fast(&errors(|t| t * t)));
+        assert!(grows_fast(&errors(|t| (0.2 * t).exp())));
+        assert!(!grows_fast(&[0.0, 1.0]));
+    }
+}

@@ -18,6 +18,7 @@
 //! approach to differential-algebraic systems).
 
 mod defect;
+mod error;
 mod ports;
 mod stages;
 mod tableau;
@@ -33,7 +34,7 @@ use crate::multibody::relative::columns::Four;
 use crate::multibody::relative::dynamics::Stresses;
 use crate::multibody::relative::geometric::{self, Geometric};
 use crate::multibody::relative::placed::{Placed, place_of};
-use defect::Defect;
+use error::Defect;
 use ports::Ports;
 use stages::Stages;
 use std::sync::Arc;

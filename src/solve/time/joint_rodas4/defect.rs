@@ -1,6 +1,7 @@
 //! The error of a motion in joint coordinates, see [`crate::solve::time::defect`].
 
 use super::JointRodas4;
+use super::error::Defect;
 use crate::equations::{Bodies, Joints};
 use crate::multibody::forces;
 use crate::multibody::planar::Pose;
@@ -9,33 +10,6 @@ use crate::multibody::relative::placed::place_of;
 use crate::solve::time::defect::{Impulses, NODES, Propagates, propagate, quartic};
 use crate::solve::time::method::Motion;
 use crate::solve::time::rodas4::tableau::GAMMA;
-
-/// The error, over the coordinates and over the bodies' motions, and storage for a step of it.
-#[derive(Debug, Clone)]
-pub(super) struct Defect {
-    error: [Motion; 2],
-    room: [Motion; 2],
-    impulses: Impulses,
-    /// Right side over the coordinates, and over the bodies' motions; then what the solve has found.
-    right: Vec<Four>,
-    wrench: Vec<Four>,
-    /// Forces of dampers.
-    force: Vec<Pose>,
-}
-
-impl Defect {
-    /// Storage for so many bodies, without an error.
-    fn zeros(count: usize) -> Self {
-        Self {
-            error: [Motion::zeros(count), Motion::zeros(count)],
-            room: [Motion::zeros(count), Motion::zeros(count)],
-            impulses: Impulses::zeros(count),
-            right: vec![Four::ZERO; count],
-            wrench: vec![Four::ZERO; count + 1],
-            force: vec![Pose::zeros(); count],
-        }
-    }
-}
 
 impl JointRodas4 {
     /// Moments of the residual over a step from the coordinates, rates and accelerations in `start`.

@@ -1,0 +1,33 @@
+//! Storage for the error of a motion in joint coordinates.
+
+use crate::multibody::planar::Pose;
+use crate::multibody::relative::columns::Four;
+use crate::solve::time::defect::Impulses;
+use crate::solve::time::method::Motion;
+
+/// The error, over the coordinates and over the bodies' motions, and storage for a step of it.
+#[derive(Debug, Clone)]
+pub(super) struct Defect {
+    pub(super) error: [Motion; 2],
+    pub(super) room: [Motion; 2],
+    pub(super) impulses: Impulses,
+    /// Right side over the coordinates, and over the bodies' motions; then what the solve has found.
+    pub(super) right: Vec<Four>,
+    pub(super) wrench: Vec<Four>,
+    /// Forces of dampers.
+    pub(super) force: Vec<Pose>,
+}
+
+impl Defect {
+    /// Storage for so many bodies, without an error.
+    pub(super) fn zeros(count: usize) -> Self {
+        Self {
+            error: [Motion::zeros(count), Motion::zeros(count)],
+            room: [Motion::zeros(count), Motion::zeros(count)],
+            impulses: Impulses::zeros(count),
+            right: vec![Four::ZERO; count],
+            wrench: vec![Four::ZERO; count + 1],
+            force: vec![Pose::zeros(); count],
+        }
+    }
+}
