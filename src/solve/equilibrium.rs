@@ -17,7 +17,6 @@ pub mod path;
 mod refusal;
 pub mod side_by_side;
 
-use fall::Unsettled;
 pub use loss::{LossKind, Passed};
 
 use super::SolveError;
@@ -193,9 +192,7 @@ impl Equilibrium {
                 }
             }
         }
-        if !done.passed.is_empty() && Self::beyond_beams(system, q).is_some() {
-            return Err(self.lost(system, s, Unsettled::Stuck, &done, q));
-        }
+        self.check_beams(system, s, &done, q)?;
         done.reached = 1.0;
         Ok(done)
     }

@@ -26,7 +26,9 @@ const UNTESTED: f64 = 1e-6;
 /// A step without μ below this ends the fall.
 const SETTLED: f64 = 1e-9;
 /// First μ and the μ that counts as none, as fractions of the median stiffness.
-const LEAST_SHIFT: [f64; 2] = [1e-8, 1e-9];
+const LEAST_SHIFT: [f64; 2] = [1e-14, 1e-15];
+/// A μ that rounding of the stiffness may ask for next to a loss of stability, in first μ.
+const NEUTRAL: f64 = 10.0;
 /// A μ that no finite stiffness needs, in median stiffnesses.
 const MOST_SHIFT: f64 = 1e12;
 /// Fractions of the predicted decrease of energy: below the first a step is rejected, below the second the region shrinks, above the third it grows.
@@ -164,10 +166,11 @@ impl Equilibrium {
                 *q += step;
             }
             // converged, or as close as rounding lets it come
-            if region.shift == 0.0 && (length < SETTLED || (!resolved && length > 0.5 * last)) {
+            let neutral = region.shift <= NEUTRAL * region.least[0];
+            if neutral && (length < SETTLED || (!resolved && length > 0.5 * last)) {
                 return Ok(());
             }
-            last = if region.shift == 0.0 { length } else { f64::INFINITY };
+            last = if neutral { length } else { f64::INFINITY };
             region.shift = if region.shift / 8.0 < region.least[1] { 0.0 } else { region.shift / 8.0 };
         }
         Err(Unsettled::Budget)
@@ -189,7 +192,7 @@ impl Equilibrium {
         units.add_shift(region.shift, &mut self.tangent);
         system.model.project_matrix(&mut self.tangent);
         if !self.is_definite(system) {
-            return raise(region, 4.0);
+            return raise(region, 8.0);
         }
         for (step, r) in self.step.iter_mut().zip(&self.residual) {
             *step = -r;

@@ -109,6 +109,14 @@ impl Equilibrium {
         Err(error)
     }
 
+    /// Refuses a state beyond losses of stability whose segments are none of beams.
+    pub(super) fn check_beams(&mut self, system: &System, s: f64, done: &Path, q: &[Pose]) -> Result<(), SolveError> {
+        if done.passed.is_empty() || Self::beyond_beams(system, q).is_none() {
+            return Ok(());
+        }
+        Err(self.lost(system, s, Unsettled::Stuck, done, q))
+    }
+
     /// Puts the softest motion at `q` into `soft`, its largest displacement 1 in the units of W; none where it is not finite.
     pub(super) fn softest(&mut self, system: &System, q: &[Pose]) -> Option<()> {
         let (units, model) = (Units::of(system), &system.model);
