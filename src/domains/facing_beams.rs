@@ -6,8 +6,8 @@ use super::contact::touching_distance;
 use super::domain::{At, Domain};
 use super::drawn::{Drawing, Drawn};
 use super::facing::Facing;
-use super::facing_side::{Deflection, Flank, Opening, Walk, Weights, back, onto, values};
-use super::facing_stretches::{BeamRows, stretches};
+use super::facing_side::{Deflection, Flank, Opening, Walk, back, onto, values};
+use super::facing_stretches::{BeamRows, Stretch, stretches};
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, BodyId, Pattern};
 use crate::structure::GapVoltage;
@@ -22,14 +22,6 @@ pub struct FacingBeams {
     pub sides: [Flank; 2],
     /// From a to b.
     stretches: Vec<Stretch>,
-}
-
-/// A part of the gap over which both sides are single cubics.
-#[derive(Debug, Clone, PartialEq)]
-struct Stretch {
-    facing: Facing,
-    segments: [usize; 2],
-    weights: [Weights; 2],
 }
 
 /// A stretch at a configuration.

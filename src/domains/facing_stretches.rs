@@ -6,6 +6,7 @@
 //! left is the shape within a segment, p·s²·(h − s)²/(24·EI), whose share in the deflection falls with the fourth power of h.
 
 use super::drawn::{Drawing, Station};
+use super::facing::Facing;
 use super::facing_side::{Flank, Weights};
 use super::quadrature::{hermite, hermite_slope};
 use crate::multibody::BodyId;
@@ -99,6 +100,16 @@ impl<'d> BeamRows<'d> {
         let rigid = stations.iter().all(|station| station.point.body == start.body);
         if rigid { straight() } else { Flank { fixed: false, stations, yields } }
     }
+}
+
+/// A part of the gap over which both sides are single cubics.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Stretch {
+    pub(super) facing: Facing,
+    /// The segments of both sides.
+    pub(super) segments: [usize; 2],
+    /// From the ends of the segments to those of the stretch.
+    pub(super) weights: [Weights; 2],
 }
 
 /// A part of a gap over which both sides are single cubics.
