@@ -205,19 +205,12 @@ fn settle(
     let path = SourcePath::new(electrics, from, &sources, loads);
     let mut end = electrics.drive();
     path.at(1.0, &mut end);
-    let begun = q.clone();
-    let mut held_weakly = Vec::new();
-    let followed = solver.follow(system, &path, &mut q);
-    let failed = matches!(followed, Err(SolveError::Lost { .. } | SolveError::Singular { .. }));
-    let weak = if failed { weak_parts::held(system) } else { None };
-    let path = match weak {
+    let (path, held_weakly) = match weak_parts::held(system) {
         Some((held, parts)) => {
-            q = begun;
             let found = solver.follow(&held, &path, &mut q)?;
-            held_weakly = weak_parts::told(system, &held, &parts, &q);
-            found
+            (found, weak_parts::told(system, &held, &parts, &q))
         }
-        None => followed?,
+        None => (solver.follow(system, &path, &mut q)?, Vec::new()),
     };
     if let Some(loose) = loose_parts::unbalanced(system, &q, &end) {
         return Err(SolveError::singular(system, loose).into());

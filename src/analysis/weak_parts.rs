@@ -1,8 +1,7 @@
 //! Parts that hang on beams so slender that rounding hides their stiffness, as drawings have them that place one part beside another.
 //!
 //! The stiffness of such a beam is below the rounding of what it joins: an equilibrium of the part is not to be had in double precision, and a
-//! linear solver finds any. The part is held where it is drawn, by springs to the ground, and the force that they bear is reported. This
-//! is tried where no equilibrium was found without it.
+//! linear solver finds any. The part is held where it is drawn, by springs to the ground, and the force that they bear is reported.
 
 use crate::domains::System;
 use crate::multibody::planar::Pose;

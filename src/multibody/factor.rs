@@ -36,6 +36,9 @@ pub struct BlockMatrix<T: Scalar, const N: usize> {
 /// times as far as others in every iteration, and none settles.
 pub(crate) const HELD: f64 = 1e-3;
 
+/// Lever at which a stiffness against displacement holds a rotation where nothing resists any [m]: a micrometre, the size of parts.
+const LEVER: f64 = 1e-6;
+
 /// Bodies eliminated between two looks at the budget, some ten microseconds.
 const BODIES_PER_CHECK: usize = 64;
 
@@ -71,22 +74,36 @@ impl<T: Scalar, const N: usize> BlockMatrix<T, N> {
     /// [`ZeroPivot`] where there is nothing to hold on to: no body resists that direction, or a pivot is not finite.
     pub fn factor_holding(&mut self, pattern: &Pattern, held: &mut Vec<ZeroPivot>) -> Result<Inertia, ZeroPivot> {
         held.clear();
-        let largest = |i: usize, all: &[SMatrix<T, N, N>]| all.iter().map(|b| b[(i, i)].modulus()).fold(0.0, f64::max);
-        for body in 0..self.diagonal.len() {
-            for direction in 0..N {
-                if self.diagonal[body][(direction, direction)] == T::zero() {
-                    let pivot = T::from_real(HELD * largest(direction, &self.diagonal));
-                    if pivot == T::zero() {
-                        return Err(ZeroPivot { body, direction });
-                    }
-                    self.diagonal[body][(direction, direction)] = pivot;
-                    held.push(ZeroPivot { body, direction });
+        let empty = self.diagonal.iter().enumerate().flat_map(|(body, block)| {
+            let zero = move |direction: &usize| block[(*direction, *direction)] == T::zero();
+            (0..N).filter(zero).map(move |direction| ZeroPivot { body, direction })
+        });
+        held.extend(empty);
+        if !held.is_empty() {
+            let largest = self.largest();
+            for &ZeroPivot { body, direction } in held.iter() {
+                let pivot = HELD * largest[direction];
+                if pivot == 0.0 {
+                    return Err(ZeroPivot { body, direction });
                 }
+                self.diagonal[body][(direction, direction)] = T::from_real(pivot);
             }
         }
         self.eliminate(pattern, |pivot| {
             held.push(pivot);
             Ok(())
+        })
+    }
+
+    /// The largest diagonal entry that stands for each direction.
+    fn largest(&self) -> [f64; N] {
+        let of = |i: usize| self.diagonal.iter().map(|block| block[(i, i)].modulus()).fold(0.0, f64::max);
+        let translation = of(0).max(of(1));
+        // both translations of the plane have one unit; of bodies on springs alone none resists rotation
+        std::array::from_fn(|i| match of(i) {
+            _ if i < 2 => translation,
+            own if own > 0.0 => own,
+            _ => translation * LEVER * LEVER,
         })
     }
 

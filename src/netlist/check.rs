@@ -273,7 +273,7 @@ fn unheld_parts(drawing: &Drawing, connected: &[bool], parts: &mut Sets, sink: &
             "W012",
             drawing.first_named[index],
             message,
-            "a free part has no static equilibrium; add an `anchor`",
+            "without balanced loads it has no static equilibrium; add an `anchor`",
         );
     }
 }

@@ -108,6 +108,27 @@ fn trusses_on_pins() {
     assert!(error.contains("\"c\"") && error.contains("about z") && error.contains("hinge"), "{error}");
 }
 
+/// A mass on two springs without rotational stiffness, and one that a spring holds along one axis only: F/k, and a direction that is held with
+/// a sentence where no load excites it, or an error where one does.
+#[test]
+fn masses_on_springs() {
+    let text = |more: &str| {
+        format!(
+            "anchor * [a] []\n spring2d * [a b] [kx=2 ky=0 krz=0]\n mass2d * [b] [m=1n]\n f2d * [b] [F=1u]\n {more}"
+        )
+    };
+    let compiled = model(&text(""), &CompileOptions::default());
+    let result = static_equilibrium(&compiled, &[]).unwrap();
+    close(moved(&result, "b")[0], 0.5e-6, 1e-9);
+    assert!(
+        result.free_motions.iter().any(|m| m.contains("\"b\"") && m.contains("along y")),
+        "{:?}",
+        result.free_motions
+    );
+    let pushed = model(&text("f2d * [b] [F=1p oz=pi/2]"), &CompileOptions::default());
+    assert!(matches!(static_equilibrium(&pushed, &[]), Err(AnalysisError::Singular { .. })));
+}
+
 /// A cantilever under a force beside a free beam of the same section.
 const BESIDE: &str = "
     anchor p1 [a] []
