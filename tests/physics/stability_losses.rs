@@ -116,7 +116,7 @@ fn states_do_not_depend_on_the_direction_of_the_drawing() {
         let up = angle + FRAC_PI_2;
         format!(
             "anchor p1 [a] []\nl beam2d p1 [a c] [l=100u w=1u oz={up:?}]\nt beam2d p1 [c d] [l=100u w=2u oz={angle:?}]\n\
-             r beam2d p1 [d b] [l=100u w=1u oz={:?}]\nanchor p1 [b] []\nf2d * [c] [F=30u oz={:?}]\nf2d * [d] [F=30u oz={:?}]",
+             r beam2d p1 [d b] [l=100u w=1u oz={:?}]\nanchor p1 [b] []\nf2d * [c] [F=27u oz={:?}]\nf2d * [d] [F=27u oz={:?}]",
             angle - FRAC_PI_2,
             angle - FRAC_PI_2,
             angle - FRAC_PI_2,
