@@ -230,7 +230,11 @@ fn settle(
             let found = solver.follow(&held, &path, &mut q)?;
             (found, weak_parts::told(system, &held, &parts, &q))
         }
-        None => (solver.follow(system, &path, &mut q)?, Vec::new()),
+        None => match solver.follow(system, &path, &mut q) {
+            Ok(found) => (found, Vec::new()),
+            // a gap pressed beyond its law is the reason where there is one
+            Err(error) => return Err(within_contact_range(compiled, &q).err().unwrap_or_else(|| error.into())),
+        },
     };
     if let Some(loose) = loose_parts::unbalanced(system, &q, &end) {
         return Err(SolveError::singular(system, loose).into());

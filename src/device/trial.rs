@@ -46,6 +46,8 @@ impl Session {
         match self.equilibrium.follow(system, &path, &mut self.motion.q) {
             Ok(found) => reply.jumped = !found.passed.is_empty(),
             Err(error) => {
+                // a gap pressed beyond its law is the reason where there is one
+                let error = within_contact_range(compiled, &self.motion.q).err().unwrap_or_else(|| error.into());
                 reply.status = Status::Fail(error.to_string());
                 return;
             }

@@ -43,10 +43,6 @@ use std::sync::Arc;
 /// all others their inertia.
 const CONSISTENT: f64 = 1e-3;
 
-/// Estimated error of a rotation in one step from which the step is rejected, whatever its share of the motion [rad]: the estimate holds
-/// for small angles.
-const MAX_TURN: f64 = 1.0;
-
 /// The method with its storage.
 #[derive(Debug, Clone)]
 pub struct JointRodas4 {
@@ -271,10 +267,6 @@ impl Method<Bodies<'_>> for JointRodas4 {
         }
         // stiffly accurate: the last argument plus its increment is the new value, the increment the error
         self.stages.last(h, &mut error.q, &mut error.v);
-        // positions follow rotations with their square, this estimate in proportion: beside a motion that has run away it is small
-        if error.q.iter().any(|error| error.z.is_nan() || error.z.abs() >= MAX_TURN) {
-            error.q.fill(Pose::repeat(f64::INFINITY));
-        }
         let (own, sensitivities) = self.carried.split_at_mut(2);
         if let [now, push] = own {
             self.stages.finish(h, now, push);
