@@ -42,7 +42,8 @@ fn measure(name: &str, coordinates: usize) -> (usize, [f64; 8]) {
     let implicit = implicit(&topology);
     let model = topology.model();
     let electrics = Arc::default();
-    let system = System { model, members: Vec::new(), loads: Vec::new(), electrics, length_scale: 2e-6 };
+    let (members, loads, beams) = (Vec::new(), Vec::new(), Vec::new().into());
+    let system = System { model, members, loads, beams, electrics, length_scale: 2e-6 };
     let (n, model) = (system.bodies(), &system.model);
     let pattern = &model.pattern;
     let q = displaced(model);

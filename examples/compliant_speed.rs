@@ -42,7 +42,8 @@ fn main() {
 fn report(name: &str, count: usize, units: usize, topology: &Topology) {
     let model = topology.model();
     let electrics = Arc::default();
-    let system = System { model, members: Vec::new(), loads: Vec::new(), electrics, length_scale: 2e-6 };
+    let (members, loads, beams) = (Vec::new(), Vec::new(), Vec::new().into());
+    let system = System { model, members, loads, beams, electrics, length_scale: 2e-6 };
     let (n, pattern) = (system.bodies(), &system.model.pattern);
     let q: Vec<Pose> = (0..n).map(|k| Pose::new(1e-8 * (k % 3) as f64, 1e-8, 1e-3 * (k % 5) as f64)).collect();
     let drive = Drive { load: 1.0, ..Drive::default() };

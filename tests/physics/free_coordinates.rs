@@ -23,10 +23,11 @@ fn close(found: f64, expected: f64, relative: f64) {
 }
 
 fn run(compiled: &Compiled, formulation: Formulation, options: &TransientOptions<'_>) -> TransientResult {
-    let (sample, watch): (&mut dyn FnMut(f64, &[f64]), &mut dyn FnMut(f64) -> bool) = (&mut |_, _| {}, &mut |_| true);
+    let mut sample = |_: f64, _: &[f64]| {};
+    let mut watch = |_: f64| true;
     match formulation {
-        Formulation::Compliant => transient(compiled, options, sample, watch),
-        _ => joint_transient(compiled, formulation, options, sample, watch).map(|(result, _)| result),
+        Formulation::Compliant => transient(compiled, options, &mut sample, &mut watch),
+        _ => joint_transient(compiled, formulation, options, &mut sample, &mut watch).map(|(result, _)| result),
     }
     .unwrap_or_else(|e| panic!("{formulation:?}: {e}"))
 }

@@ -17,10 +17,9 @@ use std::sync::Arc;
 /// A beam of 480 × 12 × 1.5 µm, E = 165 GPa, over a rigid electrode 2 µm away, without fringe field, drawn in `beams` pieces under
 /// `gaps` gap elements; clamped at its far end, too, or free there.
 fn over_electrode(beams: usize, gaps: usize, clamped: bool) -> String {
-    let mut text = format!(
-        "process p = [ Youngsmodulus=165e9 density=2330 h=12u permittivity=8.854e-12/(1+1.12*2/12) ]
-         anchor p [a(0)] []\nanchor p [c(0)] []\neground * [a(0)] []\ndrive port * [c(0) a(0)] []\n"
-    );
+    let head = "process p = [ Youngsmodulus=165e9 density=2330 h=12u permittivity=8.854e-12/(1+1.12*2/12) ]
+         anchor p [a(0)] []\nanchor p [c(0)] []\neground * [a(0)] []\ndrive port * [c(0) a(0)] []\n";
+    let mut text = head.to_owned();
     for i in 1..=beams {
         writeln!(text, "beam2d p [a({}) a({i})] [l=480u/{beams} w=1.5u]\nR * [a(0) a({i})] [R=1]", i - 1).unwrap();
     }

@@ -155,7 +155,7 @@ fn sweeps_of_transients_are_runs_alone() {
         let alone = transient(&compiled.expect("a variant"), &run, &mut |_, _| (), &mut |_| true).expect("a run");
         alone.signals.iter().map(|s| s.2.last().copied()).collect::<Vec<_>>()
     };
-    let sharper: Vec<f64> = std::iter::successors(Some(options.tol), |tol| Some(tol / 10.0)).take(4).collect();
+    let sharper: Vec<f64> = std::iter::successors(Some(options.tol), |tol| Some(tol / 10.0)).take(8).collect();
     for row in whole.rows.iter().step_by(7) {
         let same = |tol: &f64| row.values.as_ref() == Ok(&alone(row, *tol));
         assert!(sharper.iter().any(same), "{:?}", row.parameters);

@@ -131,7 +131,7 @@ impl Equilibrium {
                 break;
             }
             shift = if shift == 0.0 { least } else { 2.0 * shift };
-            if !(shift < 1e20 * least) {
+            if shift.is_nan() || least.is_nan() || shift >= 1e20 * least {
                 return None;
             }
         }

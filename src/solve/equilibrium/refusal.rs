@@ -94,7 +94,9 @@ impl Equilibrium {
     fn gone(&self, system: &System, q: &[Pose]) -> Option<String> {
         let size = system.beams.iter().map(|beam| beam.length).fold(system.length_scale, f64::max);
         let moved = |body: &usize| q[*body].x.hypot(q[*body].y);
-        let body = (0..q.len()).max_by(|a, b| moved(a).total_cmp(&moved(b))).filter(|b| !(moved(b) < GONE * size))?;
+        let body = (0..q.len())
+            .max_by(|a, b| moved(a).total_cmp(&moved(b)))
+            .filter(|b| moved(b).is_nan() || moved(b) >= GONE * size)?;
         let name = &system.model.bodies[body].name;
         Some(format!("\"{name}\" moves away without end: nothing that this load cannot overcome holds it"))
     }
