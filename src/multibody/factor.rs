@@ -67,7 +67,7 @@ impl<T: Scalar, const N: usize> BlockMatrix<T, N> {
     }
 
     /// Like [`BlockMatrix::factor`], but a direction whose pivot vanishes is held instead: it gets the pivot it had before
-    /// elimination, or [`HELD`] times the largest diagonal entry of that direction where it had none, and goes to `held`. A solution then
+    /// elimination, or `HELD` times the largest diagonal entry of that direction where it had none, and goes to `held`. A solution then
     /// stands for a structure with free motions that no load excites.
     ///
     /// # Errors
