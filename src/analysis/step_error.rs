@@ -12,6 +12,9 @@
 //! A companion has a third to a half of the steps. One that would take long is given up after 3e6 unknowns times steps, and its difference
 //! is continued in proportion to time, as phases go.
 
+mod picked;
+
+use super::after_contact::{Samples, before, first_contact, judge};
 use super::chart::error::{half_range, largest_error};
 use super::integrator::Integrator;
 use super::transient::options::STEP_SHARE;
@@ -19,6 +22,7 @@ use super::transient::{TransientOptions, TransientResult, transient};
 use super::{AnalysisError, Watch};
 use crate::compile::{Compiled, Formulation};
 use crate::equations::bodies::FLOOR;
+use picked::{Picked, stride};
 
 /// How much looser a companion is.
 const LOOSER: f64 = 10.0;
@@ -46,8 +50,6 @@ const MOST_KEPT: usize = 1 << 20;
 const AT_THE_END: &str = "by the end of the run";
 /// Output times that a companion must have reached to say something.
 const FEWEST: usize = 16;
-/// Output times that are compared, at most about twice as many: evenly spaced ones of a run that has more.
-const ENOUGH: usize = 1000;
 /// Times what the floor of a step's error is that a motion has to swing for a companion to tell anything.
 const RESOLVED: f64 = 10.0;
 /// Share of the scene below which a swing is rounding, whatever swings beside it [1].
@@ -74,7 +76,19 @@ pub fn with_step_error<T>(
     sample: &mut dyn FnMut(f64, &[f64]),
     watch: Watch<'_>,
 ) -> Result<(TransientResult, T), AnalysisError> {
-    held(options, model, run, sample, watch).map(|(result, more, _)| (result, more))
+    let mut samples = Samples::new(options);
+    let mut both = |t: f64, values: &[f64]| {
+        samples.keep(t, values);
+        sample(t, values);
+    };
+    let (mut result, more, _) = held(options, model, run, &mut both, watch)?;
+    let looser = looser(options);
+    let least = |unit: &str| least(unit, options, model);
+    let mut alike = |options: &TransientOptions<'_>, sample: &mut dyn FnMut(f64, &[f64]), watch: Watch<'_>| {
+        run(options, sample, watch).map(|_| ())
+    };
+    judge(&samples, (options, &looser), &least, &mut alike, &mut result, watch)?;
+    Ok((result, more))
 }
 
 /// The same, with the tolerance that the steps of the run followed.
@@ -160,8 +174,17 @@ fn once<T>(
     let other = |c: &TransientResult| c.counters.steps != result.counters.steps;
     match companion.filter(|c| (whole || reached >= FEWEST) && other(c) && resolved) {
         Some(companion) => {
-            let apart = largest_error(&picked, &companion, &|unit| least(unit, options, model));
-            let share = ((reached - 1) * stride(options)) as f64 / (options.points - 1) as f64;
+            // after a contact single values are judged on their own
+            let contact = first_contact(&result);
+            let until = |run: &TransientResult| contact.map(|t| before(run, options, t, stride(options)));
+            let (one, other) = (until(&picked), until(&companion));
+            let apart = largest_error(one.as_ref().unwrap_or(&picked), other.as_ref().unwrap_or(&companion), &|unit| {
+                least(unit, options, model)
+            });
+            let share = match options.until.is_some() || contact.is_some() {
+                true => 1.0,
+                false => ((reached - 1) * stride(options)) as f64 / (options.points - 1) as f64,
+            };
             let (_, method) = Formulation::of_run(model, options);
             result.step_error = Some(told_of(options, method) * apart / share.min(1.0));
         }
@@ -203,6 +226,17 @@ fn loose(options: &TransientOptions<'_>) -> f64 {
     (LOOSER * options.tol).min(LOOSEST)
 }
 
+/// The options of a companion.
+fn looser<'a>(options: &TransientOptions<'a>) -> TransientOptions<'a> {
+    TransientOptions {
+        tol: loose(options),
+        step: options.step.map(|step| 2.0 * step),
+        events: Vec::new(),
+        keep: false,
+        ..options.clone()
+    }
+}
+
 /// Share of the difference that is told: of a companion that is hardly looser, more than all of it, since the error is in proportion to
 /// the tolerance at best.
 fn told_of(options: &TransientOptions<'_>, method: Integrator) -> f64 {
@@ -241,17 +275,11 @@ fn companion<T>(
     watch: Watch<'_>,
 ) -> Result<(Option<TransientResult>, bool), AnalysisError> {
     let tol = loose(options);
-    let looser = options.step.is_some() || tol >= 2.0 * options.tol;
-    if options.signals.is_empty() || options.points < 2 || !looser {
+    let differs = options.step.is_some() || tol >= 2.0 * options.tol;
+    if options.signals.is_empty() || options.points < 2 || !differs {
         return Ok((None, false));
     }
-    let looser = TransientOptions {
-        tol,
-        step: options.step.map(|step| 2.0 * step),
-        events: Vec::new(),
-        keep: false,
-        ..options.clone()
-    };
+    let looser = looser(options);
     let mut picked = Picked::new(options, usize::MAX);
     let mut keep = |_: f64, values: &[f64]| picked.see(values);
     let (mut steps, mut stopped) = (0.0, false);
@@ -275,40 +303,6 @@ fn companion<T>(
             ))
         }
         Err(_) => Ok((None, false)),
-    }
-}
-
-/// One of so many output times is compared.
-fn stride(options: &TransientOptions<'_>) -> usize {
-    ((options.points - 1) / ENOUGH).max(1)
-}
-
-/// Samples of some output times.
-struct Picked {
-    stride: usize,
-    seen: usize,
-    most: usize,
-    columns: Vec<Vec<f64>>,
-}
-
-impl Picked {
-    /// At most `most` of them.
-    fn new(options: &TransientOptions<'_>, most: usize) -> Self {
-        Self { stride: stride(options), seen: 0, most, columns: vec![Vec::new(); options.signals.len()] }
-    }
-
-    fn see(&mut self, values: &[f64]) {
-        let wanted = self.seen.is_multiple_of(self.stride);
-        if wanted && self.columns.first().is_some_and(|column| column.len() < self.most) {
-            crate::budget::lay_out(size_of_val(values));
-            self.columns.iter_mut().zip(values).for_each(|(column, value)| column.push(*value));
-        }
-        self.seen += 1;
-    }
-
-    /// Them as the signals of a result.
-    fn signals(self, of: &[(String, String, Vec<f64>)]) -> Vec<(String, String, Vec<f64>)> {
-        of.iter().zip(self.columns).map(|((name, unit, _), column)| (name.clone(), unit.clone(), column)).collect()
     }
 }
 

@@ -17,9 +17,9 @@ use crate::solve::baseline::{Solver, SolverKind};
 use crate::solve::time::adaptive::{Advance, Observer};
 use crate::solve::time::method::{Motion, Work};
 pub use first_step::first_step;
-pub use options::TransientOptions;
+pub use options::{TransientOptions, Until};
 use record::{Carrier, record};
-pub use result::{Counters, Event, TransientResult};
+pub use result::{Counters, Event, Statistics, TransientResult};
 
 /// The bodies' own coordinates, joints as springs.
 struct Compliant<'a> {

@@ -189,13 +189,14 @@ pub fn discretize_like(
     let model = model.couple(coupled);
     let moved = |p: Point| rigid.centered(p, &place);
     let gap_names = gaps.iter().filter(|laid| laid.member.is_gap()).map(|laid| laid.name.to_owned()).collect();
-    let system = System {
+    let mut system = System {
         model,
         members: gaps.into_iter().map(|laid| laid.member.moved(&moved)).collect(),
         loads: loads.into_iter().map(|l| Load { point: moved(l.point), ..l }).collect(),
         electrics,
         length_scale: if scale.is_finite() { scale } else { 1e-6 },
     };
+    system.settle_impacts();
     let nodes =
         (0..structure.nodes.len()).map(|n| structure.nodes[n].mechanical.then(|| moved(rigid.point(n)))).collect();
     let beams = beams.into_iter().map(|points| points.into_iter().map(moved).collect()).collect();

@@ -9,6 +9,8 @@
 //! pressure: Gauss–Lobatto with nine points, among them the ends, where tilted beams touch first, and the middle.
 
 use super::contact::Contact;
+use super::contact_loss::Loss;
+use super::quotient::quotient;
 use nalgebra::{Matrix4, Vector4};
 
 /// Abscissae and weights of six-point Gauss–Legendre quadrature on 0…1.
@@ -137,6 +139,66 @@ impl Facing {
                 first -= n * force;
                 second -= n * n.transpose() * slope;
             }
+        }
+        (first, second)
+    }
+
+    /// Where the contact presses: the weights of z in the gap, the force [N] and its derivative with the gap [N/m].
+    pub(super) fn pressed(&self, z: &Vector4<f64>) -> impl Iterator<Item = (Vector4<f64>, f64, f64)> {
+        let points = if self.apart(z) { &LOBATTO[..0] } else { &LOBATTO[..] };
+        points.iter().filter_map(|&(s, weight)| {
+            let n = self.shape(s);
+            let g = self.gap + n.dot(z);
+            (g < self.touch).then(|| {
+                let (force, slope) = self.piece(weight).force(g);
+                (n, force, slope)
+            })
+        })
+    }
+
+    /// Discrete force over z and its derivative with the end of a step of length `h` [s] from `z0` to `z1`: of the field at `volts` [V], and of
+    /// the contact with its `loss`.
+    pub(super) fn quotient(
+        &self,
+        (z0, z1): (&Vector4<f64>, &Vector4<f64>),
+        (volts, h): (f64, f64),
+        loss: &Loss,
+    ) -> (Vector4<f64>, Matrix4<f64>) {
+        let (mut first, mut second) = (Vector4::zeros(), Matrix4::zeros());
+        let closest = self.least();
+        for (s, weight) in GAUSS.iter().filter(|_| volts != 0.0) {
+            let (n, m) = (self.shape(*s), self.measure(*s));
+            let k = -0.5 * volts * volts * self.strength * self.length * weight;
+            let energy = |g: f64| {
+                let d = g.max(closest);
+                k * (1.0 / d + (d - g) / (d * d))
+            };
+            let slope = |g: f64| {
+                let d = g.max(closest);
+                (-k / (d * d), if g > closest { 2.0 * k / (d * d * d) } else { 0.0 })
+            };
+            let [g0, g1] = [z0, z1].map(|z| self.gap + m.dot(z));
+            let (force, by_end) = quotient((g0, energy(g0)), (g1, energy(g1)), slope);
+            first += n * force;
+            second += (n * m.transpose() + m * n.transpose()) * (0.5 * by_end);
+        }
+        if self.apart(z0) && self.apart(z1) {
+            return (first, second);
+        }
+        for (s, weight) in LOBATTO {
+            let (n, piece) = (self.shape(s), self.piece(weight));
+            let [g0, g1] = [z0, z1].map(|z| self.gap + n.dot(z));
+            if g0.min(g1) >= self.touch {
+                continue;
+            }
+            let slope = |g: f64| {
+                let (force, slope) = piece.force(g);
+                (-force, -slope)
+            };
+            let (force, by_end) = quotient((g0, piece.energy(g0)), (g1, piece.energy(g1)), slope);
+            let (added, by_rate) = loss.fraction((g0 - g1) / h);
+            first += n * (force * (1.0 + added));
+            second += n * n.transpose() * (by_end * (1.0 + added) - force * by_rate / h);
         }
         (first, second)
     }

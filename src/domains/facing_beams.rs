@@ -2,10 +2,14 @@
 
 use super::approach::{Approach, Point};
 use super::contact::touching_distance;
+use super::contact_loss::Loss;
+use super::contact_speed::fall_at_pull_in;
 use super::domain::{At, Domain};
 use super::drawn::{Drawing, Drawn};
 use super::facing::Facing;
 use super::facing_ends;
+use super::facing_loss;
+use super::quotient::Chord;
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, BodyId, Pattern};
 use crate::structure::GapVoltage;
@@ -20,11 +24,13 @@ pub struct FacingBeams {
     pub side: f64,
     /// Constants.
     pub facing: Facing,
+    /// What an impact loses.
+    pub loss: Loss,
 }
 
 impl FacingBeams {
     /// z of [`super::facing`].
-    fn values(&self, at: At<'_>) -> Vector4<f64> {
+    pub(super) fn values(&self, at: At<'_>) -> Vector4<f64> {
         facing_ends::values(at.linear, &self.ends, self.side, at.q)
     }
 
@@ -34,7 +40,7 @@ impl FacingBeams {
     }
 
     /// `r +=` the forces of what is `first` per z.
-    fn add(&self, at: At<'_>, first: Vector4<f64>, r: &mut [Pose]) {
+    pub(super) fn add(&self, at: At<'_>, first: Vector4<f64>, r: &mut [Pose]) {
         let f = facing_ends::rows(at.linear, &self.ends, self.side, at.q).0.transpose() * first;
         for (i, id) in facing_ends::bodies(&self.ends).into_iter().enumerate() {
             if let BodyId::Free(k) = id {
@@ -59,7 +65,8 @@ impl Drawn for FacingBeams {
                 touch: pair.touch.unwrap_or(touching_distance(pair.gap)),
                 chord: drawing.chord,
             };
-            put(&pair.name, Some(&pair.voltage), Self { ends, side: pair.side, facing });
+            let loss = Loss::new(&pair.impact);
+            put(&pair.name, Some(&pair.voltage), Self { ends, side: pair.side, facing, loss });
         }
     }
 
@@ -156,6 +163,45 @@ impl Domain for FacingBeams {
         self.facing.contact_energy(&self.values(at))
     }
 
+    fn loss(&self) -> Option<Loss> {
+        Some(self.loss)
+    }
+
+    fn set_loss(&mut self, loss: Loss) {
+        self.loss = loss;
+    }
+
+    fn add_closing(&self, at: At<'_>, r: &mut [Pose]) -> f64 {
+        self.add_force_change(at, 1.0, -1.0, r);
+        fall_at_pull_in(self.facing.gap, self.facing.touch)
+    }
+
+    fn add_loss(&self, at: At<'_>, rate: &impl Fn(usize) -> Pose, r: &mut [Pose]) {
+        facing_loss::add(self, at, rate, r);
+    }
+
+    fn add_loss_tangent(
+        &self,
+        at: At<'_>,
+        rate: &impl Fn(usize) -> Pose,
+        pattern: &Pattern,
+        stiffness: &mut BlockMatrix<f64, 3>,
+        damping: &mut BlockMatrix<f64, 3>,
+    ) -> bool {
+        facing_loss::add_tangent(self, at, rate, pattern, stiffness, damping)
+    }
+
+    fn add_quotient(
+        &self,
+        chord: &Chord<'_>,
+        volts: f64,
+        pattern: &Pattern,
+        r: &mut [Pose],
+        tangent: &mut BlockMatrix<f64, 3>,
+    ) {
+        facing_loss::add_quotient(self, chord, volts, pattern, r, tangent);
+    }
+
     fn contact_work(&self, at: At<'_>, dq: &[Pose]) -> f64 {
         let force = self.facing.contact(&self.values(at)).0;
         if force.x == 0.0 && force.z == 0.0 { 0.0 } else { force.dot(&self.changes(at, dq)) }
@@ -163,7 +209,7 @@ impl Domain for FacingBeams {
 }
 
 /// Adds the tangent over four bodies.
-fn add_quad(pattern: &Pattern, ids: &[BodyId; 4], h: &SMatrix<f64, 12, 12>, tangent: &mut BlockMatrix<f64, 3>) {
+pub(super) fn add_quad(pattern: &Pattern, ids: &[BodyId; 4], h: &SMatrix<f64, 12, 12>, tangent: &mut BlockMatrix<f64, 3>) {
     for (i, &row) in ids.iter().enumerate() {
         for (j, &column) in ids.iter().enumerate() {
             let (BodyId::Free(row), BodyId::Free(column)) = (row, column) else { continue };

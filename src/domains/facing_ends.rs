@@ -20,6 +20,23 @@ pub(super) fn values(linear: bool, ends: &[Approach; 2], side: f64, q: &[Pose]) 
     Vector4::new(w(&ends[0]), turn(&ends[0]), w(&ends[1]), turn(&ends[1]))
 }
 
+/// Rate of z with the rate of each body.
+pub(super) fn rates(
+    linear: bool,
+    ends: &[Approach; 2],
+    side: f64,
+    q: &[Pose],
+    rate: &impl Fn(usize) -> Pose,
+) -> Vector4<f64> {
+    let mut d = Quad::zeros();
+    for (i, id) in bodies(ends).into_iter().enumerate() {
+        if let BodyId::Free(k) = id {
+            d.fixed_rows_mut::<3>(3 * i).copy_from(&rate(k));
+        }
+    }
+    rows(linear, ends, side, q).0 * d
+}
+
 /// Change of z with a change `dq` of the configuration.
 pub(super) fn changes(linear: bool, ends: &[Approach; 2], side: f64, q: &[Pose], dq: &[Pose]) -> Vector4<f64> {
     let mut d = Quad::zeros();

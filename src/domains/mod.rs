@@ -13,13 +13,15 @@
 //! | [`backbending`] | the strength of a hot arm, beyond which it is shortened for good |
 //! | [`capacitor`] | C(u) of a comb and of parallel plates |
 //! | [`contact`] | pressure between surfaces that touch |
+//! | [`contact_loss`] | what an impact loses |
+//! | [`contact_speed`] | at which speed, from statics |
 //! | [`domain`] | the trait of all that acts; [`member`]: which there are, and how each call finds its own |
 //! | [`dashpot`] | a damper to the ground |
 //! | [`drawn`], [`element`] | from a drawing to them; elements of their own |
 //! | [`electrodes`], [`facing_beams`], [`stop_pair`] | combs and plates; beams that face each other; stops |
 //! | [`load`], [`moving_frame`] | dead loads, and forces that sources give; the motion of the frame |
 //! | [`facing`] | two facing beams: pressure along a gap that varies over their length |
-//! | `facing_ends` | where facing beams measure |
+//! | `facing_ends`, `facing_loss` | where facing beams measure; what their contact loses |
 //! | [`network`] | potentials of a resistive network driven by ports and sources |
 //! | `laplacian` | potentials in a network of conductors |
 //! | [`thermal`] | mean temperature rise of beams that carry current |
@@ -28,6 +30,7 @@
 //! | [`inputs`] | forces at points, heat into beams, the motion of the frame: what they do; `input`: which there are |
 //! | [`energy`] | the potential of it all, and the energy that an undamped motion keeps |
 //! | [`stop`] | how a stop bears |
+//! | [`quotient`] | discrete gradients of members over a step |
 //! | `reading` | what is read of gaps: capacitance, distance, pull, which of them touch |
 //! | [`system`] | a multibody model with its gaps, loads and network: what `solve` works on |
 
@@ -36,6 +39,8 @@ pub mod backbending;
 pub mod capacitor;
 mod conduction;
 pub mod contact;
+pub mod contact_loss;
+pub mod contact_speed;
 pub mod dashpot;
 pub mod domain;
 pub mod drawn;
@@ -46,6 +51,7 @@ pub mod energy;
 pub mod facing;
 pub mod facing_beams;
 mod facing_ends;
+mod facing_loss;
 mod input;
 pub mod inputs;
 pub mod lag;
@@ -54,6 +60,7 @@ pub mod load;
 pub mod member;
 pub mod moving_frame;
 pub mod network;
+pub mod quotient;
 mod reading;
 pub mod stop;
 pub mod stop_pair;

@@ -1,6 +1,7 @@
 //! What is read of a system's gaps, by their number.
 
 use super::domain::Domain;
+use super::member::Member;
 use super::system::System;
 use crate::multibody::planar::Pose;
 
@@ -74,8 +75,18 @@ impl System {
         self.members.iter().map(|gap| gap.contact_energy(self.at(q))).sum()
     }
 
-    /// Work of the contact forces at `q` over a small change `dq`, each gap's taken positive [J].
-    pub fn contact_work(&self, q: &[Pose], dq: &[Pose]) -> f64 {
-        self.members.iter().map(|gap| gap.contact_work(self.at(q), dq).abs()).sum()
+    /// The same where contact loses nothing.
+    pub fn elastic_contact_energy(&self, q: &[Pose]) -> f64 {
+        self.members.iter().filter(|gap| is_elastic(gap)).map(|gap| gap.contact_energy(self.at(q))).sum()
     }
+
+    /// Work of the contact forces that lose nothing at `q` over a small change `dq`, each gap's taken positive [J].
+    pub fn contact_work(&self, q: &[Pose], dq: &[Pose]) -> f64 {
+        let elastic = self.members.iter().filter(|gap| is_elastic(gap));
+        elastic.map(|gap| gap.contact_work(self.at(q), dq).abs()).sum()
+    }
+}
+
+fn is_elastic(member: &Member) -> bool {
+    member.loss().is_some_and(|loss| !loss.acts())
 }

@@ -7,6 +7,7 @@ use super::domain::{At, Domain};
 use super::drive::{Drive, Electrics};
 use super::load::Load;
 use super::member::Member;
+use super::quotient::Chord;
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, BodyId, Model, forces};
 use nalgebra::Vector2;
@@ -175,6 +176,67 @@ impl System {
         for (gap, &volts) in self.members.iter().zip(&drive.volts) {
             gap.levers(at, volts, &mut lever);
         }
+    }
+
+    /// [`System::tangent`] without what members add.
+    pub fn tangent_without_members(
+        &self,
+        q: &[Pose],
+        drive: &Drive,
+        tangent: &mut BlockMatrix<f64, 3>,
+        r: &mut [Pose],
+    ) {
+        tangent.clear();
+        r.fill(Pose::zeros());
+        forces::add_tangent(&self.model, q, &drive.rest(), tangent, r);
+        let (at, pattern) = (self.at(q), &self.model.pattern);
+        for load in &self.loads {
+            load.add_force(at, drive.load, r);
+            load.add_tangent(at, drive.load, pattern, tangent);
+        }
+        self.add_input_forces(at, drive, r);
+        self.add_input_tangent(at, drive, tangent);
+        self.model.project(r);
+    }
+
+    /// Adds the discrete forces of members over a step of length `h` [s] with the configurations `q` at its start, middle and end, and the
+    /// symmetric part of their tangent with the end; held directions not removed.
+    pub fn add_quotients(
+        &self,
+        q: [&[Pose]; 3],
+        h: f64,
+        drive: &Drive,
+        r: &mut [Pose],
+        tangent: &mut BlockMatrix<f64, 3>,
+    ) {
+        let chord = Chord { at: q.map(|q| self.at(q)), h };
+        for (gap, &volts) in self.members.iter().zip(&drive.volts).filter(|(gap, volts)| gap.acts(**volts)) {
+            gap.add_quotient(&chord, volts, &self.model.pattern, r, tangent);
+        }
+    }
+
+    /// True where parts can touch.
+    pub fn can_touch(&self) -> bool {
+        self.members.iter().any(|member| member.touching().is_some())
+    }
+
+    /// `r +=` the forces that rates add where contact loses energy, `rate` the rate of each body; held directions not removed.
+    pub fn add_loss(&self, q: &[Pose], rate: impl Fn(usize) -> Pose, r: &mut [Pose]) {
+        let at = self.at(q);
+        self.members.iter().for_each(|member| member.add_loss(at, &rate, r));
+    }
+
+    /// Adds the derivatives of those forces with displacements to `stiffness` and with rates to `damping`. True where there are any.
+    pub fn add_loss_tangent(
+        &self,
+        q: &[Pose],
+        rate: impl Fn(usize) -> Pose,
+        stiffness: &mut BlockMatrix<f64, 3>,
+        damping: &mut BlockMatrix<f64, 3>,
+    ) -> bool {
+        let (at, pattern) = (self.at(q), &self.model.pattern);
+        let add = |any, member: &Member| member.add_loss_tangent(at, &rate, pattern, stiffness, damping) | any;
+        self.members.iter().fold(false, add)
     }
 
     /// Bodies that gaps and dead loads act on, ascending.

@@ -2,7 +2,7 @@
 //!
 //! **How large an error is.** In the mass norm, ‖e‖² = eᵀMe, which has one unit for translations and rotations, √(‖e_q‖² + h²‖e_v‖²) must
 //! stay below tol·(‖q‖ + floor), with ‖q‖ the larger of both ends of a step and a floor of 1e-4 of the model's length scale. Where parts
-//! touch, the time of a bounce is nothing beside that of the motion, and a displacement beside its reach: there the error of the energy,
+//! touch and lose no energy, the time of a bounce is nothing beside that of the motion, and a displacement beside its reach: there the error of the energy,
 //! |vᵀMe_v| + |work of the contact forces over e_q|, must also stay below tol·(kinetic energy + energy in the contacts).
 
 use super::{Equations, Motion, Place};
@@ -107,9 +107,10 @@ impl Equations for Bodies<'_> {
     }
 }
 
-/// Error of the energy over a step that begins or ends in contact; 0 elsewhere.
+/// Error of the energy over a step that begins or ends in elastic contact; 0 elsewhere. Where contact loses energy, an error of it does not
+/// last.
 pub(crate) fn contact_error(system: &System, (before, after): (&Motion, &Motion), error: &Motion, tol: f64) -> f64 {
-    let stored = system.contact_energy(&before.q).max(system.contact_energy(&after.q));
+    let stored = system.elastic_contact_energy(&before.q).max(system.elastic_contact_energy(&after.q));
     if stored == 0.0 {
         return 0.0;
     }

@@ -13,6 +13,7 @@ mod excited;
 mod formulations;
 mod free_coordinates;
 mod gaps;
+mod impacts;
 mod integrators;
 mod joint_integrators;
 mod junctions;

@@ -109,10 +109,7 @@ pub fn frame_transient(
         signals,
         counters,
         unknowns: frame.system.unknowns(),
-        estimated_error: None,
-        step_error: None,
-        events: Vec::new(),
-        warnings: Vec::new(),
+        ..TransientResult::default()
     })
 }
 

@@ -193,5 +193,6 @@ pub fn transient_from_wire(
         step_error,
         events: events.into_iter().map(event).collect(),
         warnings,
+        ..TransientResult::default()
     }
 }

@@ -17,6 +17,7 @@
 //! Reference: E. Hairer, G. Wanner, "Solving Ordinary Differential Equations II" (1996), §IV.7 (RODAS) and §VI.3 (the direct
 //! approach to differential-algebraic systems).
 
+mod lossy;
 mod ports;
 mod stages;
 mod tableau;
@@ -32,6 +33,7 @@ use crate::multibody::relative::columns::Four;
 use crate::multibody::relative::dynamics::Stresses;
 use crate::multibody::relative::geometric::{self, Geometric};
 use crate::multibody::relative::placed::{Placed, place_of};
+use lossy::Lossy;
 use ports::Ports;
 use stages::Stages;
 use std::sync::Arc;
@@ -63,6 +65,8 @@ pub struct JointRodas4 {
     rate: Drive,
     /// The bodies have been placed at the argument of the stages.
     is_placed: bool,
+    /// Derivatives of what contact loses, at the start of the step and in the stage at hand; none where it loses nothing.
+    lossy: Option<Box<Lossy>>,
     /// Accelerations are those of the motion to come.
     resumed: bool,
     /// About the shortest time in which something moves [s].
@@ -94,6 +98,7 @@ impl JointRodas4 {
             drive: electrics.drive(),
             rate: electrics.drive(),
             is_placed: false,
+            lossy: Lossy::new(closures, !sources.is_empty()).map(Box::new),
             resumed: false,
             shortest,
             work: Work::default(),
@@ -122,7 +127,7 @@ impl JointRodas4 {
     /// Places the bodies at the argument of the stage at hand, unless that is where they are, and puts −R into `right`. The
     /// first stage also begins W.
     fn residual(&mut self, first: bool, stays: bool) {
-        let Self { joints, w, placed, stresses, is_placed, stages, ports, force, right, drive, .. } = self;
+        let Self { joints, w, placed, stresses, is_placed, stages, ports, force, right, drive, lossy, .. } = self;
         let Joints { tree, closures, loops, inertias, .. } = &**joints;
         let model = &closures.model;
         if !(stays && *is_placed) {
@@ -137,6 +142,9 @@ impl JointRodas4 {
             forces::add_dampers(model, |k| placed.rate[k], force);
         }
         let poses = placed.at.as_slice();
+        if let Some(lossy) = lossy {
+            lossy.add_forces(closures, first, placed, force);
+        }
         if first {
             closures.add_tangent(poses, drive, &mut w.bodies, force);
             if !ports.is_empty() {
@@ -152,6 +160,9 @@ impl JointRodas4 {
             closures.add_tangent(poses, drive, &mut ports.tangent, force);
         }
         if !ports.is_empty() {
+            if let Some(lossy) = lossy {
+                lossy.add_tangent(&mut ports.tangent);
+            }
             ports.force.copy_from_slice(force);
         }
         stresses.fill(tree, &stages.argument, &drive.rest());
@@ -160,8 +171,11 @@ impl JointRodas4 {
     }
 
     fn factor(&mut self, gh: f64) -> Result<(), StepFailure> {
-        let Self { joints, w, placed, geometric, stages, force, .. } = self;
+        let Self { joints, w, placed, geometric, stages, force, lossy, .. } = self;
         forces::add_inertia(&joints.closures.model, 1.0 / (gh * gh), 1.0 / gh, &mut w.bodies);
+        if let Some(lossy) = lossy {
+            lossy.add_matrix(gh, &mut w.bodies);
+        }
         let at = |j: usize| {
             let (tile, lane) = place_of(j);
             stages.argument[tile].of(lane)[0]
@@ -175,15 +189,23 @@ impl JointRodas4 {
     /// Completes the right side of stage `i` of a step of length `h` [s]: `right` holds −R.
     fn inertia(&mut self, i: usize, h: f64) {
         let rate = GAMMA_I[i] * h;
-        let Self { joints, stages, right, wrench, forcing, force, .. } = self;
+        let Self { joints, stages, right, wrench, forcing, force, lossy, .. } = self;
         let Joints { tree, closures, inertias, drags, .. } = &**joints;
-        stages.move_bodies(i, h, *drags);
+        let loses = lossy.as_ref().is_some_and(|lossy| lossy.acts());
+        stages.move_bodies(i, h, *drags || loses);
         for ((j, inertia), (wrench, forcing)) in inertias.iter().enumerate().zip(wrench.iter_mut().zip(forcing)) {
             *wrench = Four::from(inertia.force(&stages.push(j), &stages.drift(j)) - *forcing * rate);
         }
         if !closures.model.dampers.is_empty() {
             force.fill(Pose::zeros());
             forces::add_dampers(&closures.model, |k| stages.drift(k), force);
+            for (wrench, force) in wrench.iter_mut().zip(force.iter()) {
+                *wrench = Four::from(wrench.pose() + *force);
+            }
+        }
+        if let Some(lossy) = lossy.as_ref().filter(|_| loses) {
+            force.fill(Pose::zeros());
+            lossy.add_drift(&closures.model, |k| stages.drift(k), force);
             for (wrench, force) in wrench.iter_mut().zip(force) {
                 *wrench = Four::from(wrench.pose() + *force);
             }
@@ -255,7 +277,8 @@ impl Method<Bodies<'_>> for JointRodas4 {
             self.inertia(i, h);
             self.w.solve(&mut self.wrench, &mut self.right);
             let stage = (&self.stages, self.placed.at.as_slice(), &self.drive);
-            let solves = self.ports.stage(&self.joints, ramp, (i, at, h, rate), stage, &self.w, &self.carried[2..]);
+            let matrices = (&self.w, self.lossy.as_deref());
+            let solves = self.ports.stage(&self.joints, ramp, (i, at, h, rate), stage, matrices, &self.carried[2..]);
             self.stages.keep(i, &self.right, &self.wrench);
             self.work.solves += 1 + solves;
         }

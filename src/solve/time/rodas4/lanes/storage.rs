@@ -74,10 +74,11 @@ fn block(pattern: &Pattern, row: usize, column: usize) -> Option<usize> {
 }
 
 impl LaneRodas4 {
-    /// Storage for a mechanism, with its numbers in every lane; none for a linear model, for one with inputs beside voltages,
-    /// and on a processor without vectors.
+    /// Storage for a mechanism, with its numbers in every lane; none for a linear model, for one with inputs beside voltages or contact
+    /// that loses energy, and on a processor without vectors.
     pub fn new(system: &System) -> Option<Self> {
-        let model = LaneModel::new(&system.model).filter(|_| has_lanes() && system.electrics.inputs.is_empty())?;
+        let suits = has_lanes() && system.electrics.inputs.is_empty() && !system.loses();
+        let model = LaneModel::new(&system.model).filter(|_| suits)?;
         let (n, pattern) = (system.bodies(), &system.model.pattern);
         let acted = system.acted_on();
         let between = |&row: &usize| acted.iter().filter_map(move |&column| block(pattern, row, column));
