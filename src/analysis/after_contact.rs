@@ -2,7 +2,7 @@
 //!
 //! Impacts multiply differences: bounces that lose nothing are chaotic. A run that touches is therefore compared with a companion, at ten
 //! times the tolerance or in steps of twice the length. While both stay within ten tolerances of each other, of the amplitude of
-//! each signal, the tolerance holds. From the first output time after contact at which they do not, single values hold no more
+//! each signal, by root mean square over a twentieth of the run, the tolerance holds. From the first window after contact in which they do not, single values hold no more
 //! ([`TransientResult::reliable_until`]): the result then has mean, root mean square and range of each signal over what is left
 //! ([`Statistics`]). The mean has a 95 % confidence interval, from the means of five windows of equal length by Student's t.
 
@@ -14,6 +14,9 @@ use super::{AnalysisError, Watch};
 pub const WARNING: &str = "W046";
 /// Tolerances between a run and its companion up to which single values hold [1].
 const APART: f64 = 10.0;
+/// Windows of a run in which it is compared with its companion: an impact that comes a little later makes a peak in the difference of two
+/// rates, which says nothing of what follows.
+const COMPARED: usize = 20;
 /// Windows of the statistics.
 const WINDOWS: usize = 5;
 /// Student's t for 95 % and four degrees of freedom.
@@ -86,11 +89,17 @@ pub(super) fn judge(
         Ok(()) => {
             let both = others.t.len().min(samples.t.len());
             let allowed = allowed(samples, options, result, least);
-            let apart = |k: &usize| {
-                let within = |((a, b), most): ((&Vec<f64>, &Vec<f64>), &f64)| (a[*k] - b[*k]).abs() <= *most;
+            let window = (samples.t.len() / COMPARED).max(1);
+            let starts = (first..both).step_by(window);
+            let apart = |from: &usize| {
+                let over = *from..(from + window).min(both);
+                let within = |((a, b), most): ((&Vec<f64>, &Vec<f64>), &f64)| {
+                    let squares: f64 = over.clone().map(|k| (a[k] - b[k]) * (a[k] - b[k])).sum();
+                    (squares / over.len() as f64).sqrt() <= *most
+                };
                 !samples.columns.iter().zip(&others.columns).zip(&allowed).all(within)
             };
-            (first..both).find(apart)
+            starts.into_iter().find(apart)
         }
         Err(AnalysisError::Cancelled) => return Err(AnalysisError::Cancelled),
         Err(_) => Some(first),
@@ -157,7 +166,8 @@ mod tests {
     /// 0.3 … 0.9, whose standard error is √0.1/√5, so that the interval is 2.776·0.1414.
     #[test]
     fn statistics_by_hand() {
-        let options = TransientOptions { signals: vec!["a".into(), "b".into()], points: 1001, ..TransientOptions::default() };
+        let options =
+            TransientOptions { signals: vec!["a".into(), "b".into()], points: 1001, ..TransientOptions::default() };
         let mut samples = Samples::new(&options);
         for k in 0..1000 {
             let t = f64::from(k) / 1000.0;

@@ -79,8 +79,7 @@ mod tests {
     /// α of six restitutions, from an independent computation of the equation in the head of the file (four decimals).
     #[test]
     fn alphas() {
-        for (e, expected) in
-            [(0.9, 0.1665), (0.8, 0.3731), (0.7, 0.6348), (0.5, 1.4328), (0.3, 3.0871), (0.2, 4.9192)]
+        for (e, expected) in [(0.9, 0.1665), (0.8, 0.3731), (0.7, 0.6348), (0.5, 1.4328), (0.3, 3.0871), (0.2, 4.9192)]
         {
             assert!((alpha(e) - expected).abs() < 6e-5, "{e}: {}", alpha(e));
         }

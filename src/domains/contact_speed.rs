@@ -68,7 +68,8 @@ fn groups(system: &System, asked: &[usize]) -> Vec<Vec<usize>> {
     let mut of_voltage: BTreeMap<Vec<u64>, usize> = BTreeMap::new();
     let mut groups: Vec<Vec<usize>> = Vec::new();
     for &g in asked {
-        let row: Vec<u64> = if g < rows.nrows() { rows.row(g).iter().map(|x| x.to_bits()).collect() } else { Vec::new() };
+        let row: Vec<u64> =
+            if g < rows.nrows() { rows.row(g).iter().map(|x| x.to_bits()).collect() } else { Vec::new() };
         let driven = g < rows.nrows() && rows.row(g).iter().any(|x| *x != 0.0);
         match of_voltage.get(&row).filter(|_| driven) {
             Some(&group) => groups[group].push(g),

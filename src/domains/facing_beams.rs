@@ -209,7 +209,12 @@ impl Domain for FacingBeams {
 }
 
 /// Adds the tangent over four bodies.
-pub(super) fn add_quad(pattern: &Pattern, ids: &[BodyId; 4], h: &SMatrix<f64, 12, 12>, tangent: &mut BlockMatrix<f64, 3>) {
+pub(super) fn add_quad(
+    pattern: &Pattern,
+    ids: &[BodyId; 4],
+    h: &SMatrix<f64, 12, 12>,
+    tangent: &mut BlockMatrix<f64, 3>,
+) {
     for (i, &row) in ids.iter().enumerate() {
         for (j, &column) in ids.iter().enumerate() {
             let (BodyId::Free(row), BodyId::Free(column)) = (row, column) else { continue };

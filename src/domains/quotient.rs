@@ -37,7 +37,11 @@ impl Chord<'_> {
 }
 
 /// f* and its derivative with x₁ of a potential with the derivative `slope` (first, second), from (x₀, φ₀) to (x₁, φ₁).
-pub(super) fn quotient((x0, phi0): (f64, f64), (x1, phi1): (f64, f64), slope: impl Fn(f64) -> (f64, f64)) -> (f64, f64) {
+pub(super) fn quotient(
+    (x0, phi0): (f64, f64),
+    (x1, phi1): (f64, f64),
+    slope: impl Fn(f64) -> (f64, f64),
+) -> (f64, f64) {
     let dx = x1 - x0;
     if dx.abs() < SMALL {
         let middle = slope(0.5 * (x0 + x1));

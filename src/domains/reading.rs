@@ -75,18 +75,19 @@ impl System {
         self.members.iter().map(|gap| gap.contact_energy(self.at(q))).sum()
     }
 
-    /// The same where contact loses nothing.
-    pub fn elastic_contact_energy(&self, q: &[Pose]) -> f64 {
-        self.members.iter().filter(|gap| is_elastic(gap)).map(|gap| gap.contact_energy(self.at(q))).sum()
-    }
-
-    /// Work of the contact forces that lose nothing at `q` over a small change `dq`, each gap's taken positive [J].
+    /// Work of the contact forces at `q` over a small change `dq`, each gap's taken positive [J].
     pub fn contact_work(&self, q: &[Pose], dq: &[Pose]) -> f64 {
-        let elastic = self.members.iter().filter(|gap| is_elastic(gap));
-        elastic.map(|gap| gap.contact_work(self.at(q), dq).abs()).sum()
+        self.members.iter().map(|gap| gap.contact_work(self.at(q), dq).abs()).sum()
     }
-}
 
-fn is_elastic(member: &Member) -> bool {
-    member.loss().is_some_and(|loss| !loss.acts())
+    /// The largest change of the distance of a contact with a change `dq` at `q`, over how far it is pressed, `least` [m] at least [1].
+    pub fn contact_change(&self, q: &[Pose], dq: &[Pose], least: f64) -> f64 {
+        let change = |gap: &Member| {
+            let [touch, _] = gap.touching()?;
+            let pressed = touch - gap.distance(self.at(q));
+            (pressed > 0.0).then(|| gap.distance_change(self.at(q), dq).abs() / pressed.max(least))
+        };
+        // a sum with what is not a number is none
+        self.members.iter().filter_map(change).fold(0.0, |most, one| if one <= most { most } else { one })
+    }
 }

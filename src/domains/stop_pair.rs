@@ -160,8 +160,7 @@ impl Domain for StopPair {
                 let (force, slope) = self.stop.force(way - u);
                 (force, -slope)
             };
-            let (mean, by_end) =
-                quotient((u0, self.stop.energy(way - u0)), (u1, self.stop.energy(way - u1)), pressed);
+            let (mean, by_end) = quotient((u0, self.stop.energy(way - u0)), (u1, self.stop.energy(way - u1)), pressed);
             let (added, by_rate) = self.loss.fraction((u1 - u0) / chord.h);
             (mean * (1.0 + added), by_end * (1.0 + added) + mean * by_rate / chord.h)
         };

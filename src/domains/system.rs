@@ -46,8 +46,14 @@ impl System {
     /// `r += ∂Π/∂q − load`, held directions removed from the sum. Goes from the last joint to the first: between sweeps
     /// over the bodies from the first to the last it finds in the caches what the one before left there.
     pub fn add_residual(&self, q: &[Pose], drive: &Drive, r: &mut [Pose]) {
+        self.add_residual_and(q, drive, r, |_| ());
+    }
+
+    /// The same with what `more` adds before held directions are removed.
+    pub(crate) fn add_residual_and(&self, q: &[Pose], drive: &Drive, r: &mut [Pose], more: impl FnOnce(&mut [Pose])) {
         forces::add_elastic_backwards(&self.model, q, &drive.rest(), r);
         self.add_body_forces(q, drive, r);
+        more(r);
         self.model.project(r);
     }
 
@@ -90,10 +96,23 @@ impl System {
 
     /// [`System::tangent`] with the residual added to `r`, held directions removed from the sum.
     pub fn add_tangent(&self, q: &[Pose], drive: &Drive, tangent: &mut BlockMatrix<f64, 3>, r: &mut [Pose]) {
+        self.add_tangent_and(q, drive, tangent, r, |_| ());
+    }
+
+    /// The same with what `more` adds to `r` before held directions are removed.
+    pub(crate) fn add_tangent_and(
+        &self,
+        q: &[Pose],
+        drive: &Drive,
+        tangent: &mut BlockMatrix<f64, 3>,
+        r: &mut [Pose],
+        more: impl FnOnce(&mut [Pose]),
+    ) {
         tangent.clear();
         forces::add_tangent(&self.model, q, &drive.rest(), tangent, r);
         self.add_body_forces(q, drive, r);
         self.add_body_tangent(q, drive, tangent);
+        more(r);
         self.model.project(r);
     }
 

@@ -6,9 +6,9 @@
 //! bodies it moves. A time constant of heat much longer than the period of what moves makes this right.
 
 use crate::domains::{Drive, Ramp, System};
-use crate::multibody::{BlockMatrix, forces};
 use crate::multibody::planar::Pose;
 use crate::multibody::rcr::{AddedInertia, Closure, Linkage, Reduction};
+use crate::multibody::{BlockMatrix, forces};
 
 /// What acts on a mechanism in joint coordinates.
 pub trait Loads {

@@ -38,4 +38,3 @@ impl Picked {
         of.iter().zip(self.columns).map(|((name, unit, _), column)| (name.clone(), unit.clone(), column)).collect()
     }
 }
-

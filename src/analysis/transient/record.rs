@@ -70,12 +70,13 @@ pub(in crate::analysis) fn record(
     let (mut beyond, mut stopped_at) = (None, None);
     refuse_in_contact(compiled, options, 0.0, &motion)?;
     let mut observe = |s: f64, h: f64, before: &Motion, after: &Motion| {
+        stopped_at = crossings.step(s, h, before, after);
         let suits = refuse_in_contact(compiled, options, s + h, after);
-        if let Err(error) = suits.and_then(|()| within_contact_range(compiled, &after.q)) {
+        let within = |()| within_contact_range(compiled, &after.q);
+        if let Err(error) = suits.and_then(within).or_else(|error| stopped_at.map(|_| ()).ok_or(error)) {
             beyond = Some(error);
             return false;
         }
-        stopped_at = crossings.step(s, h, before, after);
         samples.step(s, h, before, after, stopped_at.unwrap_or(f64::INFINITY));
         if stopped_at.is_some() {
             return false;

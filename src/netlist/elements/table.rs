@@ -129,8 +129,7 @@ const GAP_E: &[&str] = &[
     "restitution",
     "speed",
 ];
-const GAP_SHEET: &[&str] =
-    &["l", "w", "w1", "w2", "gap", "h", "Rs", "permittivity", "touch", "restitution", "speed"];
+const GAP_SHEET: &[&str] = &["l", "w", "w1", "w2", "gap", "h", "Rs", "permittivity", "touch", "restitution", "speed"];
 const PLATES: &[&str] = &["A", "gap", "permittivity", "touch", "restitution", "speed"];
 const STOP: &[&str] = &["gap", "back", "k", "A", "restitution", "speed"];
 const LOAD: &[&str] = &["F", "M"];

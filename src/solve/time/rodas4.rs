@@ -119,12 +119,24 @@ impl<S: LinearSolver> Method<Bodies<'_>> for Rodas4<S> {
                 turning.now = system.frame(&self.drive).map(Gyration::new).unwrap_or_default();
                 self.stages.add_gyration(model, (i, h), turning.now, turning.start);
             }
-            if let Some(lossy) = &mut self.lossy {
-                lossy.add_forces(system, (i, h), &mut self.stages, motion);
-            }
-            let (q, force) = self.stages.place(i, motion);
+            // what contact loses needs the stages beside their force
+            let mut force = std::mem::take(&mut self.stages.force);
+            let (stages, lossy, from) = (&self.stages, &mut self.lossy, &*motion);
+            let lose = |force: &mut [Pose]| {
+                if let Some(lossy) = lossy {
+                    lossy.add_forces(system, (i, h), (stages, from), force);
+                }
+            };
+            let q = stages.at(i, from);
             if i == 0 {
-                system.add_tangent(q, &self.drive, &mut self.w, force);
+                system.add_tangent_and(q, &self.drive, &mut self.w, &mut force, lose);
+            } else if let Some(tangent) = self.ports.tangent() {
+                system.add_tangent_and(q, &self.drive, tangent, &mut force, lose);
+            } else {
+                system.add_residual_and(q, &self.drive, &mut force, lose);
+            }
+            self.stages.force = force;
+            if i == 0 {
                 self.ports.keep_tangent(&self.w);
                 if let Some(lossy) = &self.lossy {
                     lossy.add_matrix(gh, &mut self.w);
@@ -134,14 +146,11 @@ impl<S: LinearSolver> Method<Bodies<'_>> for Rodas4<S> {
                 self.solver.factor(&model.pattern, &mut self.w)?;
                 self.work.factorizations += 1;
                 self.work.forces += 6;
-            } else if let Some(tangent) = self.ports.tangent() {
-                system.add_tangent(q, &self.drive, tangent, force);
-            } else {
-                system.add_residual(q, &self.drive, force);
             }
             if let (Some(lossy), Some(tangent)) = (&self.lossy, self.ports.tangent()) {
                 lossy.add_tangent(tangent);
             }
+            let force = &mut self.stages.force;
             self.solver.solve(&model.pattern, &self.w, force);
             let mut solves = 1;
             if let Some(turning) = turning {

@@ -12,7 +12,7 @@ use crate::solve::method::Motion;
 
 /// Derivatives of the force with displacements and rates.
 #[derive(Debug, Clone)]
-struct Derivatives {
+pub(super) struct Derivatives {
     stiffness: BlockMatrix<f64, 3>,
     damping: BlockMatrix<f64, 3>,
     /// They are not zero.
@@ -20,17 +20,35 @@ struct Derivatives {
 }
 
 impl Derivatives {
-    fn new(model: &Model) -> Self {
+    pub(super) fn new(model: &Model) -> Self {
         let zeros = BlockMatrix::new(&model.pattern);
         Self { stiffness: zeros.clone(), damping: zeros, act: false }
     }
 
-    fn at(&mut self, system: &System, q: &[Pose], rate: impl Fn(usize) -> Pose) {
+    /// Those of bodies at displacements `q` and rates.
+    pub(super) fn at(&mut self, system: &System, q: &[Pose], rate: impl Fn(usize) -> Pose) {
         if self.act {
             self.stiffness.clear();
             self.damping.clear();
         }
         self.act = system.add_loss_tangent(q, rate, &mut self.stiffness, &mut self.damping);
+    }
+
+    /// Adds their part of the matrix of a step.
+    pub(super) fn add_matrix(&self, gh: f64, w: &mut BlockMatrix<f64, 3>) {
+        if self.act {
+            self.stiffness.add_to(1.0, w);
+            self.damping.add_to(1.0 / gh, w);
+        }
+    }
+
+    /// `force −=` the damping at rates `x`.
+    pub(super) fn subtract_damping(&self, model: &Model, x: &[Pose], force: &mut [Pose]) {
+        if self.act {
+            force.iter_mut().for_each(|f| *f = -*f);
+            self.damping.multiply_add(&model.pattern, x, force);
+            force.iter_mut().for_each(|f| *f = -*f);
+        }
     }
 }
 
@@ -52,8 +70,13 @@ impl Lossy {
     }
 
     /// Adds the forces of stage `i` of a step of length `h` [s], which has begun.
-    pub(super) fn add_forces(&mut self, system: &System, (i, h): (usize, f64), stages: &mut Stages, motion: &Motion) {
-        let mut force = std::mem::take(&mut stages.force);
+    pub(super) fn add_forces(
+        &mut self,
+        system: &System,
+        (i, h): (usize, f64),
+        (stages, motion): (&Stages, &Motion),
+        force: &mut [Pose],
+    ) {
         let q = stages.at(i, motion);
         let rate = |k: usize| stages.speed(i, h, k);
         if i == 0 {
@@ -62,19 +85,13 @@ impl Lossy {
         if let Some(now) = &mut self.now {
             now.at(system, q, rate);
         }
-        system.add_loss(q, rate, &mut force);
-        if self.start.act {
-            subtract(&self.start.damping, &system.model, stages.r1(), &mut force);
-        }
-        stages.force = force;
+        system.add_loss(q, rate, force);
+        self.start.subtract_damping(&system.model, stages.r1(), force);
     }
 
     /// Adds its part of the matrix of a step.
     pub(super) fn add_matrix(&self, gh: f64, w: &mut BlockMatrix<f64, 3>) {
-        if self.start.act {
-            self.start.stiffness.add_to(1.0, w);
-            self.start.damping.add_to(1.0 / gh, w);
-        }
+        self.start.add_matrix(gh, w);
     }
 
     /// Adds the derivatives with displacements in the stage at hand to its tangent.
@@ -97,15 +114,6 @@ impl Lossy {
             speeds.iter_mut().enumerate().for_each(|(k, speed)| *speed = stages.speed(i, h, k));
             now.damping.multiply_add(&model.pattern, speeds, force);
         }
-        if self.start.act {
-            subtract(&self.start.damping, model, stages.r1(), force);
-        }
+        self.start.subtract_damping(model, stages.r1(), force);
     }
-}
-
-/// `force −= matrix·x`.
-fn subtract(matrix: &BlockMatrix<f64, 3>, model: &Model, x: &[Pose], force: &mut [Pose]) {
-    force.iter_mut().for_each(|f| *f = -*f);
-    matrix.multiply_add(&model.pattern, x, force);
-    force.iter_mut().for_each(|f| *f = -*f);
 }
