@@ -35,6 +35,8 @@ const LOOSER: f64 = 10.0;
 const LOOSEST: f64 = 0.1;
 /// Output times that are compared, at least and at most, whatever is printed.
 const POINTS: (usize, usize) = (201, 1001);
+/// Times as many of a run that ends at an event.
+const SOONER: usize = 5;
 /// Unknowns times steps of one run, at most.
 const MOST_WORK: f64 = 3e6;
 /// Output times that a run must have reached to say something.
@@ -204,7 +206,11 @@ fn swing(moving: &Compiled, options: &TransientOptions<'_>, segments: &[usize]) 
 }
 
 fn points(options: &TransientOptions<'_>) -> usize {
-    options.points.clamp(POINTS.0, POINTS.1)
+    // one that ends at an event may be over soon
+    match options.until {
+        Some(_) => options.points.max(SOONER * POINTS.1),
+        None => options.points.clamp(POINTS.0, POINTS.1),
+    }
 }
 
 /// How far two runs are apart, of the amplitude.
