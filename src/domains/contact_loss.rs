@@ -56,6 +56,11 @@ impl Loss {
     }
 }
 
+/// ω₀⁻¹ times the speed with which a plate arrives at its pull-in voltage [m], see [`super::contact_speed`]: from the gap `g` to where it touches, `t` [m].
+pub(super) fn fall_at_pull_in(g: f64, t: f64) -> f64 {
+    g * (8.0 / 27.0 * (g / t - 1.0) - (1.0 - t / g) * (1.0 - t / g)).max(0.0).sqrt()
+}
+
 /// α of a restitution above 0 and at most 1.
 pub fn alpha(restitution: f64) -> f64 {
     let e = restitution;

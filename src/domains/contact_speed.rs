@@ -22,11 +22,6 @@ const CANCELLED: f64 = 1e-3;
 /// Contacts that get a shape of their own; the others share that of the last one.
 const MOST_SHAPES: usize = 256;
 
-/// ω₀⁻¹ times the speed with which a plate arrives at its pull-in voltage [m], see the module: from the gap `g` to where it touches, `t` [m].
-pub(super) fn fall_at_pull_in(g: f64, t: f64) -> f64 {
-    g * (8.0 / 27.0 * (g / t - 1.0) - (1.0 - t / g) * (1.0 - t / g)).max(0.0).sqrt()
-}
-
 impl System {
     /// True where the contact of a member takes energy out of a motion.
     pub fn loses(&self) -> bool {

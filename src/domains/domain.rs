@@ -15,7 +15,6 @@ use super::approach::{Approach, Point};
 use super::capacitor::Capacitor;
 use super::contact::Contact;
 use super::contact_loss::Loss;
-use super::quotient::Chord;
 use super::stop::Stop;
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, BodyId, Pattern};
@@ -28,6 +27,15 @@ pub struct At<'a> {
     pub q: &'a [Pose],
     /// Small displacements about the drawing.
     pub linear: bool,
+}
+
+/// A step of length `h` [s]: its start, middle and end.
+#[derive(Debug, Clone, Copy)]
+pub struct Chord<'a> {
+    /// Configurations at the start, the middle and the end.
+    pub at: [At<'a>; 3],
+    /// Length [s].
+    pub h: f64,
 }
 
 /// A law of one approach, as other simulators can write it down.

@@ -3,11 +3,10 @@
 use super::approach::{Approach, Point};
 use super::capacitor::{Capacitance, Capacitor};
 use super::contact::{Contact, touching_distance};
-use super::contact_loss::Loss;
-use super::contact_speed::fall_at_pull_in;
-use super::domain::{At, Domain, Law};
+use super::contact_loss::{Loss, fall_at_pull_in};
+use super::domain::{At, Chord, Domain, Law};
 use super::drawn::{Drawing, Drawn};
-use super::quotient::{self, Chord, quotient};
+use super::quotient::{self, quotient};
 use crate::multibody::model::locate;
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, BodyId, Pattern};

@@ -2,14 +2,12 @@
 
 use super::approach::{Approach, Point};
 use super::contact::touching_distance;
-use super::contact_loss::Loss;
-use super::contact_speed::fall_at_pull_in;
-use super::domain::{At, Domain};
+use super::contact_loss::{Loss, fall_at_pull_in};
+use super::domain::{At, Chord, Domain};
 use super::drawn::{Drawing, Drawn};
 use super::facing::Facing;
 use super::facing_ends;
-use super::facing_loss;
-use super::quotient::Chord;
+use super::facing_loss::{self, Pair};
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, BodyId, Pattern};
 use crate::structure::GapVoltage;
@@ -30,7 +28,7 @@ pub struct FacingBeams {
 
 impl FacingBeams {
     /// z of [`super::facing`].
-    pub(super) fn values(&self, at: At<'_>) -> Vector4<f64> {
+    fn values(&self, at: At<'_>) -> Vector4<f64> {
         facing_ends::values(at.linear, &self.ends, self.side, at.q)
     }
 
@@ -40,13 +38,12 @@ impl FacingBeams {
     }
 
     /// `r +=` the forces of what is `first` per z.
-    pub(super) fn add(&self, at: At<'_>, first: Vector4<f64>, r: &mut [Pose]) {
-        let f = facing_ends::rows(at.linear, &self.ends, self.side, at.q).0.transpose() * first;
-        for (i, id) in facing_ends::bodies(&self.ends).into_iter().enumerate() {
-            if let BodyId::Free(k) = id {
-                r[k] += f.fixed_rows::<3>(3 * i);
-            }
-        }
+    fn add(&self, at: At<'_>, first: Vector4<f64>, r: &mut [Pose]) {
+        facing_ends::add(at.linear, &self.ends, self.side, at.q, first, r);
+    }
+
+    fn pair(&self) -> Pair<'_> {
+        Pair { ends: &self.ends, side: self.side, facing: &self.facing, loss: &self.loss }
     }
 }
 
@@ -106,7 +103,7 @@ impl Domain for FacingBeams {
             // bodies a, b, c, d; ends 0 (a, c) and 1 (b, d)
             h[(3 * i + 2, 3 * i + 2)] += first[2 * (i % 2)] * bend[i];
         }
-        add_quad(pattern, &facing_ends::bodies(&self.ends), &h, tangent);
+        facing_ends::add_quad(pattern, &facing_ends::bodies(&self.ends), &h, tangent);
     }
 
     fn levers(&self, at: At<'_>, volts: f64, mut lever: impl FnMut(Point, Vector2<f64>)) {
@@ -177,7 +174,7 @@ impl Domain for FacingBeams {
     }
 
     fn add_loss(&self, at: At<'_>, rate: &impl Fn(usize) -> Pose, r: &mut [Pose]) {
-        facing_loss::add(self, at, rate, r);
+        facing_loss::add(&self.pair(), at, rate, r);
     }
 
     fn add_loss_tangent(
@@ -188,7 +185,7 @@ impl Domain for FacingBeams {
         stiffness: &mut BlockMatrix<f64, 3>,
         damping: &mut BlockMatrix<f64, 3>,
     ) -> bool {
-        facing_loss::add_tangent(self, at, rate, pattern, stiffness, damping)
+        facing_loss::add_tangent(&self.pair(), at, rate, pattern, stiffness, damping)
     }
 
     fn add_quotient(
@@ -199,33 +196,11 @@ impl Domain for FacingBeams {
         r: &mut [Pose],
         tangent: &mut BlockMatrix<f64, 3>,
     ) {
-        facing_loss::add_quotient(self, chord, volts, pattern, r, tangent);
+        facing_loss::add_quotient(&self.pair(), chord, volts, pattern, r, tangent);
     }
 
     fn contact_work(&self, at: At<'_>, dq: &[Pose]) -> f64 {
         let force = self.facing.contact(&self.values(at)).0;
         if force.x == 0.0 && force.z == 0.0 { 0.0 } else { force.dot(&self.changes(at, dq)) }
-    }
-}
-
-/// Adds the tangent over four bodies.
-pub(super) fn add_quad(
-    pattern: &Pattern,
-    ids: &[BodyId; 4],
-    h: &SMatrix<f64, 12, 12>,
-    tangent: &mut BlockMatrix<f64, 3>,
-) {
-    for (i, &row) in ids.iter().enumerate() {
-        for (j, &column) in ids.iter().enumerate() {
-            let (BodyId::Free(row), BodyId::Free(column)) = (row, column) else { continue };
-            let block = h.fixed_view::<3, 3>(3 * i, 3 * j);
-            if row == column {
-                tangent.diagonal[row] += block;
-            } else if row > column
-                && let Some(at) = pattern.block(row, column)
-            {
-                tangent.below[at] += block;
-            }
-        }
     }
 }

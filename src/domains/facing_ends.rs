@@ -2,7 +2,7 @@
 
 use super::approach::Approach;
 use crate::multibody::planar::Pose;
-use crate::multibody::{BodyId, Model};
+use crate::multibody::{BlockMatrix, BodyId, Model, Pattern};
 use nalgebra::{SMatrix, SVector, Vector4};
 
 /// Twelve coordinates of the four bodies of a pair of facing beams.
@@ -61,4 +61,36 @@ pub(super) fn rows(linear: bool, ends: &[Approach; 2], side: f64, q: &[Pose]) ->
         (bend[e], bend[2 + e]) = (m.bend[0], m.bend[1]);
     }
     (rows, bend)
+}
+
+/// `r +=` the forces of what is `first` per z.
+pub(super) fn add(linear: bool, ends: &[Approach; 2], side: f64, q: &[Pose], first: Vector4<f64>, r: &mut [Pose]) {
+    let f = rows(linear, ends, side, q).0.transpose() * first;
+    for (i, id) in bodies(ends).into_iter().enumerate() {
+        if let BodyId::Free(k) = id {
+            r[k] += f.fixed_rows::<3>(3 * i);
+        }
+    }
+}
+
+/// Adds the tangent over four bodies.
+pub(super) fn add_quad(
+    pattern: &Pattern,
+    ids: &[BodyId; 4],
+    h: &SMatrix<f64, 12, 12>,
+    tangent: &mut BlockMatrix<f64, 3>,
+) {
+    for (i, &row) in ids.iter().enumerate() {
+        for (j, &column) in ids.iter().enumerate() {
+            let (BodyId::Free(row), BodyId::Free(column)) = (row, column) else { continue };
+            let block = h.fixed_view::<3, 3>(3 * i, 3 * j);
+            if row == column {
+                tangent.diagonal[row] += block;
+            } else if row > column
+                && let Some(at) = pattern.block(row, column)
+            {
+                tangent.below[at] += block;
+            }
+        }
+    }
 }

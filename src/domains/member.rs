@@ -2,10 +2,9 @@
 
 use super::approach::{Approach, Point};
 use super::contact_loss::Loss;
-use super::domain::{At, Domain, Law};
+use super::domain::{At, Chord, Domain, Law};
 use super::drawn::{Drawing, Drawn, Laid};
 use super::element::Element;
-use super::quotient::Chord;
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, BodyId, Damper, Pattern};
 use nalgebra::Vector2;

@@ -8,22 +8,13 @@
 //! Reference: O. Gonzalez, "Time integration and discrete Hamiltonian systems", J. Nonlinear Sci. 6 (1996) 449–467.
 
 use super::approach::Approach;
-use super::domain::At;
+use super::domain::Chord;
 use crate::multibody::model::locate;
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, BodyId, Model, Pattern};
 
 /// Change of a distance below which Simpson's rule stands for the quotient [m].
 const SMALL: f64 = 1e-12;
-
-/// A step of length `h` [s]: its start, middle and end.
-#[derive(Debug, Clone, Copy)]
-pub struct Chord<'a> {
-    /// Configurations at the start, the middle and the end.
-    pub at: [At<'a>; 3],
-    /// Length [s].
-    pub h: f64,
-}
 
 impl Chord<'_> {
     /// sin(Δθ/2)/(Δθ/2) of a body; 1 in a linear model.

@@ -3,9 +3,9 @@
 use super::approach::{Approach, Point};
 use super::contact::TOUCH;
 use super::contact_loss::Loss;
-use super::domain::{At, Domain, Law};
+use super::domain::{At, Chord, Domain, Law};
 use super::drawn::{Drawing, Drawn};
-use super::quotient::{self, Chord, quotient};
+use super::quotient::{self, quotient};
 use super::stop::{Stop, lost, nearer};
 use crate::multibody::model::locate;
 use crate::multibody::planar::Pose;

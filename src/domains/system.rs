@@ -3,11 +3,10 @@
 //! The residual is r(q, drive) = ∂Π/∂q − load, so that statics is r = 0 and dynamics M·q̈ + C·q̇ + r = 0.
 
 use super::approach::Point;
-use super::domain::{At, Domain};
+use super::domain::{At, Chord, Domain};
 use super::drive::{Drive, Electrics};
 use super::load::Load;
 use super::member::Member;
-use super::quotient::Chord;
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, BodyId, Model, forces};
 use nalgebra::Vector2;

@@ -196,6 +196,8 @@ impl<'a, S: LinearSolver> Newton<'a, S> {
             }
         }
         if let Some(h) = equation.quotient {
+            let middle: f64 = equation.samples.iter().map(|sample| sample.weight * sample.time).sum();
+            self.bodies.ramp.at(middle, &mut self.drive);
             for (k, (middle, q)) in self.at.iter_mut().zip(equation.base).enumerate() {
                 *middle = q + x[k] * 0.5;
                 self.force[k] = q + x[k];
