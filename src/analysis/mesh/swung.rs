@@ -120,10 +120,11 @@ pub(super) fn order(
     Ok(last)
 }
 
-/// True where the run goes from rest to a state in which parts touch.
+/// True where the run goes from rest to a state in which parts touch, on a mesh that is to be found.
 pub(super) fn closes(moving: &Compiled, options: &TransientOptions<'_>) -> bool {
     let system = &moving.parts.system;
-    let asked = options.release.is_none() && !options.signals.is_empty() && moving.options.band.is_none();
+    let free = !chosen(moving) && moving.options.band.is_none();
+    let asked = free && options.release.is_none() && !options.signals.is_empty();
     let touches = |point: OperatingPoint| (0..system.members.len()).any(|g| system.touches(g, &point.q));
     asked && system.can_touch() && operating_point(moving, &options.voltages).is_ok_and(touches)
 }
