@@ -17,8 +17,7 @@ pub(super) fn left_out(compiled: &Compiled, point: &OperatingPoint) -> Option<(S
     }
     let system = &compiled.parts.system;
     let (model, pattern, q) = (&system.model, &system.model.pattern, &point.q);
-    let (mut rise, mut drive) = (point.rise.clone(), system.electrics.drive());
-    system.electrics.steady(&point.sources, &mut rise, &mut drive);
+    let drive = point.drive(compiled);
     let mut change = vec![Pose::zeros(); system.bodies()];
     let mut largest = (0, 0.0);
     for (gap, &volts) in drive.volts.iter().enumerate() {

@@ -23,10 +23,10 @@ pub(super) fn unbalanced(system: &System, q: &[Pose], drive: &Drive) -> Option<Z
     let (mut left, mut drawn) = (q.to_vec(), vec![Pose::zeros(); q.len()]);
     system.residual(&drawn.clone(), drive, &mut drawn);
     system.residual(q, drive, &mut left);
-    let sum = |direction: usize| drawn.iter().map(|r| r[direction].abs()).sum::<f64>();
-    let force = sum(0).max(sum(1));
-    let reach = system.model.bodies.iter().map(|body| body.center.amax()).fold(0.0, f64::max);
-    let moment = sum(2).max(force * reach);
+    // sizes that do not depend on the directions of the axes
+    let force: f64 = drawn.iter().map(|r| r.xy().norm()).sum();
+    let reach = system.model.bodies.iter().map(|body| body.center.norm()).fold(0.0, f64::max);
+    let moment = drawn.iter().map(|r| r.z.abs()).sum::<f64>().max(force * reach);
     system.model.loose().find_map(|body| {
         let over = |direction: usize| {
             let scale = if direction == 2 { moment } else { force };

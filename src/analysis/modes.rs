@@ -133,8 +133,7 @@ fn shapeless(compiled: &Compiled, count: usize, voltages: &PortVoltages) -> Resu
         way = told_at(compiled, &point);
         way.extend(comb_beyond_told(compiled, &point.q));
         way.extend(too_hot(compiled, &point));
-        let (mut rise, mut driven) = (point.rise.clone(), system.electrics.drive());
-        system.electrics.steady(&point.sources, &mut rise, &mut driven);
+        let driven = point.drive(compiled);
         // as SUGAR: heat and loads move what the field pulls at, and do nothing to the stiffness of beams
         drive = if as_sugar { Drive { volts: driven.volts, ..drive } } else { driven };
         point.q

@@ -6,6 +6,7 @@ use super::signal::{Signal, View};
 use super::weak_parts;
 use super::{AnalysisError, BeamMotions, PortVoltages};
 use crate::compile::Compiled;
+use crate::domains::Drive;
 use crate::multibody::planar::Pose;
 use crate::solve::SolveError;
 use crate::solve::equilibrium::{Equilibrium, EquilibriumOptions, LossKind, Passed, Path};
@@ -177,6 +178,14 @@ pub(crate) struct OperatingPoint {
 }
 
 impl OperatingPoint {
+    /// What drives it.
+    pub(crate) fn drive(&self, compiled: &Compiled) -> Drive {
+        let electrics = &compiled.parts.system.electrics;
+        let (mut rise, mut drive) = (self.rise.clone(), electrics.drive());
+        electrics.steady(&self.sources, &mut rise, &mut drive);
+        drive
+    }
+
     /// At rest as drawn and cold, with the voltages on: where a run begins.
     pub(crate) fn rest(compiled: &Compiled, voltages: &PortVoltages) -> Result<Self, AnalysisError> {
         let system = &compiled.parts.system;

@@ -4,7 +4,7 @@
 //! linear solver finds any. The part is held where it is drawn, by springs to the ground, and the force that they bear is reported.
 
 use crate::domains::System;
-use crate::multibody::planar::Pose;
+use crate::multibody::planar::{Block, Pose};
 use crate::multibody::{BlockMatrix, BodyId};
 use crate::sets::Sets;
 
@@ -52,8 +52,9 @@ pub(super) fn held(system: &System) -> Option<(System, Vec<usize>)> {
     }
     let (zeros, mut tangent) = (vec![Pose::zeros(); ground], BlockMatrix::new(&model.pattern));
     system.tangent(&zeros, &system.electrics.drive(), &mut tangent, &mut zeros.clone());
-    let largest = |i: usize| tangent.diagonal.iter().map(|block| block[(i, i)].abs()).fold(0.0, f64::max);
-    let springs = [largest(0).max(largest(1)), largest(2)].map(|k| HOLDS * k);
+    let largest = |of: &dyn Fn(&Block) -> f64| HOLDS * tangent.diagonal.iter().map(of).fold(0.0, f64::max);
+    // half of the trace does not depend on the directions of the axes
+    let springs = [largest(&|block| 0.5 * (block[(0, 0)] + block[(1, 1)])), largest(&|block| block[(2, 2)])];
     Some((System { model: model.with_springs_to_ground(&last, springs), ..system.clone() }, last))
 }
 

@@ -56,20 +56,38 @@ impl Growth {
     }
 }
 
+/// Storage for a rate, allocated once.
+#[derive(Debug, Clone)]
+pub(super) struct Difference {
+    moved: Vec<Pose>,
+    force: [Vec<Pose>; 2],
+}
+
+impl Difference {
+    /// For so many bodies.
+    pub(super) fn new(count: usize) -> Self {
+        let zeros = vec![Pose::zeros(); count];
+        Self { moved: zeros.clone(), force: [zeros.clone(), zeros] }
+    }
+}
+
 /// The rate [1/s] at `q` along the response `s` of the motion; 0 where its stiffness at fixed voltages is positive.
-pub(super) fn rate_along(system: &System, drive: &Drive, q: &[Pose], s: &[Pose]) -> f64 {
-    let largest = s.iter().fold(0.0f64, |m, s| m.max(s.xy().amax()));
+pub(super) fn rate_along(
+    system: &System,
+    drive: &Drive,
+    (q, s): (&[Pose], &[Pose]),
+    Difference { moved, force }: &mut Difference,
+) -> f64 {
+    let largest = s.iter().map(|s| s.xy().norm()).fold(0.0, f64::max);
     if largest.is_nan() || largest == 0.0 || largest.is_infinite() {
         return 0.0;
     }
     let scale = DIFFERENCE * system.length_scale / largest;
-    let mut moved = q.to_vec();
-    let mut force = [vec![Pose::zeros(); s.len()], vec![Pose::zeros(); s.len()]];
     for (force, sign) in force.iter_mut().zip([1.0, -1.0]) {
         for ((moved, q), s) in moved.iter_mut().zip(q).zip(s) {
             *moved = q + s * (sign * scale);
         }
-        system.residual(&moved, drive, force);
+        system.residual(moved, drive, force);
     }
     let dot = |x: &[Pose]| s.iter().zip(x).map(|(s, x)| s.dot(x)).sum::<f64>();
     let stiffness = (dot(&force[0]) - dot(&force[1])) / (2.0 * scale);

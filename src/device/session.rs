@@ -1,7 +1,7 @@
 //! What is open of a device: its ports, its signals, its states, and the storage that every trial reuses.
 
 use super::agitation::Shaken;
-use super::growth::Growth;
+use super::growth::{Difference, Growth};
 use super::ports::Ports;
 use super::ringing::Ringing;
 use super::seen::{Seen, surroundings};
@@ -58,6 +58,7 @@ pub(super) struct Session {
     pub(super) ringing: Ringing,
     /// How fast the last trial's motion grows at fixed voltages.
     pub(super) growth: Growth,
+    pub(super) difference: Difference,
 }
 
 impl Session {
@@ -131,6 +132,7 @@ impl Session {
             warned: Vec::new(),
             ringing: Ringing::default(),
             growth: Growth::default(),
+            difference: Difference::new(n),
         };
         Ok((session, description))
     }

@@ -151,7 +151,7 @@ impl Session {
     }
 
     /// Rate at which the motion at the end of a trial grows at fixed voltages [1/s]; 0 where nothing shows that it does.
-    fn growth_rate(&self, system: &System, reply: &TrialReply) -> f64 {
+    fn growth_rate(&mut self, system: &System, reply: &TrialReply) -> f64 {
         let (electrics, ports) = (&system.electrics, self.ports.len());
         let mut fastest = 0.0f64;
         for (p, &source) in self.ports.sources.iter().enumerate() {
@@ -161,7 +161,8 @@ impl Session {
             let moving = reply.dq_dv[p * (ports + 1)] - fixed;
             if moving.abs() > RESPONDS * fixed.abs() {
                 let response = &self.stepper.method.sensitivity()[p].q;
-                fastest = fastest.max(rate_along(system, &self.drive, &self.motion.q, response));
+                fastest =
+                    fastest.max(rate_along(system, &self.drive, (&self.motion.q, response), &mut self.difference));
             }
         }
         fastest

@@ -13,7 +13,7 @@ use super::super::PortVoltages;
 use super::super::statics::{OperatingPoint, operating_point_near};
 use super::finer::{Finer, MOST_NEAR_LIMIT, finer};
 use crate::compile::Compiled;
-use crate::domains::{BeamLine, Drive};
+use crate::domains::BeamLine;
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
 use crate::multibody::unstressed::add_unstressed_tangent;
@@ -72,7 +72,7 @@ pub(super) fn hidden(compiled: &Compiled, voltages: &PortVoltages, point: &Opera
 fn is_softer(compiled: &Compiled, point: &OperatingPoint, fraction: f64) -> bool {
     let system = &compiled.parts.system;
     let (mut tangent, mut force) = (BlockMatrix::new(&system.model.pattern), vec![Pose::zeros(); system.bodies()]);
-    system.tangent(&point.q, &driven(compiled, point), &mut tangent, &mut force);
+    system.tangent(&point.q, &point.drive(compiled), &mut tangent, &mut force);
     add_unstressed_tangent(&system.model, &point.q, -fraction, &mut tangent);
     system.model.project_matrix(&mut tangent);
     tangent.factor(&system.model.pattern).is_ok_and(|inertia| inertia.negative > 0)
@@ -83,7 +83,7 @@ fn softest(compiled: &Compiled, point: &OperatingPoint) -> Option<String> {
     let (system, model) = (&compiled.parts.system, &compiled.parts.system.model);
     let mut x = vec![Pose::zeros(); system.bodies()];
     let mut loaded = BlockMatrix::new(&model.pattern);
-    system.tangent(&point.q, &driven(compiled, point), &mut loaded, &mut x);
+    system.tangent(&point.q, &point.drive(compiled), &mut loaded, &mut x);
     model.project_matrix(&mut loaded);
     loaded.factor(&model.pattern).ok()?;
     let mut unloaded = BlockMatrix::new(&model.pattern);
@@ -102,12 +102,4 @@ fn softest(compiled: &Compiled, point: &OperatingPoint) -> Option<String> {
     let energy = |beam: &BeamLine| beam.bending(&point.q, &x, model.linear).0;
     let softest = system.beams.iter().max_by(|a, b| energy(a).total_cmp(&energy(b)))?;
     Some(softest.name.to_string())
-}
-
-/// What drives an equilibrium.
-fn driven(compiled: &Compiled, point: &OperatingPoint) -> Drive {
-    let electrics = &compiled.parts.system.electrics;
-    let (mut rise, mut drive) = (point.rise.clone(), electrics.drive());
-    electrics.steady(&point.sources, &mut rise, &mut drive);
-    drive
 }

@@ -59,8 +59,7 @@ pub(super) fn left(compiled: &Compiled, point: &OperatingPoint) -> Option<f64> {
 /// What drives an equilibrium, what is there at rest, without loads and voltages, and the first without voltages.
 fn drives(compiled: &Compiled, point: &OperatingPoint) -> [Drive; 3] {
     let electrics = &compiled.parts.system.electrics;
-    let (mut rise, mut here) = (point.rise.clone(), electrics.drive());
-    electrics.steady(&point.sources, &mut rise, &mut here);
+    let here = point.drive(compiled);
     let without = Drive { volts: vec![0.0; here.volts.len()], ..here.clone() };
     [here, Drive { load: 0.0, ..electrics.drive() }, without]
 }

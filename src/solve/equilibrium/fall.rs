@@ -30,7 +30,7 @@ const LEAST_SHIFT: [f64; 2] = [1e-14, 1e-15];
 /// A μ that rounding of the stiffness may ask for next to a loss of stability, in first μ.
 const NEUTRAL: f64 = 10.0;
 /// A μ that no finite stiffness needs, in median stiffnesses.
-const MOST_SHIFT: f64 = 1e20;
+pub(super) const MOST_SHIFT: f64 = 1e20;
 /// Fractions of the predicted decrease of energy: below the first a step is rejected, below the second the region shrinks, above the third it grows.
 const RATIO: [f64; 3] = [0.05, 0.25, 0.75];
 /// Rounding of the energy, as a fraction of it.

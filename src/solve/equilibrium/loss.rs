@@ -8,7 +8,7 @@
 //! in the units of W. At a limit point the part goes where the force does work. At a bifurcation both sides are alike, and
 //! [`System::side`] decides by a rule that turns with the drawing.
 
-use super::fall::{Units, Unsettled};
+use super::fall::{MOST_SHIFT, Units, Unsettled};
 use super::path::LoadPath;
 use super::{Equilibrium, Path};
 use crate::domains::System;
@@ -19,8 +19,8 @@ use serde::{Deserialize, Serialize};
 
 /// Participation of the load in the softest motion that divides bifurcations (up to 4e-6 seen) from limit points (from 1.7e-4).
 const PARTICIPATION: f64 = 3e-5;
-/// Force that is none but rounding, as a fraction of the largest section force.
-const UNBALANCED: f64 = 1e-8;
+/// Residual force that is rounding, as a fraction of the largest section force.
+const ROUNDED_FORCE: f64 = 1e-8;
 /// Inverse iterations for the softest motion.
 const ROUNDS: usize = 6;
 /// Largest displacement of the disturbance with which a fall begins, in the units of W.
@@ -74,7 +74,7 @@ impl Equilibrium {
         done: &mut Path,
     ) -> Result<(f64, f64), SolveError> {
         if done.passed.len() >= MAX_LOSSES {
-            return Err(self.too_many(system, s, done));
+            return Err(Self::too_many(s, done));
         }
         let loaded = path.begins_loaded();
         let beyond = |factor: f64| {
@@ -131,7 +131,7 @@ impl Equilibrium {
                 break;
             }
             shift = if shift == 0.0 { least } else { 2.0 * shift };
-            if shift.is_nan() || least.is_nan() || shift >= 1e20 * least {
+            if shift.is_nan() || least.is_nan() || shift >= MOST_SHIFT * least {
                 return None;
             }
         }
@@ -164,7 +164,7 @@ impl Equilibrium {
         let axial = |joint| axial_force(&system.model, joint, q, &self.drive.rest()).abs();
         let stress = system.model.joints.iter().map(axial).fold(0.0, f64::max) * length;
         // a straight part under uniform stress is balanced at any load
-        let unbalanced = force.sqrt() > UNBALANCED * stress;
+        let unbalanced = force.sqrt() > ROUNDED_FORCE * stress;
         let norm = (motion * force).sqrt();
         if unbalanced && norm > 0.0 && work.abs() > PARTICIPATION * norm {
             let sign = work.signum();

@@ -38,7 +38,7 @@ impl Equilibrium {
     }
 
     /// A path that loses stability again and again.
-    pub(super) fn too_many(&self, _: &System, share: f64, done: &Path) -> SolveError {
+    pub(super) fn too_many(share: f64, done: &Path) -> SolveError {
         let reason = format!(
             "{MAX_LOSSES} stability losses lie below that load, as where a part is crumpled: the load is far beyond what the part bears"
         );

@@ -98,14 +98,15 @@ impl Defect {
         forces::add_damping(model, &before.v, start);
         model.project(start);
         for (k, force) in start.iter_mut().enumerate() {
-            let mass = model.mass(k);
-            for i in 0..3 {
-                let rates = [before.v[k][i], after.v[k][i]];
-                let change = h * force[i].abs();
-                force[i] = if mass[i] > 0.0 && change <= RESOLVED * mass[i] * (rates[0].abs() + rates[1].abs()) {
-                    -force[i] / mass[i]
-                } else {
-                    cubic_start(h, [before.q[k][i], after.q[k][i]], rates)
+            let (mass, v) = (model.mass(k), [&before.v[k], &after.v[k]]);
+            let within = |mass: f64, force: f64, rates: f64| mass > 0.0 && h * force <= RESOLVED * mass * rates;
+            // of a translation as a whole: the directions of the axes decide nothing
+            let moves = within(mass.x.min(mass.y), force.xy().norm(), v[0].xy().norm() + v[1].xy().norm());
+            let turns = within(mass.z, force.z.abs(), v[0].z.abs() + v[1].z.abs());
+            for (i, resolved) in [moves, moves, turns].into_iter().enumerate() {
+                force[i] = match resolved {
+                    true => -force[i] / mass[i],
+                    false => cubic_start(h, [before.q[k][i], after.q[k][i]], [v[0][i], v[1][i]]),
                 };
             }
         }
