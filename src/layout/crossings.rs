@@ -235,10 +235,12 @@ impl<'a> Sweep<'a> {
             }
             if std::mem::replace(&mut self.last[other as usize], k as u32) != k as u32 {
                 self.tried += 1;
-                let [own, others] = self.each.get_disjoint_mut([k, other as usize]).unwrap_or_else(|_| unreachable!());
-                let (more, dense) = run.cuts(found, [own, others]);
-                cuts += more;
-                self.dense += dense;
+                // another run than this one
+                if let Ok([own, others]) = self.each.get_disjoint_mut([k, other as usize]) {
+                    let (more, dense) = run.cuts(found, [own, others]);
+                    cuts += more;
+                    self.dense += dense;
+                }
             }
             i += 1;
         }
