@@ -20,7 +20,6 @@ use bimorph::multibody::{BlockMatrix, BodyId, Model, forces};
 use bimorph::solve::method::{Method, Motion};
 use bimorph::solve::rodas4::Rodas4;
 use std::hint::black_box;
-use std::sync::Arc;
 use std::time::Instant;
 
 const SIZES: [usize; 9] = [100, 316, 1_000, 3_160, 10_000, 31_600, 100_000, 316_000, 1_000_000];
@@ -41,9 +40,7 @@ fn measure(name: &str, coordinates: usize) -> (usize, [f64; 8]) {
     let reduction = reduction(&topology);
     let implicit = implicit(&topology);
     let model = topology.model();
-    let electrics = Arc::default();
-    let (members, loads, beams) = (Vec::new(), Vec::new(), Vec::new().into());
-    let system = System { model, members, loads, beams, electrics, length_scale: 2e-6 };
+    let system = System::of_model(model, 2e-6);
     let (n, model) = (system.bodies(), &system.model);
     let pattern = &model.pattern;
     let q = displaced(model);

@@ -19,7 +19,6 @@ use bimorph::multibody::relative::dynamics::Stresses;
 use bimorph::multibody::relative::placed::{Eights, Placed};
 use bimorph::multibody::{BlockMatrix, forces};
 use std::hint::black_box;
-use std::sync::Arc;
 use std::time::Instant;
 use topologies::Topology;
 
@@ -41,9 +40,7 @@ fn main() {
 /// Measures `topology`; figures are divided by `units`.
 fn report(name: &str, count: usize, units: usize, topology: &Topology) {
     let model = topology.model();
-    let electrics = Arc::default();
-    let (members, loads, beams) = (Vec::new(), Vec::new(), Vec::new().into());
-    let system = System { model, members, loads, beams, electrics, length_scale: 2e-6 };
+    let system = System::of_model(model, 2e-6);
     let (n, pattern) = (system.bodies(), &system.model.pattern);
     let q: Vec<Pose> = (0..n).map(|k| Pose::new(1e-8 * (k % 3) as f64, 1e-8, 1e-3 * (k % 5) as f64)).collect();
     let drive = Drive { load: 1.0, ..Drive::default() };

@@ -9,19 +9,11 @@ use bimorph::multibody::planar::Pose;
 use bimorph::multibody::{BlockMatrix, Model, forces};
 use bimorph::solve::method::{Method, Motion};
 use bimorph::solve::rodas4::Rodas4;
-use std::sync::Arc;
 use topologies::{NAMES, bodies_per_unit, named};
 
 /// A mechanism with nothing but joints: no gaps, no loads, no sources.
 fn system(model: Model) -> System {
-    System {
-        model,
-        members: Vec::new(),
-        loads: Vec::new(),
-        electrics: Arc::default(),
-        length_scale: 2e-6,
-        beams: Arc::default(),
-    }
+    System::of_model(model, 2e-6)
 }
 
 /// What a model costs: bodies, joints, blocks below the diagonal, block products of a factorization and of a solve.

@@ -11,7 +11,7 @@ use bimorph::solve::dirk::Dirk;
 use bimorph::solve::method::{Method, Motion};
 use bimorph::solve::rodas4::Rodas4;
 use bimorph::solve::time::tableau::TR_BDF2;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 #[global_allocator]
 static HEAP: dhat::Alloc = dhat::Alloc;
@@ -43,14 +43,7 @@ fn bytes(name: &str, coordinates: usize) -> (usize, usize, usize) {
     let drawing = topologies::sized(name, coordinates);
     let _profiler = dhat::Profiler::builder().testing().build();
     let model = drawing.model();
-    let system = System {
-        model,
-        members: Vec::new(),
-        loads: Vec::new(),
-        electrics: Arc::default(),
-        length_scale: 2e-6,
-        beams: Arc::default(),
-    };
+    let system = System::of_model(model, 2e-6);
     let n = system.bodies();
     let kept: (_, Motion, Motion) = (Rodas4::new(&system, &[]), Motion::zeros(n), Motion::zeros(n));
     let stats = dhat::HeapStats::get();

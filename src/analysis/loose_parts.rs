@@ -102,8 +102,8 @@ pub(super) fn settle_rigid(system: &System, stiffness: &BlockMatrix<f64, 3>, fou
     rigid
 }
 
-/// What to warn of rigid-body modes.
-pub(super) fn told(system: &System, rigid: usize) -> Option<String> {
+/// Warning about rigid-body modes; none without any.
+pub(super) fn warning(system: &System, rigid: usize) -> Option<String> {
     let parts: Vec<String> =
         system.model.loose().take(3).map(|b| format!("`{}`", system.model.bodies[b].name)).collect();
     let why = match parts.as_slice() {

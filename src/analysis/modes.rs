@@ -178,7 +178,7 @@ fn shapeless(compiled: &Compiled, count: usize, voltages: &PortVoltages) -> Resu
     let per_deflection = if loaded { about.to_deflection() } else { Vec::new() };
     let way = way.into_iter().map(|way| format!("the equilibrium that these modes are about: {way}"));
     let rigid = rigid.iter().take(count).filter(|rigid| **rigid).count();
-    let warnings = way.chain(loose_parts::told(system, rigid)).collect();
+    let warnings = way.chain(loose_parts::warning(system, rigid)).collect();
     let result = judged(compiled, count, &q, (errors, warnings), &mut found);
     Ok((ModesResult { per_deflection, ..result }, q, found.shapes))
 }

@@ -71,7 +71,7 @@ pub(super) fn pull_in_with(
         snaps_v: Vec::new(),
         release_before_snaps_v: None,
         estimated_error,
-        warnings: sweep.told(),
+        warnings: sweep.warnings(),
     };
     match sweep.close(q, max)? {
         Closed::Falls { volts } => Ok(result(volts, false, &sweep)),

@@ -237,7 +237,7 @@ fn settle(
     let (path, held_weakly) = match weak_parts::held(system) {
         Some((held, parts)) => {
             let found = solver.follow(&held, &path, &mut q)?;
-            (found, weak_parts::told(system, &held, &parts, &q))
+            (found, weak_parts::sentences(system, &held, &parts, &q))
         }
         None => match solver.follow(system, &path, &mut q) {
             Ok(found) => (found, Vec::new()),

@@ -71,11 +71,11 @@ fn held<T>(
     let estimated = TransientOptions { estimate: true, ..options.clone() };
     let made = first(&estimated, model, run, sample, watch)?;
     let made = sharper(made, &estimated, model, run, watch)?;
-    made.kept.tell(sample);
+    made.kept.send(sample);
     let Made { mut result, more, tol, .. } = made;
     result.warnings.extend(match result.step_error {
         Some(error) => beyond(options, error, AT_THE_END),
-        None => Some(unknown(options)),
+        None => (!options.signals.is_empty()).then(|| unknown(options)),
     });
     Ok((result, more, tol))
 }
@@ -116,9 +116,9 @@ fn first<T>(
     let long = Cell::new(options.points * options.signals.len() > MOST_KEPT);
     let (mut kept, mut picked) = (Kept::default(), Picked::new(options, usize::MAX));
     let mut keep = |t: f64, values: &[f64]| {
-        picked.see(values);
+        picked.add(values);
         if long.get() {
-            std::mem::take(&mut kept).tell(sample);
+            std::mem::take(&mut kept).send(sample);
             sample(t, values);
         } else {
             kept.keep(t, values);
@@ -162,7 +162,7 @@ fn sharper<T>(
         let options = TransientOptions { tol: ratio * made.tol, ..options.clone() };
         let (mut kept, mut picked) = (Kept::default(), Picked::new(&options, usize::MAX));
         let mut keep = |t: f64, values: &[f64]| {
-            picked.see(values);
+            picked.add(values);
             kept.keep(t, values);
         };
         let (mut result, more) = match run(&options, &mut keep, watch) {

@@ -1,7 +1,8 @@
-//! Parts that hang on beams so slender that rounding hides their stiffness, as drawings have them that place one part beside another.
+//! Weakly constrained parts: the beams that hold them are so slender that rounding hides their stiffness. Some netlists place one part
+//! beside another with such beams.
 //!
-//! The stiffness of such a beam is below the rounding of what it joins: an equilibrium of the part is not to be had in double precision, and a
-//! linear solver finds any. The part is held where it is drawn, by springs to the ground, and the force that they bear is reported.
+//! The stiffness of such a beam is below the rounding of the stiffness that it joins. The equilibrium of the part is undetermined in double
+//! precision. The part is held where it is drawn, by springs to the ground, and the force that they bear is reported.
 
 use crate::domains::System;
 use crate::multibody::planar::{Block, Pose};
@@ -58,13 +59,13 @@ pub(super) fn held(system: &System) -> Option<(System, Vec<usize>)> {
     Some((System { model: model.with_springs_to_ground(&last, springs), ..system.clone() }, last))
 }
 
-/// What to say of parts that are held, with the force on each at `q` of the system that holds them.
-pub(super) fn told(system: &System, held: &System, parts: &[usize], q: &[Pose]) -> Vec<String> {
+/// Sentences about parts that are held, with the force on each at `q` of the system that holds them.
+pub(super) fn sentences(system: &System, held: &System, parts: &[usize], q: &[Pose]) -> Vec<String> {
     let springs = &held.model.joints[system.model.joints.len()..];
     let one = |(&body, joint): (&usize, &crate::multibody::section::LaidJoint)| {
         let force = held.model.section(joint).stiffness.0[0] * q[body].x.hypot(q[body].y);
         format!(
-            "the part with body \"{}\" hangs on beams so slender that rounding hides their stiffness; the net load on it is {force:.1e} N",
+            "the part with body \"{}\" is held by beams so slender that rounding hides their stiffness; the net load on it is {force:.1e} N",
             system.model.bodies[body].name
         )
     };

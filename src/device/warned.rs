@@ -50,7 +50,7 @@ impl Session {
             let warning = Diagnostic::warning(
                 HELD,
                 held_by_charge(seconds),
-                "a voltage source in place of the charge lets it go",
+                "a voltage source in place of the charge would close or open the gap",
             );
             told.extend(self.grown(warning, 1.0));
         }

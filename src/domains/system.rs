@@ -32,6 +32,12 @@ pub struct System {
 }
 
 impl System {
+    /// A mechanism on which nothing acts but its joints, with a length scale [m].
+    pub fn of_model(model: Model, length_scale: f64) -> Self {
+        let (members, loads) = (Vec::new(), Vec::new());
+        Self { model, members, loads, electrics: Arc::default(), length_scale, beams: Arc::default() }
+    }
+
     /// Bodies that move.
     pub fn bodies(&self) -> usize {
         self.model.bodies.len()

@@ -107,17 +107,7 @@ impl Frame {
         };
         let loads = loads.iter().map(|&(id, f)| Load { point: at(id), force: f.into(), moment: 0.0 }).collect();
         let electrics = Electrics { names: Vec::new(), ..Electrics::default() };
-        (
-            System {
-                model,
-                members: Vec::new(),
-                loads,
-                electrics: Arc::new(electrics),
-                length_scale: 1e-6,
-                beams: Arc::default(),
-            },
-            place,
-        )
+        (System { loads, electrics: Arc::new(electrics), ..System::of_model(model, 1e-6) }, place)
     }
 }
 

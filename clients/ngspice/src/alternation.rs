@@ -1,8 +1,8 @@
-//! Currents that alternate from point to point, which is no motion but the trapezoidal rule.
+//! Alternation of currents from point to point: an error of the trapezoidal rule.
 //!
-//! i = 2·(q − q₁)/h − i₁ keeps what a current remembers wrongly, with the other sign at each step, as in any capacitor of ngspice. At each accepted
-//! point the derivative of the parabola through three charges is known beside that current; where the difference of the two changes its sign from
-//! point to point, half of what it departs from the mean of its neighbours is the alternation. On a smooth curve that is of fourth order in the step.
+//! i = 2·(q − q₁)/h − i₁ keeps an error of i₁ and inverts its sign at each step, as in any capacitor of ngspice. At each accepted point the current is
+//! compared with the derivative of the parabola through three charges. Where their difference changes its sign from point to point, half of its
+//! deviation from the mean of its neighbours is the alternation. On a smooth curve that is of fourth order in the step.
 //!
 //! Reference — L. W. Nagel, *SPICE2* (ERL-M520, Berkeley 1975), §4: the oscillation of the trapezoidal rule.
 
@@ -11,13 +11,13 @@ use bimorph::netlist::Diagnostic;
 
 /// Code of the warning.
 const CODE: &str = "W047";
-/// Alternation from which on a current is reported, of its range so far [1].
+/// Smallest alternation that is reported, as a fraction of the range of the current [1].
 const REPORTED: f64 = 3e-3;
 /// Points in a row that must alternate: a corner of a source makes few.
 const MIN_POINTS: u32 = 12;
-/// Share of a charge whose change over a step is no motion but what integrators leave of one [1].
+/// Relative error of a charge that integrators leave [1].
 const NOISE: f64 = 1e-7;
-/// Ratio of a step to the one before it below which a point tells no derivative [1].
+/// Ratio of a step to the one before it below which a point has no derivative [1].
 const LEAST_RATIO: f64 = 1e-3;
 
 /// What the accepted points of an instance show of its currents.
@@ -66,7 +66,7 @@ impl Port {
 }
 
 impl Alternation {
-    /// After an accepted point: `step` [s], 0 at an equilibrium; `names` of the ports. What alternates by more than before, ten times as much.
+    /// Warnings after an accepted point: `step` [s], 0 at an equilibrium; `names` of the ports. A port is reported again at ten times as much.
     pub(crate) fn accepted<'a>(
         &mut self,
         step: f64,
@@ -89,7 +89,8 @@ impl Alternation {
             }
             port.charges = [*charge, port.charges[0]];
             port.current = *current;
-            let share = size / (port.range[1] - port.range[0]);
+            // a charge that stands still has no range
+            let share = size / (port.range[1] - port.range[0]).max(size);
             if port.points >= MIN_POINTS && share > 10.0 * port.reported {
                 port.reported = share;
                 warnings.push(Diagnostic::warning(
@@ -115,13 +116,13 @@ mod tests {
     fn reports(q: impl Fn(f64) -> f64, i: impl Fn(f64) -> f64, wrong: f64, step: impl Fn(u32) -> f64) -> usize {
         let (mut found, mut t) = (Alternation::default(), 0.0);
         let base = |current: f64| Base { currents: vec![current], ..Base::default() };
-        let mut told = found.accepted(0.0, &[q(0.0)], &base(0.0), ["p"].into_iter()).len();
+        let mut count = found.accepted(0.0, &[q(0.0)], &base(0.0), ["p"].into_iter()).len();
         for n in 0..400 {
             t += step(n);
             let alternating = if n % 2 == 0 { wrong } else { -wrong };
-            told += found.accepted(step(n), &[q(t)], &base(i(t) + alternating), ["p"].into_iter()).len();
+            count += found.accepted(step(n), &[q(t)], &base(i(t) + alternating), ["p"].into_iter()).len();
         }
-        told
+        count
     }
 
     /// A sine of 28 points a cycle, even or uneven steps, is no alternation by itself; one of 5 % of its range is reported once.

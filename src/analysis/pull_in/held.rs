@@ -2,7 +2,7 @@
 
 use super::super::AnalysisError;
 use super::super::contact_range::within_contact_range;
-use super::sweep::{MOST_FOLDS, PAST, Sweep, last, named};
+use super::sweep::{MAX_LIMIT_POINTS, PAST, Sweep, last, named};
 use crate::multibody::planar::Pose;
 use crate::solve::continuation::PathEnd;
 
@@ -42,7 +42,9 @@ impl Sweep<'_> {
         let without = before.map_or("stays closed".to_owned(), |v| format!("is released at {v:.4} V"));
         let sentence = match differs {
             true => format!("the closed part snaps further at {}; without that it {without}", named(&snaps_v)),
-            false => format!("the closed part snaps further at {}; its release is the same without", named(&snaps_v)),
+            false => {
+                format!("the closed part snaps further at {}; it is released at the same voltage", named(&snaps_v))
+            }
         };
         self.of_closed.push(sentence);
         Ok(HeldDown { release_v, snaps_v, release_before_snaps_v: before })
@@ -58,7 +60,7 @@ impl Sweep<'_> {
         max: f64,
     ) -> Result<(Vec<f64>, Option<(f64, Vec<Pose>)>), AnalysisError> {
         let (mut snaps, mut top) = (Vec::new(), None);
-        for _ in 0..MOST_FOLDS {
+        for _ in 0..MAX_LIMIT_POINTS {
             if volts >= max {
                 break;
             }
@@ -97,7 +99,7 @@ impl Sweep<'_> {
         let made: Vec<usize> = (0..self.rest.len()).filter(|&g| !self.rest[g] && system.touches(g, &q)).collect();
         let free = |q: &[Pose]| made.iter().all(|&g| !system.touches(g, q));
         let mut peeled = Vec::new();
-        for _ in 0..MOST_FOLDS {
+        for _ in 0..MAX_LIMIT_POINTS {
             let traced = self.trace(&q, volts, 0.0, 1.0)?;
             let at = |s: f64| volts * (1.0 - s);
             if let Some(k) = traced.points.iter().position(|p| free(&p.q)) {
@@ -124,7 +126,7 @@ impl Sweep<'_> {
             volts = beyond;
         }
         Err(AnalysisError::NoEquilibrium {
-            detail: format!("no release found after {MOST_FOLDS} folds of the closed branch"),
+            detail: format!("no release found after {MAX_LIMIT_POINTS} folds of the closed branch"),
         })
     }
 

@@ -12,22 +12,22 @@ use crate::solve::equilibrium::{Equilibrium, EquilibriumOptions};
 use crate::solve::family::Blend;
 use crate::solve::path::SourcePath;
 
-/// How far beyond a fold a part is let fall, as a share of its voltage.
+/// How far beyond a limit point a fall begins, as a fraction of its voltage.
 pub(super) const PAST: f64 = 1e-3;
-/// Halvings of a step, at most, where the branch itself does not lead to its fold.
+/// Halvings of a step, at most, where the branch does not lead to its limit point.
 const BISECTIONS: usize = 40;
-/// Share of a voltage to which it is found so.
+/// Relative accuracy of a voltage found so [1].
 const SHARP: f64 = 1e-8;
-/// Folds on the way up, or on the way down, after which the search gives up.
-pub(super) const MOST_FOLDS: usize = 200;
+/// Limit points on the way up, or on the way down, at most.
+pub(super) const MAX_LIMIT_POINTS: usize = 200;
 /// Jumps that are named.
 const MAX_NAMED: usize = 4;
 /// Points of one piece of a branch.
-const MOST_POINTS: usize = 20_000;
+const MAX_POINTS: usize = 20_000;
 
 /// What became of a part beyond pull-in.
 pub(super) enum Closed {
-    /// It rests on contact: voltage of the fold, and an equilibrium beyond.
+    /// It rests on contact: voltage of the limit point, and an equilibrium beyond.
     Rests { fold: f64, volts: f64, q: Vec<Pose> },
     /// Nothing holds it.
     Falls { volts: f64 },
@@ -41,13 +41,13 @@ pub(super) struct Sweep<'a> {
     off: Vec<f64>,
     source: usize,
     equilibrium: Equilibrium,
-    /// What the part did before any voltage, where it did not just give way.
+    /// Stability losses before any voltage, as a sentence.
     jumped: Option<&'static str>,
     /// Which gaps are closed without any voltage.
     pub(super) rest: Vec<bool>,
     /// Voltages at which it jumped without closing a gap [V].
     passed: Vec<f64>,
-    /// What is to be known of the closed branch.
+    /// Sentences about the closed branch.
     pub(super) of_closed: Vec<String>,
 }
 
@@ -96,7 +96,7 @@ impl<'a> Sweep<'a> {
     pub(super) fn close(&mut self, mut q: Vec<Pose>, max: f64) -> Result<Closed, AnalysisError> {
         let unit = self.unit(&q, max)?;
         let mut from = 0.0;
-        for _ in 0..MOST_FOLDS {
+        for _ in 0..MAX_LIMIT_POINTS {
             let traced = self.trace(&q, from, from + unit, (max - from) / unit)?;
             let last = last(&traced);
             let fold = from + last.0 * unit;
@@ -128,7 +128,8 @@ impl<'a> Sweep<'a> {
             from = beyond;
         }
         let port = &self.system.electrics.names[self.source];
-        let detail = format!("no pull-in found after {MOST_FOLDS} folds of the open branch, at {port} = {from:.6} V");
+        let detail =
+            format!("no pull-in found after {MAX_LIMIT_POINTS} folds of the open branch, at {port} = {from:.6} V");
         Err(AnalysisError::NoEquilibrium { detail })
     }
 
@@ -146,8 +147,8 @@ impl<'a> Sweep<'a> {
         AnalysisError::NoEquilibrium { detail: format!("{name} pulls nothing in up to {max} V; {way_out}") }
     }
 
-    /// What the voltages do not say by themselves.
-    pub(super) fn told(&self) -> Vec<String> {
+    /// Sentences about jumps on the way and about the closed branch.
+    pub(super) fn warnings(&self) -> Vec<String> {
         let passed = match self.passed.as_slice() {
             [] => None,
             some => {
@@ -206,7 +207,7 @@ impl<'a> Sweep<'a> {
             longest: growth,
             growth,
             target,
-            points: MOST_POINTS,
+            points: MAX_POINTS,
             stop_at_loss: true,
             ..ContinuationOptions::default()
         };

@@ -19,17 +19,17 @@ use super::run::{AT_THE_END, LOOSER, MOST_AGAIN, MOST_KEPT, MOST_WORK, Run, beyo
 use super::samples::{Kept, Picked, resolved, stride};
 use crate::compile::{Compiled, Formulation};
 
-/// Share of the difference that is told.
+/// Fraction of the difference that is reported.
 const SHARE: f64 = 0.5;
 /// The same for methods of second order, and explicit ones, whose error falls little with the tolerance.
 const SHARE_OF_SECOND: f64 = 1.0;
-/// What is added to what proportion says, where the companion is hardly looser.
+/// Reserve where the companion is hardly looser [1].
 const RESERVE: f64 = 1.2;
 /// Times the steps of a run that one at a tenth of its tolerance takes, of the methods that are run again.
 const MORE: f64 = 2.0;
-/// How much sharper than asked for the steps of a run may be.
-const MOST_SHARPER: f64 = 99.0;
-/// Output times that a companion must have reached to say something.
+/// Largest ratio of the requested tolerance to that of the steps.
+const MAX_SHARPER: f64 = 99.0;
+/// Output times that a companion must reach, at least.
 const FEWEST: usize = 16;
 
 /// Makes a run whose first one at a looser tolerance, its companion, came as far as this; returns the tolerance of its steps, too.
@@ -43,7 +43,7 @@ pub(super) fn compared<T>(
 ) -> Result<(TransientResult, T, f64), AnalysisError> {
     let unknowns = model.unknowns() as f64;
     let steps = companion.as_ref().map_or(0, |c| c.counters.steps) as f64;
-    // what takes long is told as it comes, and once
+    // the samples of a long run are sent as they come
     let again = whole
         && options.step.is_none()
         && is_high(Formulation::of_run(model, options).1)
@@ -60,7 +60,7 @@ pub(super) fn compared<T>(
     let room = room(options.tol, made.result.estimated_error);
     while made.result.step_error.is_some_and(|error| error > room)
         && MORE * made.result.counters.steps as f64 * unknowns <= MOST_AGAIN
-        && now.tol > options.tol / MOST_SHARPER
+        && now.tol > options.tol / MAX_SHARPER
     {
         let sharper = TransientOptions { tol: now.tol / LOOSER, ..options.clone() };
         let mut others = Kept::default();
@@ -71,7 +71,7 @@ pub(super) fn compared<T>(
             _ => break,
         }
     }
-    kept.tell(sample);
+    kept.send(sample);
     made.result.warnings.extend(made.result.step_error.and_then(|e| beyond(options, e, AT_THE_END)));
     Ok((made.result, made.more, now.tol))
 }
@@ -95,7 +95,7 @@ fn once<T>(
     let reached = companion.as_ref().map_or(0, |c| c.signals.first().map_or(0, |s| s.2.len()));
     let mut picked = Picked::new(options, reached);
     let mut both = |t: f64, values: &[f64]| {
-        picked.see(values);
+        picked.add(values);
         sample(t, values);
     };
     let (mut result, more) = run(options, &mut both, watch)?;
@@ -110,16 +110,16 @@ fn once<T>(
             let apart = largest_error(&picked, &companion, &|unit| least(unit, options, model));
             let share = ((reached - 1) * stride(options)) as f64 / (options.points - 1) as f64;
             let (_, method) = Formulation::of_run(model, options);
-            result.step_error = Some(told_of(options, method) * apart / share.min(1.0));
+            result.step_error = Some(reported_fraction(options, method) * apart / share.min(1.0));
         }
         None => result.warnings.extend((!options.signals.is_empty()).then(|| unknown(options))),
     }
     Ok(Made { result, more, picked })
 }
 
-/// Share of the difference that is told: of a companion that is hardly looser, more than all of it, since the error is in proportion to
-/// the tolerance at best.
-fn told_of(options: &TransientOptions<'_>, method: Integrator) -> f64 {
+/// Fraction of the difference that is reported. Of a companion that is hardly looser it is more than all, since the error is at best
+/// in proportion to the tolerance.
+fn reported_fraction(options: &TransientOptions<'_>, method: Integrator) -> f64 {
     let share = if is_high(method) { SHARE } else { SHARE_OF_SECOND };
     match options.step {
         Some(_) => SHARE,
@@ -155,7 +155,7 @@ pub(super) fn companion<T>(
         ..options.clone()
     };
     let mut picked = Picked::new(options, usize::MAX);
-    let mut keep = |_: f64, values: &[f64]| picked.see(values);
+    let mut keep = |_: f64, values: &[f64]| picked.add(values);
     let (mut steps, mut stopped) = (0.0, false);
     let mut few = |_: f64| {
         steps += 1.0;

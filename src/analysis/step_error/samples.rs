@@ -8,12 +8,12 @@ use crate::equations::bodies::FLOOR;
 
 /// Output times that are compared, at most about twice as many: evenly spaced ones of a run that has more.
 const ENOUGH: usize = 1000;
-/// Times what the floor of a step's error is that a motion has to swing for an estimate of its steps.
+/// Smallest amplitude of a motion with an estimate, in floors of a step's error [1].
 const RESOLVED: f64 = 10.0;
-/// Share of the scene below which a swing is rounding, whatever swings beside it [1].
+/// Fraction of the length scale below which an amplitude is rounding [1].
 const ROUNDING: f64 = 1e-12;
 
-/// Samples that nobody was told of yet.
+/// Samples that are not sent yet.
 #[derive(Default)]
 pub(super) struct Kept {
     t: Vec<f64>,
@@ -27,13 +27,13 @@ impl Kept {
         self.values.extend(values);
     }
 
-    pub(super) fn tell(&self, sample: &mut dyn FnMut(f64, &[f64])) {
+    pub(super) fn send(&self, sample: &mut dyn FnMut(f64, &[f64])) {
         let width = (self.values.len() / self.t.len().max(1)).max(1);
         self.t.iter().zip(self.values.chunks(width)).for_each(|(t, values)| sample(*t, values));
     }
 }
 
-/// Whether the displacements of a run swing by more than what the floor of a step's error hides, in the run as in its companion; or by rounding.
+/// True where the displacements of a run exceed the floor of a step's error, or are rounding.
 pub(super) fn resolved(
     picked: &Picked,
     result: &TransientResult,
@@ -54,24 +54,24 @@ pub(super) fn stride(options: &TransientOptions<'_>) -> usize {
 /// Samples of some output times.
 pub(super) struct Picked {
     stride: usize,
-    seen: usize,
-    most: usize,
+    count: usize,
+    max: usize,
     pub(super) columns: Vec<Vec<f64>>,
 }
 
 impl Picked {
-    /// At most `most` of them.
-    pub(super) fn new(options: &TransientOptions<'_>, most: usize) -> Self {
-        Self { stride: stride(options), seen: 0, most, columns: vec![Vec::new(); options.signals.len()] }
+    /// At most `max` of them.
+    pub(super) fn new(options: &TransientOptions<'_>, max: usize) -> Self {
+        Self { stride: stride(options), count: 0, max, columns: vec![Vec::new(); options.signals.len()] }
     }
 
-    pub(super) fn see(&mut self, values: &[f64]) {
-        let wanted = self.seen.is_multiple_of(self.stride);
-        if wanted && self.columns.first().is_some_and(|column| column.len() < self.most) {
+    pub(super) fn add(&mut self, values: &[f64]) {
+        let wanted = self.count.is_multiple_of(self.stride);
+        if wanted && self.columns.first().is_some_and(|column| column.len() < self.max) {
             crate::budget::lay_out(size_of_val(values));
             self.columns.iter_mut().zip(values).for_each(|(column, value)| column.push(*value));
         }
-        self.seen += 1;
+        self.count += 1;
     }
 
     /// Them as the signals of a result.

@@ -1,4 +1,4 @@
-//! Why steps in time fell to nothing, where the motion shows it: segments that fold.
+//! Folded segments, a reason why the steps of a run become too small.
 //!
 //! A compression wave beyond the buckling load of a single segment, 24·E·I/h², turns neighbouring segments against each other in a zigzag that no mesh of that
 //! length resolves. The axial and bending strains of a segment hold up to about half a radian between its ends.
@@ -7,11 +7,11 @@ use crate::compile::Compiled;
 use crate::multibody::planar::Pose;
 use crate::multibody::{BodyId, Model};
 
-/// Angle between the ends of a segment from which it is said to fold [rad].
+/// Angle between the ends of a folded segment, at least [rad].
 const FOLDED: f64 = 0.5;
 
-/// What to add to the message of a step that failed at `q`; empty where no segment folds.
-pub(super) fn told(compiled: &Compiled, q: &[Pose]) -> String {
+/// Addition to the message of a step that failed at `q`; empty without a folded segment.
+pub(super) fn addition(compiled: &Compiled, q: &[Pose]) -> String {
     let model = &compiled.parts.system.model;
     let angle = |id: BodyId| Model::pose(q, id).z;
     let name = |id: BodyId| match id {

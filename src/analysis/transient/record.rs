@@ -91,7 +91,7 @@ pub(in crate::analysis) fn record(
     let see = errors.as_mut().map(|see| see as SeeError<'_>);
     let (end, work) = carrier.advance(&ramp, &mut motion, &mut observe, see).map_err(|error| match error {
         AnalysisError::StepFailed { t, dt, detail } => {
-            AnalysisError::StepFailed { t, dt, detail: detail + &folded::told(compiled, &motion.q) }
+            AnalysisError::StepFailed { t, dt, detail: detail + &folded::addition(compiled, &motion.q) }
         }
         other => other,
     })?;
