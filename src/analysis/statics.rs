@@ -204,7 +204,7 @@ pub(crate) fn operating_point(compiled: &Compiled, voltages: &PortVoltages) -> R
     let sources = source_vector(compiled, voltages)?;
     let rest = vec![0.0; sources.len()];
     let q = vec![Pose::zeros(); compiled.parts.system.bodies()];
-    settle(compiled, q, sources, &rest, [0.0, 1.0])
+    settle(compiled, q, sources, (&rest, [0.0, 1.0]), EquilibriumOptions::default())
 }
 
 /// The equilibrium next to `q`; that reached from rest where there is none, and then true.
@@ -214,8 +214,10 @@ pub(crate) fn operating_point_near(
     q: Vec<Pose>,
 ) -> Result<(OperatingPoint, bool), AnalysisError> {
     let sources = source_vector(compiled, voltages)?;
-    match settle(compiled, q, sources.clone(), &sources, [1.0, 1.0]) {
-        Ok(point) if point.path.passed.is_empty() => Ok((point, false)),
+    // another branch than that of `q` is of no use
+    let options = EquilibriumOptions { stop_at_fold: true, ..EquilibriumOptions::default() };
+    match settle(compiled, q, sources.clone(), (&sources, [1.0, 1.0]), options) {
+        Ok(point) if point.path.reached == 1.0 => Ok((point, false)),
         _ => Ok((operating_point(compiled, voltages)?, true)),
     }
 }
@@ -225,12 +227,12 @@ fn settle(
     compiled: &Compiled,
     mut q: Vec<Pose>,
     sources: Vec<f64>,
-    from: &[f64],
-    loads: [f64; 2],
+    (from, loads): (&[f64], [f64; 2]),
+    options: EquilibriumOptions,
 ) -> Result<OperatingPoint, AnalysisError> {
     let system = &compiled.parts.system;
     let electrics = &system.electrics;
-    let mut solver = Equilibrium::new(system, EquilibriumOptions::default());
+    let mut solver = Equilibrium::new(system, options);
     let path = SourcePath::new(electrics, from, &sources, loads);
     let mut end = electrics.drive();
     path.at(1.0, &mut end);

@@ -166,7 +166,10 @@ impl Equilibrium {
             let free = self.held.first().copied();
             let from_the_first = *free_at_first.get_or_insert(free.is_some());
             self.free_from_start = from_the_first;
-            let smallest = (self.options.smallest_step * to).max(LEAST_STEP);
+            let smallest = match path.is_still() {
+                true => f64::INFINITY,
+                false => (self.options.smallest_step * to).max(LEAST_STEP),
+            };
             match self.correct(system, path, to, q, &mut done) {
                 Corrected::Stable => {
                     q.copy_from_slice(&self.trial);

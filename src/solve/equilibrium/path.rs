@@ -13,6 +13,10 @@ pub trait LoadPath {
     fn begins_loaded(&self) -> bool {
         false
     }
+    /// True where the drive is the same all along it: shorter steps lead to the same trial.
+    fn is_still(&self) -> bool {
+        false
+    }
     /// The next value of s beyond `s` at which a step has to end: 1, or where an electrode's voltage vanishes before that. What it holds closed
     /// opens there, and at the opposite voltage the same contact is an equilibrium again.
     fn station(&self, s: f64) -> f64 {
@@ -75,6 +79,10 @@ impl<'a> SourcePath<'a> {
 impl LoadPath for SourcePath<'_> {
     fn begins_loaded(&self) -> bool {
         self.load[0] != 0.0 || self.from.iter().any(|v| *v != 0.0)
+    }
+
+    fn is_still(&self) -> bool {
+        self.load[0] == self.load[1] && self.from == self.to
     }
 
     fn at(&self, s: f64, drive: &mut Drive) {
