@@ -63,6 +63,18 @@ pub trait Domain {
     /// `tangent += ∂²Π/∂q²`, on a pattern that couples its bodies.
     fn add_tangent(&self, at: At<'_>, given: Self::Given, pattern: &Pattern, tangent: &mut BlockMatrix<f64, 3>);
 
+    /// Both: [`Domain::add_force`] and [`Domain::add_tangent`].
+    fn add_force_and_tangent(
+        &self,
+        at: At<'_>,
+        given: Self::Given,
+        pattern: &Pattern,
+        (r, tangent): (&mut [Pose], &mut BlockMatrix<f64, 3>),
+    ) {
+        self.add_force(at, given, r);
+        self.add_tangent(at, given, pattern, tangent);
+    }
+
     /// True where it has two sides with a distance between them, and is called a gap.
     fn is_gap(&self) -> bool {
         true

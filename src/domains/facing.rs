@@ -167,6 +167,33 @@ impl Facing {
         (first, second)
     }
 
+    /// ∂Π/∂z: the field at `volts`, and the contact.
+    #[inline]
+    pub fn load(&self, z: &Vector4<f64>, volts: f64) -> Vector4<f64> {
+        let field = if volts == 0.0 { Vector4::zeros() } else { self.gradient(z) * (-0.5 * volts * volts) };
+        if self.apart(z) { field } else { field + self.contact(z).0 }
+    }
+
+    /// ∂Π/∂z and ∂²Π/∂z²; none where nothing acts.
+    #[inline]
+    pub fn load_and_stiffness(&self, z: &Vector4<f64>, volts: f64) -> Option<(Vector4<f64>, Matrix4<f64>)> {
+        let (apart, factor) = (self.apart(z), -0.5 * volts * volts);
+        if apart && volts == 0.0 {
+            return None;
+        }
+        let (mut first, mut second) = (Vector4::zeros(), Matrix4::zeros());
+        if volts != 0.0 {
+            let field = self.at(z);
+            (first, second) = (field.gradient * factor, field.hessian * factor);
+        }
+        if !apart {
+            let (force, stiffness) = self.contact(z);
+            first += force;
+            second += stiffness;
+        }
+        Some((first, second))
+    }
+
     /// Energy stored in the contact [J].
     pub fn contact_energy(&self, z: &Vector4<f64>) -> f64 {
         if self.apart(z) {

@@ -40,7 +40,8 @@ impl FacingBeams {
     /// Calls `each` for the stretches in turn.
     #[inline(always)]
     fn along(&self, at: At<'_>, mut each: impl FnMut(&Local<'_>)) {
-        let [mut upper, mut lower] = [0, 1].map(|i| Walk::new(self.frame, &self.sides[i], at.q, at.linear));
+        let mut upper = Walk::new(self.frame, &self.sides[0], at.q, at.linear);
+        let mut lower = Walk::new(self.frame, &self.sides[1], at.q, at.linear);
         for stretch in &self.stretches {
             let ends = [upper.to(stretch.segments[0]), lower.to(stretch.segments[1])];
             let part = |side: usize| match self.sides[side].fixed {
@@ -109,6 +110,7 @@ impl FacingBeams {
     }
 
     /// `tangent +=` what `first` and `second` per z of a stretch add.
+    #[inline]
     fn add_stiffness(
         &self,
         local: &Local<'_>,
@@ -151,14 +153,6 @@ impl FacingBeams {
                 }
             }
         }
-    }
-
-    /// ∂Π/∂z of a stretch: the field at `volts`, and the contact.
-    #[inline]
-    fn first(local: &Local<'_>, volts: f64) -> Vector4<f64> {
-        let facing = &local.stretch.facing;
-        let field = if volts == 0.0 { Vector4::zeros() } else { facing.gradient(&local.z) * (-0.5 * volts * volts) };
-        if facing.apart(&local.z) { field } else { field + facing.contact(&local.z).0 }
     }
 }
 
@@ -221,7 +215,7 @@ impl Domain for FacingBeams {
     fn add_force(&self, at: At<'_>, volts: f64, r: &mut [Pose]) {
         self.along(at, |local| {
             if volts != 0.0 || !local.stretch.facing.apart(&local.z) {
-                self.add(local, Self::first(local, volts), r);
+                self.add(local, local.stretch.facing.load(&local.z, volts), r);
             }
         });
     }
@@ -234,28 +228,31 @@ impl Domain for FacingBeams {
     }
 
     fn add_tangent(&self, at: At<'_>, volts: f64, pattern: &Pattern, tangent: &mut BlockMatrix<f64, 3>) {
-        let factor = -0.5 * volts * volts;
         self.along(at, |local| {
-            let facing = &local.stretch.facing;
-            let (mut first, mut second) = (Vector4::zeros(), Matrix4::zeros());
-            if volts != 0.0 {
-                let field = facing.at(&local.z);
-                (first, second) = (field.gradient * factor, field.hessian * factor);
+            if let Some(both) = local.stretch.facing.load_and_stiffness(&local.z, volts) {
+                self.add_stiffness(local, both, pattern, tangent);
             }
-            if !facing.apart(&local.z) {
-                let (force, stiffness) = facing.contact(&local.z);
-                first += force;
-                second += stiffness;
-            } else if volts == 0.0 {
-                return;
+        });
+    }
+
+    fn add_force_and_tangent(
+        &self,
+        at: At<'_>,
+        volts: f64,
+        pattern: &Pattern,
+        (r, tangent): (&mut [Pose], &mut BlockMatrix<f64, 3>),
+    ) {
+        self.along(at, |local| {
+            if let Some(both) = local.stretch.facing.load_and_stiffness(&local.z, volts) {
+                self.add(local, both.0, r);
+                self.add_stiffness(local, both, pattern, tangent);
             }
-            self.add_stiffness(local, (first, second), pattern, tangent);
         });
     }
 
     fn levers(&self, at: At<'_>, volts: f64, mut lever: impl FnMut(Point, Vector2<f64>)) {
         self.along(at, |local| {
-            let first = Self::first(local, volts);
+            let first = local.stretch.facing.load(&local.z, volts);
             for side in self.moving() {
                 let first = back(&local.stretch.weights[side], first) * SIGNS[side];
                 for (end, point) in self.points(local.stretch, side).into_iter().enumerate() {
@@ -293,7 +290,7 @@ impl Domain for FacingBeams {
         let (mut begin, mut size) = (0.0, 0.0);
         self.along(at, |local| {
             let Stretch { facing, segments, .. } = local.stretch;
-            let first = Self::first(local, volts);
+            let first = local.stretch.facing.load(&local.z, volts);
             let load = (first[0] + first[2]) / facing.length;
             let bent = |s: f64| -> f64 {
                 (0..2).map(|side| self.sides[side].bent(segments[side], begin + s * facing.length, load)).sum()

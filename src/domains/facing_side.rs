@@ -120,6 +120,7 @@ pub(super) struct Walk<'a> {
 }
 
 impl<'a> Walk<'a> {
+    #[inline(always)]
     pub(super) fn new(frame: Opening, side: &'a Flank, q: &'a [Pose], linear: bool) -> Self {
         let mut walk = Self { frame, side, q, linear, segment: 0, ends: [Deflection::default(); 2] };
         if !side.fixed {
@@ -134,7 +135,7 @@ impl<'a> Walk<'a> {
     }
 
     /// The two ends of a segment; segments come in ascending order.
-    #[inline]
+    #[inline(always)]
     pub(super) fn to(&mut self, segment: usize) -> &[Deflection; 2] {
         while !self.side.fixed && self.segment < segment {
             self.segment += 1;

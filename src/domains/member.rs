@@ -98,6 +98,17 @@ impl Domain for Member {
     }
 
     #[inline]
+    fn add_force_and_tangent(
+        &self,
+        at: At<'_>,
+        given: f64,
+        pattern: &Pattern,
+        sums: (&mut [Pose], &mut BlockMatrix<f64, 3>),
+    ) {
+        each!(self, m => m.add_force_and_tangent(at, given, pattern, sums));
+    }
+
+    #[inline]
     fn acts(&self, given: f64) -> bool {
         each!(self, m => m.acts(given))
     }

@@ -100,8 +100,15 @@ impl System {
     pub fn add_tangent(&self, q: &[Pose], drive: &Drive, tangent: &mut BlockMatrix<f64, 3>, r: &mut [Pose]) {
         tangent.clear();
         forces::add_tangent(&self.model, q, &drive.rest(), tangent, r);
-        self.add_body_forces(q, drive, r);
-        self.add_body_tangent(q, drive, tangent);
+        let (at, pattern) = (self.at(q), &self.model.pattern);
+        for (gap, &volts) in self.members.iter().zip(&drive.volts).filter(|(gap, volts)| gap.acts(**volts)) {
+            gap.add_force_and_tangent(at, volts, pattern, (r, tangent));
+        }
+        for load in &self.loads {
+            load.add_force_and_tangent(at, drive.load, pattern, (r, tangent));
+        }
+        self.add_input_forces(at, drive, r);
+        self.add_input_tangent(at, drive, tangent);
         self.model.project(r);
     }
 
