@@ -6,7 +6,7 @@ use crate::equations::linear::LinearSolver;
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, forces};
 use crate::solve::method::Motion;
-use crate::solve::time::defect::{Impulses, NODES, cubic_start, propagate, quartic};
+use crate::solve::time::defect::{Impulses, NODES, POWERS, cubic_start, quartic};
 
 /// An acceleration is that of a resolved motion where it would change the rate in a step by no more than this many times the rates at the
 /// ends.
@@ -15,8 +15,7 @@ const RESOLVED: f64 = 10.0;
 /// The error, and storage for a step of it.
 #[derive(Debug, Clone)]
 pub(super) struct Defect {
-    error: [Motion; 1],
-    room: [Motion; 1],
+    error: Motion,
     impulses: Impulses,
     /// r at the start of the step; then the acceleration there.
     start: Vec<Pose>,
@@ -30,8 +29,7 @@ impl Defect {
     pub(super) fn zeros(count: usize) -> Self {
         let zeros = vec![Pose::zeros(); count];
         Self {
-            error: [Motion::zeros(count)],
-            room: [Motion::zeros(count)],
+            error: Motion::zeros(count),
             impulses: Impulses::zeros(count),
             start: zeros.clone(),
             at: Motion::zeros(count),
@@ -60,34 +58,50 @@ impl Defect {
         let model = &system.model;
         let gh = GAMMA * h;
         self.accelerate(system, h, before, after);
-        let Self { error, room, impulses, start, at, rho } = self;
+        let Self { impulses, start, at, rho, .. } = self;
         impulses.clear();
         for node in NODES {
             ramp.at(s + node.0 * h, drive);
-            for (k, (rho, a0)) in rho.iter_mut().zip(&*start).enumerate() {
-                let (q, v) = ([&before.q[k], &after.q[k]], [&before.v[k], &after.v[k]]);
-                let [q, v, a] = quartic(node.0, h, q, v, a0);
-                (at.q[k], at.v[k]) = (q, v);
-                *rho = model.mass(k).component_mul(&a);
+            let ends = before.q.iter().zip(&after.q).zip(before.v.iter().zip(&after.v)).zip(&*start);
+            let places = at.q.iter_mut().zip(&mut at.v).zip(rho.iter_mut());
+            for (body, (((q, v), rho), (((q0, q1), (v0, v1)), a0))) in model.bodies.iter().zip(places.zip(ends)) {
+                let a;
+                [*q, *v, a] = quartic(node.0, h, [q0, q1], [v0, v1], a0);
+                *rho = body.mass_diagonal().component_mul(&a) + body.drag.force(v);
             }
-            forces::add_damping(model, &at.v, rho);
+            forces::add_dampers(model, |k| at.v[k], rho);
             system.add_residual(&at.q, drive, rho);
             rho.iter().enumerate().for_each(|(k, rho)| impulses.add(k, node, h, *rho));
         }
-        propagate(error, room, |number, [x]| {
-            for (k, rho) in rho.iter_mut().enumerate() {
-                at.q[k] = x.q[k] / gh;
-                *rho = model.mass(k).component_mul(&((at.q[k] + x.v[k]) / gh)) + impulses.of(number, k) / gh;
+        self.propagate(system, (solver, w), gh);
+        &self.error
+    }
+
+    /// [`crate::solve::time::defect::propagate`] in one sweep over the bodies between two solves.
+    fn propagate<S: LinearSolver>(&mut self, system: &System, (solver, w): (&S, &BlockMatrix<f64, 3>), gh: f64) {
+        let model = &system.model;
+        let Self { error, impulses, at, rho, .. } = self;
+        // between two sweeps the vector is z in the displacements and z/(γh) − drift in the rates
+        let (drift, rate) = (&mut at.q, 1.0 / gh);
+        rho.fill(Pose::zeros());
+        drift.fill(Pose::zeros());
+        for (number, power) in POWERS.into_iter().rev().enumerate() {
+            let e = error.q.iter().zip(&error.v);
+            let sweep = rho.iter_mut().zip(drift.iter_mut()).zip(e).zip(&model.bodies);
+            for (k, (((z, drift), (e_q, e_v)), body)) in sweep.enumerate() {
+                let v = *z * rate - *drift + e_v * power;
+                *drift = (*z + e_q * power) * rate;
+                let momentum = body.mass_diagonal().component_mul(&(*drift + v)) + impulses.of(number, k);
+                *z = momentum * rate + body.drag.force(drift);
             }
-            forces::add_damping(model, &at.q, rho);
+            forces::add_dampers(model, |k| drift[k], rho);
             model.project(rho);
             solver.solve(&model.pattern, w, rho);
             model.project(rho);
-            for (k, z) in rho.iter().enumerate() {
-                (x.q[k], x.v[k]) = (*z, z / gh - at.q[k]);
-            }
-        });
-        &self.error[0]
+        }
+        for ((z, drift), (e_q, e_v)) in rho.iter().zip(&*drift).zip(error.q.iter_mut().zip(&mut error.v)) {
+            (*e_q, *e_v) = (*z, *z * rate - drift);
+        }
     }
 
     /// The acceleration at the start of the step; that of a cubic through the ends in directions without mass, and with one so small that
