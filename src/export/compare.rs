@@ -5,7 +5,7 @@
 //! value relative to itself; where parts cancel (a zero of the curve), to a hundredth of the parts.
 //!
 //! Kept are the modes up to the end of the band that show there; then, as far as the tolerance takes it, the static correction
-//! swings, one direction after the other; then modes above the band are added.
+//! swings, one direction after the other; then modes above the band are added, and last the others in the band.
 
 use super::basis::Basis;
 use super::linear::Reduced;
@@ -111,16 +111,9 @@ pub fn fit(compiled: &Arc<Compiled>, request: &Request) -> Result<Fitted, Export
             let unknowns = compiled.parts.system.model.unknowns();
             Fitted { model, error, worst, band, compared: grid.len(), unknowns, jumped: exact.jumped }
         };
-        let within: Vec<usize> = showing.iter().copied().filter(|&j| hertz(j) <= 1.01 * to).collect();
-        let above: Vec<usize> = every.iter().copied().filter(|&j| hertz(j) > 1.01 * to).collect();
-        let choices: Vec<Vec<usize>> = match request.count {
+        let choices = match request.count {
             Some(_) => vec![every.clone()],
-            // none, 1, 2, 4 … of those above the band
-            None => std::iter::once(0)
-                .chain((0..).map(|k| 1 << k).take_while(|more| *more < above.len()))
-                .chain([above.len()])
-                .map(|more| within.iter().chain(&above[..more]).copied().collect())
-                .collect(),
+            None => choices(&every, &showing, |j| hertz(j) <= 1.01 * to),
         };
         let mut best: Option<Fitted> = None;
         for kept in &choices {
@@ -150,6 +143,23 @@ pub fn fit(compiled: &Arc<Compiled>, request: &Request) -> Result<Fitted, Export
             _ => count *= 2,
         }
     }
+}
+
+/// Modes to try, one choice after the other: those that show in the band, with none, 1, 2, 4 … and all of those above it. Then all in the
+/// band, too: one that does not show at its own resonance, beside another, may matter where that is far.
+fn choices(every: &[usize], showing: &[usize], in_band: impl Fn(usize) -> bool) -> Vec<Vec<usize>> {
+    let within = |of: &[usize]| of.iter().copied().filter(|&j| in_band(j)).collect::<Vec<usize>>();
+    let above: Vec<usize> = every.iter().copied().filter(|&j| !in_band(j)).collect();
+    let mut families = vec![within(showing), within(every)];
+    families.dedup();
+    let with_above = |within: Vec<usize>| -> Vec<Vec<usize>> {
+        std::iter::once(0)
+            .chain((0..).map(|k| 1 << k).take_while(|more| *more < above.len()))
+            .chain([above.len()])
+            .map(|more| within.iter().chain(&above[..more]).copied().collect())
+            .collect()
+    };
+    families.into_iter().flat_map(with_above).collect()
 }
 
 /// Angular frequencies of the comparison, ascending.
