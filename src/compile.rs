@@ -2,6 +2,7 @@
 
 use crate::discretize::{DiscretizeError, Discretized, discretize_like, order, yielded};
 use crate::equations::Joints;
+use crate::multibody::planar::Pose;
 use crate::multibody::relative::Unfit;
 use crate::netlist::{Bundle, Diagnostic, Diagnostics, Setting, Source};
 use crate::options::Refused;
@@ -32,6 +33,21 @@ pub struct Compiled {
     pub joints: Option<Result<Arc<Joints>, Unfit>>,
     /// Its lowest mode, where that was looked for: in a circuit.
     pub lowest: Option<LowestMode>,
+    /// Modes above that whose errors are known, where they were looked for: in a circuit.
+    pub higher: Arc<[HigherMode]>,
+}
+
+/// A mode above the lowest about the equilibrium without voltages.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HigherMode {
+    /// Frequency [Hz].
+    pub frequency_hz: f64,
+    /// Quality by the drag and dampers of the drawing [1]; infinite without.
+    pub quality: f64,
+    /// Estimated relative error of the frequency by the mesh [1].
+    pub error: f64,
+    /// Displacements of the bodies, of modal mass 1 kg.
+    pub shape: Vec<Pose>,
 }
 
 /// The lowest mode about the equilibrium without voltages.
@@ -71,6 +87,7 @@ impl Compiled {
             parts,
             order,
             lowest: None,
+            higher: Arc::default(),
         })
     }
 }
@@ -159,6 +176,7 @@ impl Drawn {
             parts,
             order,
             lowest: None,
+            higher: Arc::default(),
         })
     }
 }

@@ -6,7 +6,7 @@ use super::sensitivity::About;
 use super::signal::{Signal, View};
 use super::statics::{NodeMotion, operating_point, told_at, too_hot};
 use super::{AnalysisError, BeamMotions, NodeMotions, PortVoltages};
-use crate::compile::{Compiled, LowestMode};
+use crate::compile::{Compiled, HigherMode, LowestMode};
 use crate::domains::{Domain, Drive, Point};
 use crate::multibody::BlockMatrix;
 use crate::multibody::forces::{add_damping, add_inertia};
@@ -72,12 +72,8 @@ pub fn modes(compiled: &Compiled, count: usize, voltages: &PortVoltages) -> Resu
 /// compared with `twice` the segments.
 pub(super) fn lowest(compiled: &Compiled, twice: impl FnOnce() -> Option<Compiled>) -> Option<LowestMode> {
     let (found, _, shapes) = shapeless(compiled, 1, &[]).ok()?;
-    let (model, shape) = (&compiled.parts.system.model, shapes.first()?);
-    let mut drag = vec![Pose::zeros(); shape.len()];
-    add_damping(model, shape, &mut drag);
-    let power: f64 = drag.iter().zip(shape).map(|(force, rate)| force.dot(rate)).sum();
     let frequency_hz = *found.frequencies_hz.first()?;
-    let quality = TAU * frequency_hz * model.mass_product(shape, shape) / power.abs();
+    let quality = quality(compiled, shapes.first()?, frequency_hz);
     let error = match *found.errors.first()? {
         Some(error) => error,
         None => {
@@ -86,6 +82,29 @@ pub(super) fn lowest(compiled: &Compiled, twice: impl FnOnce() -> Option<Compile
         }
     };
     Some(LowestMode { frequency_hz, quality, error })
+}
+
+/// The modes above the lowest, of the `count` lowest about the equilibrium without voltages, whose errors are known; none where they cannot be found.
+pub(super) fn higher(compiled: &Compiled, count: usize) -> Vec<HigherMode> {
+    let Ok((found, _, shapes)) = shapeless(compiled, count, &[]) else { return Vec::new() };
+    let modes = found.frequencies_hz.iter().zip(&found.errors).zip(shapes).skip(1);
+    let known = modes.filter_map(|((frequency, error), shape)| {
+        let quality = quality(compiled, &shape, *frequency);
+        let scale = 1.0 / compiled.parts.system.model.mass_product(&shape, &shape).sqrt();
+        let shape: Vec<Pose> = shape.iter().map(|x| x * scale).collect();
+        let sound = *frequency > 0.0 && scale.is_finite();
+        sound.then_some(HigherMode { frequency_hz: *frequency, quality, error: (*error)?, shape })
+    });
+    known.collect()
+}
+
+/// Quality of a mode by drag and dampers [1].
+fn quality(compiled: &Compiled, shape: &[Pose], frequency_hz: f64) -> f64 {
+    let model = &compiled.parts.system.model;
+    let mut drag = vec![Pose::zeros(); shape.len()];
+    add_damping(model, shape, &mut drag);
+    let power: f64 = drag.iter().zip(shape).map(|(force, rate)| force.dot(rate)).sum();
+    TAU * frequency_hz * model.mass_product(shape, shape) / power.abs()
 }
 
 /// True where modes are about an equilibrium that is not the drawing. As SUGAR has it, that is where voltages pull across gaps: its beams

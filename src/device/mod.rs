@@ -18,6 +18,8 @@ pub mod agitation;
 mod answer;
 mod contract;
 mod growth;
+mod half_cycles;
+mod higher_modes;
 pub mod local;
 pub mod look;
 mod noise;

@@ -6,14 +6,11 @@
 //! the mode count nothing, as what a slow drive moves is not out of step.
 //!
 //! A current is a result as its charge is, over a range of its own: a slow stroke may make nearly all of a charge and nearly nothing of its current.
-//! So the rates of charges from point to point are followed, too.
+//! So the rates of charges from point to point are followed, too, and what higher modes bring to them ([`super::higher_modes`]).
 
+use super::half_cycles::{Course, Phase};
+use super::higher_modes::{HigherModes, OfMode, Split};
 use crate::compile::LowestMode;
-use std::f64::consts::PI;
-
-/// By how much half a swing may be longer or shorter than half a cycle of the mode [1]: voltages move its frequency, and a turning point is
-/// known to a step.
-const ALIKE: f64 = 0.25;
 
 /// Part of half a cycle below which two points tell no rate of a charge [1]: at corners of a source they are roundings apart.
 const LEAST_STEP: f64 = 1e-4;
@@ -41,34 +38,43 @@ pub(super) struct Ringing {
     rates: Vec<f64>,
     /// Values and time [s] at the last point that told rates.
     rated: (Vec<f64>, f64),
+    /// The last errors of rates [1].
+    errors: Vec<f64>,
+    higher: HigherModes,
     /// What is told next, in tolerances [1].
     told: f64,
 }
 
-/// One quantity that the circuit sees.
-#[derive(Debug, Clone, Copy)]
-struct Course {
-    now: f64,
-    low: f64,
-    high: f64,
-    /// Whether it rises.
-    rises: Option<bool>,
-    /// The last turning point: time [s], value.
-    turned: Option<(f64, f64)>,
-    /// Halves of a cycle of the mode so far.
-    halves: u32,
+/// The worst of what is off.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Worst {
+    /// Error, of its range [1].
+    pub(super) error: f64,
+    /// Cycles that it took.
+    pub(super) cycles: f64,
+    /// Number of the value, currents behind all values.
+    pub(super) n: usize,
+    /// The higher mode that brings most of it.
+    pub(super) higher: Option<OfMode>,
 }
 
 impl Ringing {
-    /// After a point since the equilibrium, with `charges` among its values: how far the worst of values and currents is off by now, as a share of its
-    /// range [1], how many cycles that took, and its number, currents behind all values.
-    pub(super) fn see(&mut self, mode: &LowestMode, at: Accepted<'_>, charges: &[bool]) -> (f64, f64, usize) {
+    /// After a point since the equilibrium, with `charges` among its values: what is furthest off of the values and currents that turn there.
+    pub(super) fn see(
+        &mut self,
+        mode: &LowestMode,
+        at: Accepted<'_>,
+        charges: &[bool],
+        split: Option<&Split<'_>>,
+    ) -> Worst {
         let (Accepted { t, values }, count) = (at, at.values.len());
+        let mut worst = Worst { error: 0.0, cycles: 0.0, n: 0, higher: None };
         if t <= self.at || self.courses.len() != 2 * count {
-            let begun = |&y: &f64| Course { now: y, low: y, high: y, rises: None, turned: None, halves: 0 };
-            let courses = values.iter().chain(std::iter::repeat_n(&0.0, count)).map(begun).collect();
-            *self = Self { at: t, courses, rates: vec![0.0; count], rated: (values.to_vec(), t), told: self.told };
-            return (0.0, 0.0, 0);
+            let courses = values.iter().chain(std::iter::repeat_n(&0.0, count)).map(|y| Course::at(*y)).collect();
+            let none = vec![0.0; count];
+            let (rates, rated, told) = (none.clone(), (values.to_vec(), t), self.told);
+            *self = Self { at: t, courses, rates, rated, errors: none, higher: HigherModes::default(), told };
+            return worst;
         }
         let (before, half) = (self.at, 0.5 / mode.frequency_hz);
         self.at = t;
@@ -81,13 +87,28 @@ impl Ringing {
             last.copy_from_slice(values);
             *since = t;
         }
-        let mut worst = (0.0, 0.0, 0);
         let followed = if rated { 2 * count } else { count };
-        for (n, (course, y)) in self.courses.iter_mut().zip(values.iter().chain(&self.rates)).take(followed).enumerate()
-        {
-            let (error, cycles) = course.see((before, *y), half, mode);
-            if error > worst.0 {
-                worst = (error, cycles, n);
+        let phase = Phase { error: mode.error, quality: mode.quality };
+        let seen = values.iter().chain(&self.rates).take(followed);
+        for (n, (course, y)) in self.courses.iter_mut().zip(seen).enumerate() {
+            let Some((swing, halves)) = course.half([before, t], *y, half) else { continue };
+            let error = phase.after(halves) * swing / (2.0 * course.range());
+            if n >= count {
+                self.errors[n - count] = error;
+            }
+            if error > worst.error {
+                worst = Worst { error, cycles: 0.5 * f64::from(halves), n, higher: None };
+            }
+        }
+        if split.is_some_and(|split| self.higher.see([before, t], charges, split)) {
+            for n in (0..count).filter(|n| charges[*n]) {
+                let (sum, largest) = self.higher.of(n);
+                let range = self.courses[count + n].range();
+                let error = self.errors[n] + sum / range;
+                let most = largest.filter(|of| of.error > self.errors[n] * range);
+                if let Some(of) = most.filter(|_| error > worst.error) {
+                    worst = Worst { error, cycles: of.cycles, n: count + n, higher: Some(of) };
+                }
             }
         }
         worst
@@ -100,46 +121,40 @@ impl Ringing {
         tol: f64,
         at: Accepted<'_>,
         charges: &[bool],
+        split: &Split<'_>,
     ) -> Option<(String, usize)> {
-        let (error, cycles, n) = self.see(mode, at, charges);
+        let Worst { error, cycles, n, higher } = self.see(mode, at, charges, Some(split));
         if error <= tol * self.told.max(1.0) {
             return None;
         }
         self.told = GROWS * error / tol;
+        let frequency = match higher {
+            None => format!(
+                "the mesh may be off by {:.1e} in the lowest frequency, {:.4e} Hz,",
+                mode.error.abs(),
+                mode.frequency_hz
+            ),
+            Some(of) => format!(
+                "the mesh may be off by {:.1e} and the steps by {:.1e} in the frequency of a higher mode, {:.4e} Hz,",
+                split.modes[of.mode].error.abs(),
+                of.steps,
+                split.modes[of.mode].frequency_hz
+            ),
+        };
         let text = format!(
-            "the mesh may be off by {:.1e} in the lowest frequency, {:.4e} Hz, and a motion that rings gets out of step: after {cycles:.1} \
-             cycles it may be off by {error:.1e} of its range, more than the tolerance {tol:e}",
-            mode.error.abs(),
-            mode.frequency_hz
+            "{frequency} and a motion that rings gets out of step: after {cycles:.1} \
+             cycles it may be off by {error:.1e} of its range, more than the tolerance {tol:e}"
         );
         Some((text, n))
-    }
-}
-
-impl Course {
-    /// The next value `y`, where the last one was at `before` [s].
-    fn see(&mut self, (before, y): (f64, f64), half: f64, mode: &LowestMode) -> (f64, f64) {
-        let last = std::mem::replace(&mut self.now, y);
-        (self.low, self.high) = (self.low.min(y), self.high.max(y));
-        if y == last || self.rises.replace(y > last).is_none_or(|rose| rose == (y > last)) {
-            return (0.0, 0.0);
-        }
-        // it turned at the last point
-        let Some((since, from)) = self.turned.replace((before, last)) else { return (0.0, 0.0) };
-        if ((before - since) / half - 1.0).abs() > ALIKE {
-            return (0.0, 0.0);
-        }
-        self.halves += 1;
-        let phase = mode.error.abs() * (PI * f64::from(self.halves)).min(2.0 * mode.quality);
-        let share = (last - from).abs() / (2.0 * (self.high - self.low));
-        (phase * share, 0.5 * f64::from(self.halves))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::f64::consts::TAU;
+    use crate::compile::HigherMode;
+    use crate::solve::time::defect::step_error;
+    use std::f64::consts::{PI, TAU};
 
     const MODE: LowestMode = LowestMode { frequency_hz: 1e3, quality: f64::INFINITY, error: 1e-4 };
 
@@ -149,7 +164,7 @@ mod tests {
         (0..)
             .map(|k| f64::from(k) * 3e-5)
             .take_while(|t| *t < end)
-            .map(|t| ringing.see(mode, Accepted { t, values: &[course(t)] }, &[false]).0)
+            .map(|t| ringing.see(mode, Accepted { t, values: &[course(t)] }, &[false], None).error)
             .fold(0.0, f64::max)
     }
 
@@ -184,8 +199,8 @@ mod tests {
         let rings = |charges: bool| {
             let mut ringing = Ringing::default();
             let seen = (0..3300).map(|k| f64::from(k) * 3e-5);
-            let seen = seen.map(|t| ringing.see(&MODE, Accepted { t, values: &[charge(t)] }, &[charges]));
-            seen.fold((0.0, 0), |worst, now| if now.0 > worst.0 { (now.0, now.2) } else { worst })
+            let seen = seen.map(|t| ringing.see(&MODE, Accepted { t, values: &[charge(t)] }, &[charges], None));
+            seen.fold((0.0, 0), |worst, now| if now.error > worst.0 { (now.error, now.n) } else { worst })
         };
         let ((error, n), (alone, _)) = (rings(true), rings(false));
         // 98 cycles: ω·t·e, half of it of the range
@@ -200,5 +215,38 @@ mod tests {
             assert_eq!(worst(&MODE, 0.1, |t| (TAU * frequency * t).sin()), 0.0, "{frequency} Hz");
         }
         assert_eq!(worst(&MODE, 0.1, |t| t), 0.0);
+    }
+
+    /// A current in which a mode of ten times the lowest frequency makes a quarter of the range, as much off in frequency as leaves it half a radian out of
+    /// phase at the end: the error is that of the two sines, and it is found with the number of the current; steps of the integrator
+    /// that are long for that mode bring more.
+    #[test]
+    fn a_higher_mode_brings_its_phase() {
+        let lowest = LowestMode { frequency_hz: 1e3, quality: f64::INFINITY, error: 0.0 };
+        let (end, error) = (0.02, 0.5 / (TAU * 1e4 * 0.02));
+        let modes = [HigherMode { frequency_hz: 1e4, quality: f64::INFINITY, error, shape: Vec::new() }];
+        let (slow, fast) = (|t: f64| 3.0 * (TAU * 1e3 * t).cos(), |t: f64| (TAU * 1e4 * t).cos());
+        let charge = |t: f64| 3.0 * (TAU * 1e3 * t).sin() / (TAU * 1e3) + (TAU * 1e4 * t).sin() / (TAU * 1e4);
+        let reported = |step: f64| {
+            let (mut ringing, dt) = (Ringing::default(), 5e-6);
+            let points = (1..).map(|k| f64::from(k) * dt).take_while(|t| *t < end);
+            let seen = points.map(|t| {
+                let split = Split { modes: &modes, rates: &[fast(t)], step, coupling: &|_, _| 1.0 };
+                let worst = ringing.see(&lowest, Accepted { t, values: &[charge(t)] }, &[true], Some(&split));
+                assert!(worst.error == 0.0 || worst.n == 1 && worst.higher.is_some());
+                worst.error
+            });
+            seen.fold(0.0, f64::max)
+        };
+        let range = (0..20_000).map(|k| slow(f64::from(k) * 1e-7) + fast(f64::from(k) * 1e-7));
+        let (low, high) = range.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
+        let expected = 2.0 * (0.25f64).sin() / (high - low);
+        let found = reported(1e-7);
+        assert!((found / expected - 1.0).abs() < 0.1, "{found} {expected}");
+        // a step over a radian is off by step_error(1)
+        let steps = TAU * 1e4 * end * step_error(1.0);
+        let more = reported(1.0 / (TAU * 1e4)) / found;
+        assert!((more / (1.0 + steps / 0.5) - 1.0).abs() < 0.2 || steps > 1.5, "{more} {steps}");
+        assert!(steps < PI);
     }
 }

@@ -120,6 +120,11 @@ impl Shown {
         &self.now
     }
 
+    /// Length of the step that led here [s]; 0 at the start.
+    pub(super) fn last_step(&self) -> f64 {
+        self.steps[0]
+    }
+
     /// Values that it follows.
     pub fn followed(&self) -> usize {
         self.now.len()

@@ -2,6 +2,7 @@
 //! waveform shows.
 
 use super::growth::held_by_charge;
+use super::higher_modes::Split;
 use super::ports::Answer;
 use super::ringing::Accepted;
 use super::session::Session;
@@ -19,7 +20,9 @@ impl Session {
     /// any solid bears, a motion that rings out of step and, in equilibria, gaps along beams in too few segments and what a linear
     /// model leaves out.
     pub(super) fn warns(&mut self, compiled: &Compiled, state: &Snapshot) -> Vec<Diagnostic> {
-        let electrics = &Self::system(&self.ports.system, compiled).electrics;
+        let own = self.ports.system.clone();
+        let system = Self::system(&own, compiled);
+        let electrics = &system.electrics;
         let mut drive = electrics.drive();
         electrics.apply(&state.sources, &state.rise, &mut drive);
         // what is given to other ports than electrical ones stands behind the sources of the drawing
@@ -39,7 +42,21 @@ impl Session {
             found.into_iter().filter_map(|(warning, size)| self.grown(warning, size)).collect();
         if let Some(mode) = &compiled.lowest {
             let (charges, seen) = (self.charges(), Accepted { t: state.elapsed, values: state.shown.values() });
-            if let Some((text, n)) = self.ringing.tell(mode, compiled.options.tol, seen, &charges) {
+            let model = &compiled.parts.system.model;
+            let rates: Vec<f64> =
+                compiled.higher.iter().map(|mode| model.mass_product(&mode.shape, &state.v)).collect();
+            let (sources, signals) = (&self.ports.sources, self.signals.len());
+            let coupling = |mode: usize, n: usize| -> f64 {
+                let port = sources[n - signals];
+                let of = |(g, volts): (usize, &f64)| match electrics.gap_rows[(g, port)] * volts {
+                    0.0 => 0.0,
+                    volts => volts * system.capacitance_slope(g, &state.q, &compiled.higher[mode].shape),
+                };
+                point.volts.iter().enumerate().map(of).sum()
+            };
+            let step = state.next_step.min(state.shown.last_step());
+            let split = Split { modes: &compiled.higher, rates: &rates, step, coupling: &coupling };
+            if let Some((text, n)) = self.ringing.tell(mode, compiled.options.tol, seen, &charges, &split) {
                 let text = format!("{text} ({})", self.seen_name(n, compiled));
                 told.push(Diagnostic::warning(WARNING, text, "give the model `segments` or a `band`"));
             }

@@ -2,7 +2,7 @@
 //! drawing and the lowest modes about it, which steps and pulses excite most.
 
 use super::super::AnalysisError;
-use super::super::modes::lowest;
+use super::super::modes::{higher, lowest};
 use super::equilibrium;
 use super::frequencies::for_modes;
 use super::meshed::{chosen, laid};
@@ -18,6 +18,9 @@ const MOST: usize = 3000;
 
 /// How much looser the tolerance becomes where its mesh would be finer than that [1], and how often.
 const LOOSER: (f64, i32) = (10.0, 3);
+
+/// Modes whose errors are followed over a run.
+const FOLLOWED: usize = 12;
 
 /// Modes that the mesh holds.
 const HELD: usize = 3;
@@ -39,6 +42,7 @@ pub fn in_circuit(compiled: &Compiled) -> Compiled {
     let sought = finer.as_ref().and_then(|finer| finer.order.estimated_error);
     let mut fitted = finer.unwrap_or_else(|| compiled.clone());
     fitted.lowest = bounded(2 * MOST, || lowest(&fitted, || twice(&fitted, fitted.options.tol).ok())).flatten();
+    fitted.higher = bounded(2 * MOST, || higher(&fitted, FOLLOWED)).unwrap_or_default().into();
     let compared = if sought.is_some() { None } else { bounded(2 * MOST, || worse(&fitted)) };
     match (sought, compared) {
         (Some(error), _) => warned(fitted, "the equilibrium without voltages or one of the lowest modes", Some(error)),
