@@ -149,7 +149,7 @@ fn connect(address: &str, bundle: &Bundle, card: &ModelCard) -> Result<Box<dyn D
     let socket = address.strip_prefix("unix:").and_then(|p| names::existing(Path::new(p.trim_start_matches("//"))));
     let respelled = socket.map(|path| format!("unix://{}", path.display()));
     let address = respelled.as_deref().unwrap_or(address);
-    let device = RemoteDevice::connect(address, bundle, &card.options, card.deadline)?;
+    let device = RemoteDevice::connect(address, bundle, &card.options, card.deadline)?.resuming();
     told::of_netlist(&card.file, card.options.without_circuit, device.warnings());
     Ok(Box::new(device))
 }

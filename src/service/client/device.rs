@@ -1,6 +1,7 @@
 //! A device on a server, over one bidirectional stream.
 
-use super::link::{Link, reason};
+use super::link::{Link, is_not_found, reason};
+use super::replay::Replay;
 use crate::compile::CompileOptions;
 use crate::device::{Description, Device, DeviceError, OpenRequest, SmallSignal, Token, Trial, TrialReply};
 use crate::netlist::{Bundle, Diagnostic};
@@ -9,10 +10,13 @@ use crate::service::convert::device as wire;
 use crate::service::proto;
 use proto::device_reply::Kind as ReplyKind;
 use proto::device_request::Kind as RequestKind;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Code, Status, Streaming};
+
+/// Pause between two attempts to reach a server that went away.
+const PAUSE: Duration = Duration::from_millis(50);
 
 /// Requests that may wait for the next call to carry them: accepts, which nobody waits for.
 const QUEUE: usize = 64;
@@ -20,7 +24,7 @@ const QUEUE: usize = 64;
 /// A [`Device`] whose model is held by a server. Every call returns within the deadline.
 ///
 /// After a lost connection or a late answer the device is closed (states live on the server); [`Device::open`] connects
-/// again and starts a new epoch.
+/// again and starts a new epoch. One that is [`RemoteDevice::resuming`] looks for its server again before that.
 #[derive(Debug)]
 pub struct RemoteDevice {
     address: String,
@@ -36,6 +40,10 @@ pub struct RemoteDevice {
     link: Option<Link>,
     /// Why the link was lost, for calls that come after.
     lost: Option<String>,
+    /// What it was opened with.
+    asked: OpenRequest,
+    /// What is asked again of a server that comes back; none: nothing is.
+    replay: Option<Replay>,
 }
 
 #[derive(Debug)]
@@ -82,9 +90,19 @@ impl RemoteDevice {
             stream: None,
             link: None,
             lost: None,
+            asked: OpenRequest::default(),
+            replay: None,
         };
         device.reach().map_err(|status| device.lose(&status))?;
         Ok(device)
+    }
+
+    /// The same device, which goes on with a server that is reached again within the deadline: it asks the trials that led to its states once
+    /// more. They have the same tokens and bits there.
+    #[must_use]
+    pub fn resuming(mut self) -> Self {
+        self.replay = Some(Replay::default());
+        self
     }
 
     /// What the server warned of when it compiled the model, its mesh in a circuit with it.
@@ -121,19 +139,66 @@ impl RemoteDevice {
         Ok(())
     }
 
-    /// One request and its reply.
+    /// One request and its reply, with another attempt where the server comes back.
     fn ask(&mut self, request: RequestKind) -> Result<ReplyKind, DeviceError> {
-        let Self { link: Some(link), stream: Some(stream), .. } = self else { return Err(self.closed()) };
+        if self.link.is_none() || self.stream.is_none() {
+            return Err(self.closed());
+        }
+        let from = match &request {
+            RequestKind::Trial(trial) => Some(trial.parent),
+            RequestKind::Linearize(small) => Some(small.token),
+            _ => None,
+        };
+        let again = from.filter(|_| self.replay.is_some()).map(|from| (from, request.clone()));
+        let status = match self.send(request) {
+            Err(status) => status,
+            answer => return answer.map_err(|status| self.lose(&status)),
+        };
+        let back = match again {
+            Some((from, request)) if status.code() != Code::DeadlineExceeded => {
+                self.resume(from).and_then(|()| self.send(request).ok())
+            }
+            _ => None,
+        };
+        back.ok_or_else(|| self.lose(&status))
+    }
+
+    /// One request and its reply on the stream there is.
+    fn send(&mut self, request: RequestKind) -> Result<ReplyKind, Status> {
+        let Self { link: Some(link), stream: Some(stream), .. } = self else { return Err(ended()) };
         let Stream { requests, replies, .. } = stream;
-        let answer = link.call(async {
+        link.call(async {
             let request = proto::DeviceRequest { kind: Some(request) };
             if requests.send(request).await.is_err() {
                 // The stream has ended: its status says why.
                 return Err(replies.message().await.err().unwrap_or_else(ended));
             }
             replies.message().await?.and_then(|reply| reply.kind).ok_or_else(ended)
-        });
-        answer.map_err(|status| self.lose(&status))
+        })
+    }
+
+    /// Reaches the server again within the deadline and leads it to the state of a token; none where that cannot be done.
+    fn resume(&mut self, token: u64) -> Option<()> {
+        let way = self.replay.as_ref()?.way(token)?;
+        let until = Instant::now() + self.deadline;
+        loop {
+            (self.stream, self.link) = (None, None);
+            if self.start().is_ok() {
+                break;
+            }
+            if Instant::now() + PAUSE > until {
+                return None;
+            }
+            std::thread::sleep(PAUSE);
+        }
+        let ReplyKind::Opened(_) = self.send(self.open_request()).ok()? else { return None };
+        if let Some(stream) = &mut self.stream {
+            stream.opened = true;
+        }
+        for trial in way {
+            self.send(RequestKind::Trial(trial)).ok().filter(|reply| matches!(reply, ReplyKind::Trial(_)))?;
+        }
+        Some(())
     }
 
     fn small_signal(&mut self, request: proto::SmallSignalRequest) -> Result<proto::SmallSignal, DeviceError> {
@@ -178,13 +243,18 @@ impl RemoteDevice {
     }
 
     /// Opens on the stream there is.
-    fn open_here(&mut self, request: &OpenRequest) -> Result<ReplyKind, DeviceError> {
-        self.ask(RequestKind::Open(proto::OpenRequest {
+    fn open_here(&mut self) -> Result<ReplyKind, DeviceError> {
+        self.ask(self.open_request())
+    }
+
+    fn open_request(&self) -> RequestKind {
+        let request = &self.asked;
+        RequestKind::Open(proto::OpenRequest {
             model: self.model.clone(),
             ports: request.ports.clone(),
             signals: request.signals.clone(),
             noise: request.noise.map(|noise| proto::Agitation { seed: noise.seed, band_hz: noise.band }),
-        }))
+        })
     }
 }
 
@@ -192,20 +262,17 @@ fn ended() -> Status {
     Status::unavailable("the server ended the stream")
 }
 
-fn is_not_found(reply: &ReplyKind) -> bool {
-    let ReplyKind::Fault(proto::Fault { kind: Some(proto::fault::Kind::Refused(refused)), .. }) = reply else {
-        return false;
-    };
-    refused.code == Code::NotFound as i32
-}
-
 impl Device for RemoteDevice {
     fn open(&mut self, request: &OpenRequest) -> Result<Description, DeviceError> {
+        self.asked.clone_from(request);
+        if let Some(replay) = &mut self.replay {
+            replay.clear();
+        }
         let fresh = self.stream.is_none();
         if fresh {
             self.start().map_err(|status| self.lose(&status))?;
         }
-        let mut reply = self.open_here(request);
+        let mut reply = self.open_here();
         // A stream left from an earlier run may have died meanwhile, and a server forgets models: once more, anew.
         let stale = match &reply {
             Ok(reply) => is_not_found(reply),
@@ -214,7 +281,7 @@ impl Device for RemoteDevice {
         if stale {
             (self.stream, self.link) = (None, None);
             self.start().map_err(|status| self.lose(&status))?;
-            reply = self.open_here(request);
+            reply = self.open_here();
         }
         match reply? {
             ReplyKind::Opened(opened) => {
@@ -233,14 +300,25 @@ impl Device for RemoteDevice {
         if !self.opened() {
             return Err(self.closed());
         }
-        match self.ask(RequestKind::Trial(wire::trial_to_wire(request)))? {
-            ReplyKind::Trial(answer) => wire::reply_from_wire(answer, reply).map_err(|text| self.remote(text)),
+        let asked = wire::trial_to_wire(request);
+        let remembered = self.replay.is_some().then(|| asked.clone());
+        match self.ask(RequestKind::Trial(asked))? {
+            ReplyKind::Trial(answer) => {
+                wire::reply_from_wire(answer, reply).map_err(|text| self.remote(text))?;
+                if let (Some(replay), Some(asked), Some(token)) = (&mut self.replay, &remembered, reply.token) {
+                    replay.made(token.0, asked);
+                }
+                Ok(())
+            }
             ReplyKind::Fault(fault) => Err(self.fault(fault)),
             _ => Err(self.unexpected()),
         }
     }
 
     fn accept(&mut self, token: Token) {
+        if let Some(replay) = &mut self.replay {
+            replay.accept(token.0);
+        }
         if let Some(stream) = &self.stream {
             let accept = proto::Accept { token: token.0, answer: false };
             // Advisory: when the queue is full, the next one says as much.

@@ -111,6 +111,15 @@ impl Link {
     }
 }
 
+/// A reply that refuses what the server does not have.
+pub(super) fn is_not_found(reply: &proto::device_reply::Kind) -> bool {
+    let proto::device_reply::Kind::Fault(proto::Fault { kind: Some(proto::fault::Kind::Refused(refused)), .. }) = reply
+    else {
+        return false;
+    };
+    refused.code == Code::NotFound as i32
+}
+
 async fn channel(endpoint: &Endpoint, address: &Address, access: &Access) -> Result<Channel, Status> {
     let connected = match address {
         Address::Tls { host, socket } => secured(endpoint, host, *socket, access).await?,

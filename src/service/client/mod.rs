@@ -12,6 +12,7 @@ mod jobs;
 mod line;
 mod link;
 mod persistence;
+mod replay;
 #[cfg(feature = "tls")]
 mod secure;
 mod sweeps;

@@ -12,6 +12,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, mpsc};
 use std::thread;
+use std::time::Duration;
 use tempfile::TempDir;
 use tokio::sync::oneshot;
 
@@ -206,6 +207,31 @@ fn a_killed_server_ends_the_run() {
     if !skipped() {
         stops(Fate::Cut);
     }
+}
+
+/// A server that is killed in the middle of a transient and comes back within the deadline, without any of its states, goes on where it was: the
+/// waveforms are those of the process to the last bit.
+#[test]
+fn a_server_that_comes_back_goes_on() {
+    if skipped() {
+        return;
+    }
+    let (first, second) = (Serving::start(), Serving::start());
+    let folder = tempfile::tempdir().unwrap();
+    let socket = folder.path().join("line");
+    line(&socket, first.socket(), Fate::Cut, 20_000);
+    let (at, server) = (socket.clone(), second.socket());
+    let comes_back = thread::spawn(move || {
+        while at.exists() {
+            thread::sleep(Duration::from_millis(5));
+        }
+        thread::sleep(Duration::from_millis(200));
+        line(&at, server, Fate::Mute, usize::MAX);
+    });
+    let there = run(on(&socket, "comb_remote.cir")).unwrap();
+    comes_back.join().unwrap();
+    let here = run(on(&first.socket(), "comb_remote.cir")).unwrap();
+    assert_eq!(here.plots, there.plots);
 }
 
 /// A server that no longer answers ends it at the deadline.
