@@ -17,6 +17,8 @@ const REPORTED: f64 = 3e-3;
 const MIN_POINTS: u32 = 12;
 /// Relative error of a charge that integrators leave [1].
 const NOISE: f64 = 1e-7;
+/// By how much an alternation is larger than the one that was reported last, to be reported again [1].
+const GROWS: f64 = 3.0;
 /// Ratio of a step to the one before it below which a point has no derivative [1].
 const LEAST_RATIO: f64 = 1e-3;
 
@@ -66,7 +68,7 @@ impl Port {
 }
 
 impl Alternation {
-    /// Warnings after an accepted point: `step` [s], 0 at an equilibrium; `names` of the ports. A port is reported again at ten times as much.
+    /// Warnings after an accepted point: `step` [s], 0 at an equilibrium; `names` of the ports. A port is reported again at three times as much.
     pub(crate) fn accepted<'a>(
         &mut self,
         step: f64,
@@ -91,7 +93,7 @@ impl Alternation {
             port.current = *current;
             // a charge that stands still has no range
             let share = size / (port.range[1] - port.range[0]).max(size);
-            if port.points >= MIN_POINTS && share > 10.0 * port.reported {
+            if port.points >= MIN_POINTS && share > GROWS * port.reported {
                 port.reported = share;
                 warnings.push(Diagnostic::warning(
                     CODE,

@@ -5,6 +5,7 @@ mod analytic;
 mod around;
 mod charge;
 mod check;
+mod currents;
 mod export;
 mod harmonic;
 mod held;
