@@ -211,7 +211,7 @@ mod tests {
         for z in [0.1, 0.2] {
             assert!((step_error(z) / z.powi(5) / 7.3e-4 - 1.0).abs() < 0.2, "{z}: {:e}", step_error(z) / z.powi(5));
         }
-        assert!(step_error(100.0) > 0.9 && step_error(0.0) == 0.0);
+        assert!(step_error(100.0) > 0.8 && step_error(0.0) < 1e-12);
     }
 
     /// A quartic is itself: t⁴ − 2t³ + t on a step of half a second from t = 0.3 s.
