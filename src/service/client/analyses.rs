@@ -1,6 +1,7 @@
 //! Analyses on a server.
 
-use super::link::{Link, is_broken, reason};
+use super::link::{Link, is_broken, reason, unexpected};
+use super::verified;
 use crate::analysis::harmonic::{HarmonicOptions, HarmonicResult};
 use crate::analysis::integrator::Integrator;
 use crate::analysis::modes::ModesResult;
@@ -114,7 +115,9 @@ impl Client {
     pub fn statics(&mut self, model: &str, voltages: &PortVoltages) -> Result<StaticResult, ClientError> {
         let request = proto::StaticRequest { model: model.to_owned(), voltages: named(voltages) };
         let mut rpc = self.link.rpc.clone();
-        self.call(rpc.r#static(request)).map(results::static_from_wire)
+        let reply = self.call(rpc.r#static(request))?;
+        self.checked(verified::statics(&reply))?;
+        Ok(results::static_from_wire(reply))
     }
 
     /// Natural frequencies; `count` 0: six.
@@ -125,7 +128,9 @@ impl Client {
         let count = u32::try_from(count).unwrap_or(u32::MAX);
         let request = proto::ModesRequest { model: model.to_owned(), count, voltages: named(voltages) };
         let mut rpc = self.link.rpc.clone();
-        self.call(rpc.modes(request)).map(results::modes_from_wire)
+        let reply = self.call(rpc.modes(request))?;
+        self.checked(verified::modes(&reply))?;
+        Ok(results::modes_from_wire(reply))
     }
 
     /// Frequency response.
@@ -139,7 +144,9 @@ impl Client {
     ) -> Result<HarmonicResult, ClientError> {
         let request = harmonics::request_to_wire(model, options);
         let mut rpc = self.link.rpc.clone();
-        self.call(rpc.frequency_response(request)).map(|reply| harmonics::result_from_wire(&options.drive, reply))
+        let reply = self.call(rpc.frequency_response(request))?;
+        self.checked(verified::response(&options.signals, &reply))?;
+        Ok(harmonics::result_from_wire(&options.drive, reply))
     }
 
     /// Pull-in and release.
@@ -185,6 +192,8 @@ impl Client {
         while let Some(event) = self.next(&mut events)? {
             match event.kind {
                 Some(EventKind::Samples(samples)) => {
+                    let last = t.last().copied().unwrap_or(f64::NEG_INFINITY);
+                    self.checked(verified::samples(last, columns.len(), &samples))?;
                     t.extend(samples.t);
                     for (column, more) in columns.iter_mut().zip(samples.signals) {
                         column.extend(more.values);
@@ -200,6 +209,11 @@ impl Client {
             }
         }
         Err(self.error(&Status::unavailable("the stream ended before the run did")))
+    }
+
+    /// What a reply that was checked says.
+    fn checked(&self, found: Result<(), String>) -> Result<(), ClientError> {
+        found.map_err(|what| self.error(&unexpected(&what)))
     }
 
     pub(super) fn call<T>(&self, call: impl Future<Output = Result<Response<T>, Status>>) -> Result<T, ClientError> {

@@ -1,7 +1,9 @@
 //! A device on a server, over one bidirectional stream.
 
-use super::link::{Link, is_not_found, reason};
+use super::link::{Link, is_not_found, reason, unexpected};
 use super::replay::Replay;
+use super::trial_stream::{Stream, ended, open_request};
+use super::verified;
 use crate::compile::CompileOptions;
 use crate::device::{Description, Device, DeviceError, OpenRequest, SmallSignal, Token, Trial, TrialReply};
 use crate::netlist::{Bundle, Diagnostic};
@@ -13,7 +15,7 @@ use proto::device_request::Kind as RequestKind;
 use std::time::{Duration, Instant};
 use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
-use tonic::{Code, Status, Streaming};
+use tonic::{Code, Status};
 
 /// Pause between two attempts to reach a server that went away.
 const PAUSE: Duration = Duration::from_millis(50);
@@ -44,13 +46,8 @@ pub struct RemoteDevice {
     asked: OpenRequest,
     /// What is asked again of a server that comes back; none: nothing is.
     replay: Option<Replay>,
-}
-
-#[derive(Debug)]
-struct Stream {
-    requests: mpsc::Sender<proto::DeviceRequest>,
-    replies: Streaming<proto::DeviceReply>,
-    opened: bool,
+    /// When the call at hand must have ended.
+    until: Instant,
 }
 
 impl RemoteDevice {
@@ -92,6 +89,7 @@ impl RemoteDevice {
             lost: None,
             asked: OpenRequest::default(),
             replay: None,
+            until: Instant::now() + deadline,
         };
         device.reach().map_err(|status| device.lose(&status))?;
         Ok(device)
@@ -117,10 +115,12 @@ impl RemoteDevice {
 
     /// Connects and compiles.
     fn reach(&mut self) -> Result<(), Status> {
-        let link = Link::connect(&self.address, &self.access, self.deadline)?;
+        let left = self.until.saturating_duration_since(Instant::now());
+        let mut link = Link::connect(&self.address, &self.access, left)?;
+        link.deadline = self.deadline;
+        link.end_by(self.until);
         let described = link.compile(&self.bundle, &self.options)?;
-        let warning = |told: proto::Diagnostic| Diagnostic::warning(&told.code, told.message, &told.help);
-        self.warnings = described.warnings.into_iter().map(warning).collect();
+        self.warnings = verified::warnings(&described.warnings);
         self.model = described.id;
         self.link = Some(link);
         Ok(())
@@ -135,7 +135,7 @@ impl RemoteDevice {
         let (requests, queue) = mpsc::channel(QUEUE);
         let mut rpc = link.rpc.clone();
         let replies = link.call(rpc.trial(ReceiverStream::new(queue)))?.into_inner();
-        self.stream = Some(Stream { requests, replies, opened: false });
+        self.stream = Some(Stream::new(requests, replies));
         Ok(())
     }
 
@@ -166,42 +166,52 @@ impl RemoteDevice {
     /// One request and its reply on the stream there is.
     fn send(&mut self, request: RequestKind) -> Result<ReplyKind, Status> {
         let Self { link: Some(link), stream: Some(stream), .. } = self else { return Err(ended()) };
-        let Stream { requests, replies, .. } = stream;
-        link.call(async {
-            let request = proto::DeviceRequest { kind: Some(request) };
-            if requests.send(request).await.is_err() {
-                // The stream has ended: its status says why.
-                return Err(replies.message().await.err().unwrap_or_else(ended));
-            }
-            replies.message().await?.and_then(|reply| reply.kind).ok_or_else(ended)
-        })
+        link.call(stream.ask(request))
     }
 
     /// Reaches the server again within the deadline and leads it to the state of a token; none where that cannot be done.
     fn resume(&mut self, token: u64) -> Option<()> {
         let way = self.replay.as_ref()?.way(token)?;
-        let until = Instant::now() + self.deadline;
         loop {
             (self.stream, self.link) = (None, None);
             if self.start().is_ok() {
                 break;
             }
-            if Instant::now() + PAUSE > until {
+            if Instant::now() + PAUSE > self.until {
                 return None;
             }
             std::thread::sleep(PAUSE);
         }
-        let ReplyKind::Opened(_) = self.send(self.open_request()).ok()? else { return None };
-        if let Some(stream) = &mut self.stream {
-            stream.opened = true;
-        }
+        let ReplyKind::Opened(opened) = self.send(open_request(&self.model, &self.asked)).ok()? else { return None };
+        let device = opened.device.unwrap_or_default();
+        verified::opened(&self.asked, &device).ok()?;
+        self.stream.as_mut()?.open(&device);
         for trial in way {
             self.send(RequestKind::Trial(trial)).ok().filter(|reply| matches!(reply, ReplyKind::Trial(_)))?;
         }
         Some(())
     }
 
+    /// A call begins, which ends within the deadline whatever it takes.
+    fn begin(&mut self) {
+        self.until = Instant::now() + self.deadline;
+        self.link.iter().for_each(|link| link.end_by(self.until));
+    }
+
+    /// What a reply that was checked says; one that is none of those asked for loses the connection.
+    fn checked(&mut self, found: Result<(), String>) -> Result<(), DeviceError> {
+        found.map_err(|what| self.lose(&unexpected(&what)))
+    }
+
+    fn shape(&self) -> (usize, usize) {
+        self.stream.as_ref().map_or((0, 0), Stream::shape)
+    }
+
     fn small_signal(&mut self, request: proto::SmallSignalRequest) -> Result<proto::SmallSignal, DeviceError> {
+        if !self.opened() {
+            return Err(self.closed());
+        }
+        self.begin();
         match self.ask(RequestKind::Linearize(request))? {
             ReplyKind::Linearized(answer) => Ok(answer),
             ReplyKind::Fault(fault) => Err(self.fault(fault)),
@@ -210,7 +220,7 @@ impl RemoteDevice {
     }
 
     fn opened(&self) -> bool {
-        self.stream.as_ref().is_some_and(|stream| stream.opened)
+        self.stream.as_ref().is_some_and(Stream::is_open)
     }
 
     /// The error of a device that is not open: never opened, or lost since.
@@ -235,35 +245,22 @@ impl RemoteDevice {
     }
 
     fn unexpected(&mut self) -> DeviceError {
-        self.lose(&Status::internal("a reply of another kind than the request; is the server of another version?"))
+        self.lose(&unexpected("one of another kind than the request"))
     }
 
     fn fault(&mut self, fault: proto::Fault) -> DeviceError {
-        wire::fault_from_wire(fault, &self.address)
+        verified::fault(wire::fault_from_wire(fault, &self.address))
     }
 
     /// Opens on the stream there is.
     fn open_here(&mut self) -> Result<ReplyKind, DeviceError> {
-        self.ask(self.open_request())
+        self.ask(open_request(&self.model, &self.asked))
     }
-
-    fn open_request(&self) -> RequestKind {
-        let request = &self.asked;
-        RequestKind::Open(proto::OpenRequest {
-            model: self.model.clone(),
-            ports: request.ports.clone(),
-            signals: request.signals.clone(),
-            noise: request.noise.map(|noise| proto::Agitation { seed: noise.seed, band_hz: noise.band }),
-        })
-    }
-}
-
-fn ended() -> Status {
-    Status::unavailable("the server ended the stream")
 }
 
 impl Device for RemoteDevice {
     fn open(&mut self, request: &OpenRequest) -> Result<Description, DeviceError> {
+        self.begin();
         self.asked.clone_from(request);
         if let Some(replay) = &mut self.replay {
             replay.clear();
@@ -285,11 +282,11 @@ impl Device for RemoteDevice {
         }
         match reply? {
             ReplyKind::Opened(opened) => {
+                let device = opened.device.unwrap_or_default();
+                self.checked(verified::opened(request, &device))?;
                 self.lost = None;
-                if let Some(stream) = &mut self.stream {
-                    stream.opened = true;
-                }
-                Ok(wire::description_from_wire(opened.device.unwrap_or_default()))
+                self.stream.iter_mut().for_each(|stream| stream.open(&device));
+                Ok(wire::description_from_wire(device))
             }
             ReplyKind::Fault(fault) => Err(self.fault(fault)),
             _ => Err(self.unexpected()),
@@ -300,11 +297,17 @@ impl Device for RemoteDevice {
         if !self.opened() {
             return Err(self.closed());
         }
+        self.begin();
         let asked = wire::trial_to_wire(request);
         let remembered = self.replay.is_some().then(|| asked.clone());
         match self.ask(RequestKind::Trial(asked))? {
             ReplyKind::Trial(answer) => {
-                wire::reply_from_wire(answer, reply).map_err(|text| self.remote(text))?;
+                self.checked(verified::trial(request, self.shape(), &answer))?;
+                let answer = proto::TrialReply { reason: verified::text(&answer.reason), ..answer };
+                let read = wire::reply_from_wire(answer, reply);
+                let stream = self.stream.as_mut();
+                let found = read.and_then(|()| stream.map_or(Ok(()), |stream| stream.order.check(request, reply)));
+                self.checked(found)?;
                 if let (Some(replay), Some(asked), Some(token)) = (&mut self.replay, &remembered, reply.token) {
                     replay.made(token.0, asked);
                 }
@@ -322,27 +325,23 @@ impl Device for RemoteDevice {
         if let Some(stream) = &self.stream {
             let accept = proto::Accept { token: token.0, answer: false };
             // Advisory: when the queue is full, the next one says as much.
-            let _ = stream.requests.try_send(proto::DeviceRequest { kind: Some(RequestKind::Accept(accept)) });
+            stream.tell(RequestKind::Accept(accept));
         }
     }
 
     fn linearize(&mut self, token: Token, omega: f64, reply: &mut SmallSignal) -> Result<(), DeviceError> {
-        if !self.opened() {
-            return Err(self.closed());
-        }
         let answer = self.small_signal(proto::SmallSignalRequest { token: token.0, omega, noise: false })?;
+        self.checked(verified::small_signal(self.shape(), &answer))?;
         wire::small_signal_from_wire(&answer, reply);
         Ok(())
     }
 
     fn noise(&mut self, token: Token, omega: f64, reply: &mut Vec<[f64; 2]>) -> Result<(), DeviceError> {
-        if !self.opened() {
-            return Err(self.closed());
-        }
         let answer = self.small_signal(proto::SmallSignalRequest { token: token.0, omega, noise: true })?;
         if !answer.admittance_re.is_empty() {
             return Err(self.remote("it is of an earlier version, which knows no noise".into()));
         }
+        self.checked(verified::noise(self.shape(), &answer))?;
         wire::noise_from_wire(&answer, reply);
         Ok(())
     }

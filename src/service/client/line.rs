@@ -4,7 +4,7 @@
 //! Connections are driven by who asks, and by a thread of their own while nobody does ([`super::driven`]).
 
 use super::driven::Loop;
-use super::link::{is_broken, reason};
+use super::link::{is_broken, reason, unexpected};
 use crate::service::address::Address;
 use crate::service::inside::{decoded, not_asynchronous};
 use crate::service::proto;
@@ -12,8 +12,11 @@ use prost::Message;
 use proto::bimorph_client::BimorphClient;
 use proto::device_request::Kind;
 use std::collections::BTreeMap;
+use std::future::Future;
 use std::io;
+use std::pin::pin;
 use std::sync::{Arc, Mutex, PoisonError};
+use std::task::{Context, Poll, Waker};
 use std::time::{Duration, Instant};
 use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
@@ -132,6 +135,15 @@ impl Line {
         let asked = Instant::now();
         let still = || waits() && asked.elapsed() < patience;
         let Self { runtime, requests, replies, owed } = self;
+        if *owed == 0 {
+            // a reply that nobody asked for would be taken for that to this question
+            match pin!(replies.message()).poll(&mut Context::from_waker(Waker::noop())) {
+                Poll::Ready(Ok(Some(_))) => return Err(unexpected("one that nobody asked for")),
+                Poll::Ready(Err(status)) => return Err(said(&status, asked, patience)),
+                Poll::Ready(Ok(None)) => return Err(said(&ended(), asked, patience)),
+                Poll::Pending => {}
+            }
+        }
         let sent = async { requests.reserve().await.map_err(|_| Status::unknown("")) };
         // a place first: what is dropped on the way to it was not sent
         match runtime.wait(sent, &still) {

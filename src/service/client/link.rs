@@ -1,5 +1,6 @@
 //! A connection, the token it shows, and the runtime that drives it while a call runs.
 
+use super::verified;
 use crate::compile::CompileOptions;
 use crate::netlist::Bundle;
 use crate::service::access::{Access, AccessError};
@@ -7,9 +8,10 @@ use crate::service::address::Address;
 use crate::service::convert::model::bundle_to_wire;
 use crate::service::convert::options::options_to_wire;
 use crate::service::proto::{self, bimorph_client::BimorphClient};
+use std::cell::Cell;
 use std::future::Future;
 use std::net::SocketAddr;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use tokio::runtime::Runtime;
 use tonic::metadata::{Ascii, MetadataValue};
 use tonic::service::Interceptor;
@@ -56,7 +58,10 @@ fn unusable(error: &AccessError) -> Status {
 pub(super) struct Link {
     runtime: Runtime,
     pub(super) rpc: Rpc,
+    /// Longest time of one call.
     pub(super) deadline: Duration,
+    /// When all of what is under way must have ended; none: each call has its own time.
+    until: Cell<Option<Instant>>,
 }
 
 impl Link {
@@ -80,12 +85,20 @@ impl Link {
         let rpc = BimorphClient::with_interceptor(channel, shown)
             .max_decoding_message_size(MESSAGE_BYTES)
             .max_encoding_message_size(MESSAGE_BYTES);
-        Ok(Self { runtime, rpc, deadline })
+        Ok(Self { runtime, rpc, deadline, until: Cell::new(None) })
+    }
+
+    /// Bounds all calls until the next bound: together they end by then.
+    pub(super) fn end_by(&self, until: Instant) {
+        self.until.set(Some(until));
     }
 
     /// Runs one call to its end or to the deadline.
     pub(super) fn call<T>(&self, call: impl Future<Output = Result<T, Status>>) -> Result<T, Status> {
-        within(&self.runtime, self.deadline, call)
+        let left = self.until.get().map(|until| until.saturating_duration_since(Instant::now()));
+        let time = left.map_or(self.deadline, |left| left.min(self.deadline));
+        let answer = within(&self.runtime, time, call);
+        answer.map_err(|status| if left.is_some() && is_late(&status) { late(self.deadline) } else { status })
     }
 
     /// Compiles a netlist on the server. A netlist with errors comes back with all of them: a status has no room for
@@ -97,7 +110,9 @@ impl Link {
         match self.call(rpc.compile(request)) {
             Ok(response) => {
                 let model = response.into_inner().model;
-                model.ok_or_else(|| Status::internal("the server compiled, but described no model"))
+                let model = model.ok_or_else(|| unexpected("it compiled, but described no model"))?;
+                verified::model(&model).map_err(|what| unexpected(&what))?;
+                Ok(model)
             }
             Err(status) if status.code() == Code::InvalidArgument => {
                 let request = proto::CheckRequest { bundle: wire_bundle, options: wire_options };
@@ -154,11 +169,22 @@ fn within<T>(
     deadline: Duration,
     call: impl Future<Output = Result<T, Status>>,
 ) -> Result<T, Status> {
-    runtime.block_on(async {
-        tokio::time::timeout(deadline, call).await.unwrap_or_else(|_| {
-            Err(Status::deadline_exceeded(format!("no answer within {} s", deadline.as_secs_f64())))
-        })
-    })
+    runtime.block_on(async { tokio::time::timeout(deadline, call).await.unwrap_or_else(|_| Err(late(deadline))) })
+}
+
+fn late(deadline: Duration) -> Status {
+    Status::deadline_exceeded(format!("{LATE} {} s", deadline.as_secs_f64()))
+}
+
+const LATE: &str = "no answer within";
+
+fn is_late(status: &Status) -> bool {
+    status.code() == Code::DeadlineExceeded && status.message().starts_with(LATE)
+}
+
+/// The status of a reply that is none of those that were asked for.
+pub(super) fn unexpected(what: &str) -> Status {
+    Status::internal(format!("unexpected reply: {what}; the server is faulty, of another version, or none of Bimorph"))
 }
 
 /// Whether the connection broke: a status that a server sent has no source, one that was made of a broken connection has.
@@ -168,6 +194,10 @@ pub(super) fn is_broken(status: &Status) -> bool {
 
 /// What happened, in words: a netlist's diagnostics as they are, anything else with its kind.
 pub(super) fn reason(status: &Status) -> String {
+    verified::text(&said(status))
+}
+
+fn said(status: &Status) -> String {
     match status.code() {
         Code::InvalidArgument | Code::FailedPrecondition | Code::DeadlineExceeded | Code::ResourceExhausted => {
             status.message().trim_end().to_owned()

@@ -11,11 +11,14 @@ mod jobs;
 #[cfg(feature = "server")]
 mod line;
 mod link;
+mod order;
 mod persistence;
 mod replay;
 #[cfg(feature = "tls")]
 mod secure;
 mod sweeps;
+mod trial_stream;
+mod verified;
 
 pub use analyses::{Client, ClientError, RemoteTransient};
 pub use device::RemoteDevice;

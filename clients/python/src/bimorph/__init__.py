@@ -22,6 +22,7 @@ from .errors import (
     Refused,
     StepFailed,
     Unavailable,
+    UnexpectedReply,
     Violation,
 )
 from .executors import sweep_on
@@ -87,6 +88,7 @@ __all__ = [
     "TransientResult",
     "TrialReply",
     "Unavailable",
+    "UnexpectedReply",
     "Uniform",
     "Violation",
     "aio",

@@ -81,6 +81,10 @@ class StepFailed(NoResult):
     """A device that cannot take a step, however short."""
 
 
+class UnexpectedReply(BimorphError):
+    """A reply that is none of those that were asked for: the server is faulty, of another version, or none of Bimorph."""
+
+
 class Refused(BimorphError):
     """A server that asks for a token, or knows another one."""
 
@@ -116,7 +120,20 @@ def from_status(number: int, text: str, details: bytes, address: str) -> Bimorph
     return _of_code(code, text, details, address)
 
 
+_LONGEST = 65536
+"""Longest text of a server that is shown [character]."""
+
+
+def shown(text: str) -> str:
+    """Text of a server: line breaks and tabs stay, other characters that control a terminal are written out, and what is very long is cut."""
+    text = text if len(text) <= _LONGEST else text[:_LONGEST] + " …"
+    if text.isprintable():
+        return text
+    return "".join(c if c in "\n\t" or c.isprintable() else repr(c)[1:-1] for c in text)
+
+
 def _of_code(code: grpc.StatusCode, text: str, details: bytes, address: str) -> BimorphError:
+    text = shown(text)
     if code == grpc.StatusCode.INVALID_ARGUMENT:
         return InvalidRequest(text, violations(details))
     kind = _BY_CODE.get(code, BimorphError)
@@ -133,5 +150,5 @@ def violations(details: bytes) -> list[Violation]:
     for detail in status_pb2.Status.FromString(details).details:
         bad = error_details_pb2.BadRequest()
         if detail.Unpack(bad):
-            found += [Violation(v.field, v.description) for v in bad.field_violations]
+            found += [Violation(shown(v.field), shown(v.description)) for v in bad.field_violations]
     return found

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import grpc
 
 from . import native
-from .errors import BimorphError, Unavailable, from_rpc, from_status
+from .errors import BimorphError, UnexpectedReply, Unavailable, from_rpc, from_status
 from .v1 import device_pb2
 
 if TYPE_CHECKING:
@@ -93,6 +93,12 @@ class Line:
         over: BimorphError
         try:
             for reply in call:
+                if not self._sent:
+                    self.over = self.over or UnexpectedReply(
+                        f"server {self._address}: unexpected reply: one that nobody asked for"
+                    )
+                    call.cancel()
+                    return
                 replies = self._sent.popleft().replies
                 if replies is not None:
                     replies.put(reply)

@@ -17,6 +17,7 @@ from .session import Session, opened_just_now
 from .stopping import apart
 from .ticket import Snapshot
 from .v1 import analysis_pb2, device_pb2, model_pb2
+from .verified import Checked
 from .waveforms import Waveform, drive, told
 
 class Model:
@@ -26,6 +27,10 @@ class Model:
     """
 
     def __init__(self, channel: Channel, description: Any, source: Any) -> None:
+        checked = Checked(channel.address, "compile")
+        checked.names("id of the model", [description.id])
+        checked.names("ports", description.ports)
+        checked.names("nodes", description.nodes)
         self._channel = channel
         self._description = description
         self._source = source
@@ -59,6 +64,9 @@ class Model:
             self._channel.call("Compile", self._source)
             return self._channel.call(method, request)
 
+    def _checked(self, call: str) -> Checked:
+        return Checked(self._channel.address, f"{call} of model {self.id[:8]}")
+
     def _tol(self) -> float:
         """Its tolerance [1]."""
         options = self._source.options
@@ -80,6 +88,7 @@ class Model:
         """Static equilibrium reached from rest at these port voltages [V]."""
         request = analysis_pb2.StaticRequest(model=self.id, voltages=named(voltages))
         answer = self._call("Static", request)
+        self._checked("static").static(answer)
         return StaticResult(
             nodes={n.name: NodeMotion(n.x, n.y, n.rz) for n in answer.nodes},
             temperatures_k=by_name(answer.temperatures_k),
@@ -98,6 +107,7 @@ class Model:
         """The ``count`` lowest modes about the equilibrium at these port voltages [V]."""
         request = analysis_pb2.ModesRequest(model=self.id, count=at_least("count", count, 1), voltages=named(voltages))
         answer = self._call("Modes", request)
+        self._checked("modes").modes(answer)
         shapes = [
             {name: NodeMotion(x, y, rz) for name, x, y, rz in zip(answer.nodes, s.x, s.y, s.rz)}
             for s in answer.shapes
@@ -152,6 +162,7 @@ class Model:
             voltages=named(voltages),
         )
         answer = self._call("FrequencyResponse", request)
+        self._checked("ac").response(answer, signals)
 
         def roots(wire: Iterable[Any]) -> list[Root]:
             return [Root(complex(root.re, root.im)) for root in wire]
@@ -238,10 +249,12 @@ class Model:
                 model._describe()
         t: list[float] = []
         columns: list[list[float]] = [[] for _ in signals]
+        checked = self._checked("transient")
         for event in self._channel.stream("Transient", request):
             if progress is not None:
                 progress(event.progress)
             if event.HasField("samples"):
+                checked.samples(event.samples, t[-1] if t else -math.inf, len(columns))
                 t.extend(event.samples.t)
                 for column, more in zip(columns, event.samples.signals):
                     column.extend(more.values)

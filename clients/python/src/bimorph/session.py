@@ -12,11 +12,12 @@ from types import TracebackType
 from typing import Any
 
 from .channel import Channel
-from .errors import BimorphError, InvalidRequest, NotFound, StepFailed, from_fault
+from .errors import BimorphError, InvalidRequest, NotFound, StepFailed, from_fault, shown
 from .results import NodeMotion, TrialReply
 from .stopping import apart, check
 from .ticket import Snapshot, Ticket
 from .v1 import device_pb2
+from .verified import Checked
 
 _SHORTEST = 1e-9
 """A step that would have to be shorter than this fraction of what was asked for has failed."""
@@ -59,6 +60,8 @@ class Session:
         self.accepted: TrialReply | None = None
         """The accepted state; None: the model at rest as drawn."""
         self._voltages: dict[str, float] = {}
+        self._checked = Checked(channel.address, f"session of model {model[:8]}")
+        self._last: tuple[int, object] | None = None
         if session:
             first = device_pb2.DeviceRequest(attach=device_pb2.Attach(session=session))
         else:
@@ -66,7 +69,8 @@ class Session:
                 open=device_pb2.OpenRequest(model=model, ports=ports, signals=signals, noise=noise)
             )
         try:
-            opened = self._ask(first).opened
+            opened = self._checked.kind(self._ask(first), "opened")
+            self._checked.opened(opened.device, ports, None if session else signals)
         except BaseException:
             # the session was there before this object: it stays, to be joined again
             self.leave()
@@ -107,7 +111,15 @@ class Session:
             mode, t = device_pb2.MODE_TRANSIENT, (parent.t if parent else 0.0) + dt
         token = parent.token if parent else 0
         trial = device_pb2.TrialRequest(mode=mode, parent=token, t=t, dt=dt or 0.0, voltages=vector)
-        return self._named(self._ask(device_pb2.DeviceRequest(trial=trial)).trial, t, vector)
+        wire = self._checked.kind(self._ask(device_pb2.DeviceRequest(trial=trial)), "trial")
+        self._checked.trial(wire, len(self.ports), len(self.signals), dt)
+        if wire.token:
+            # a state has one name and comes of one trial
+            asked = (mode, token, dt, tuple(vector))
+            other = self._last is not None and self._last[0] == wire.token and self._last[1] != asked
+            self._checked.require(not other, "it names the state of an earlier trial")
+            self._last = (wire.token, asked)
+        return self._named(wire, t, vector)
 
     def accept(self, reply: TrialReply, voltages: Mapping[str, float] | None = None) -> None:
         """Makes a trial's state the one that later trials start from, and its voltages, or those named here, what ports not named keep.
@@ -131,7 +143,9 @@ class Session:
 
     def _tell_accepted(self, reply: TrialReply) -> None:
         if self.kept:
-            self._ask(device_pb2.DeviceRequest(accept=device_pb2.Accept(token=reply.token, answer=True)))
+            accept = device_pb2.Accept(token=reply.token, answer=True)
+            accepted = self._checked.kind(self._ask(device_pb2.DeviceRequest(accept=accept)), "accepted")
+            self._checked.require(accepted.token == reply.token, "it accepts another state than that of the request")
             return
         self._own()
         self._line.tell(device_pb2.DeviceRequest(accept=device_pb2.Accept(token=reply.token)))
@@ -193,7 +207,10 @@ class Session:
         if state is None:
             raise ValueError("there is no accepted state; call operating_point first")
         request = device_pb2.SmallSignalRequest(token=state.token, omega=omega, noise=noise)
-        answer: device_pb2.SmallSignal = self._ask(device_pb2.DeviceRequest(linearize=request)).linearized
+        asked = self._ask(device_pb2.DeviceRequest(linearize=request))
+        answer: device_pb2.SmallSignal = self._checked.kind(asked, "linearized")
+        if not (noise and answer.admittance_re):
+            self._checked.small_signal(answer, len(self.ports), len(self.signals), noise=noise)
         return answer
 
     def read(self, signal: str) -> float:
@@ -270,7 +287,7 @@ class Session:
 
     def _named(self, wire: Any, t: float, vector: list[float]) -> TrialReply:
         if wire.status == device_pb2.TrialReply.STATUS_FAIL:
-            raise StepFailed(wire.reason)
+            raise StepFailed(shown(wire.reason))
         need = wire.need_dt if wire.status == device_pb2.TrialReply.STATUS_NEED_DT else None
         names = tuple(self.signals)
         return TrialReply(
@@ -301,7 +318,7 @@ class Session:
             kind = fault.WhichOneof("kind")
             if kind == "refused":
                 raise from_fault(fault.refused.code, fault.message, self._channel.address)
-            raise (NotFound if kind == "unknown_token" else InvalidRequest)(fault.message)
+            raise (NotFound if kind == "unknown_token" else InvalidRequest)(shown(fault.message))
         return reply
 
 
