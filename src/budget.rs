@@ -234,6 +234,7 @@ impl Held {
         }
         let now = Instant::now();
         if deadline.is_some_and(|deadline| now >= deadline) {
+            self.budget.late();
             return Some(Stopped::Late);
         }
         if self.cpu_at_start.is_none() || now < self.cpu_next.get() {

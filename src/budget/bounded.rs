@@ -1,14 +1,19 @@
 //! A part of a computation that is given up where it takes too much.
 
-use super::{Allowance, Budget, Shared, Stopped, current, unwind, within};
+use super::{Allowance, Budget, LATE, Shared, Stopped, current, unwind, within};
 use std::sync::Arc;
-use std::sync::atomic::AtomicUsize;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 impl Budget {
     /// The same allowance unused, for a part of the computation: stopped together with it.
     #[must_use]
     pub fn part(&self) -> Self {
         self.part_with(Allowance::clone)
+    }
+
+    /// Whether it was stopped for want of time.
+    pub fn is_late(&self) -> bool {
+        self.0.order.load(Ordering::Relaxed) == LATE
     }
 
     fn part_with(&self, of: impl FnOnce(&Allowance) -> Allowance) -> Self {

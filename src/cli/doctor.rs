@@ -12,7 +12,7 @@ use bimorph::service::address::Address;
 use bimorph::service::client::Client;
 use bimorph::service::server::{self, ServeOptions};
 use bimorph::service::settings::Settings;
-use bimorph::service::{guard, survey};
+use bimorph::service::{descriptors, guard, survey};
 use clap::Args;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -81,6 +81,9 @@ impl Doctor {
             good &= found.is_ok();
             line("states", &found, "name a folder of this server's own in state_dir, which its user can write")?;
         }
+        let found = descriptors::check(&options.limits);
+        good &= found.is_ok();
+        line("files", &found, "a server that starts so takes as many connections as fit, and warns")?;
         if good { Ok(()) } else { Err(Failure::Settings) }
     }
 }

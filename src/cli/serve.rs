@@ -3,8 +3,9 @@
 use super::failure::Failure;
 use bimorph::service::address::Address;
 use bimorph::service::log;
-use bimorph::service::server::{ServeOptions, run_until_signal};
+use bimorph::service::server::ServeOptions;
 use bimorph::service::settings::{ENVIRONMENT, SETTINGS, Setting, Settings, Source};
+use bimorph::service::until_signal::run_until_signal;
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, Error, FromArgMatches};
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;

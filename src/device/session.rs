@@ -61,6 +61,9 @@ pub(super) struct Session {
     pub(super) difference: Difference,
 }
 
+/// Doubles for each port and body: stages, displacements, velocities, and those of states that are kept.
+const DOUBLES: usize = 64;
+
 impl Session {
     pub(super) fn open(compiled: &Compiled, request: &OpenRequest) -> Result<(Self, Description), DeviceError> {
         let ports = Ports::find(compiled, &request.ports)?;
@@ -88,8 +91,8 @@ impl Session {
             unknowns: compiled.unknowns(),
         };
         let n = system.bodies();
-        // each port carries its sensitivity, and matrices of ports and signals go with every reply
-        budget::lay_out_matrix(ports.len(), 12 * n + 4 * ports.len() + 2 * signals.len());
+        // each port has its sensitivity in every stage of a step, and matrices of ports and signals go with every reply
+        budget::lay_out_matrix(ports.len(), DOUBLES * n + 4 * ports.len() + 2 * signals.len());
         let heaters = electrics.heating.heaters.len();
         let first_step = first_step(system, f64::INFINITY);
         let joints = match &compiled.joints {
@@ -143,14 +146,18 @@ impl Session {
         let poses = |poses: &[Pose]| poses.len() == n && poses.iter().all(|p| p.iter().all(|x| x.is_finite()));
         let numbers = |numbers: &[f64], count: usize| numbers.len() == count && numbers.iter().all(|x| x.is_finite());
         let carried = self.stepper.method.state();
-        let alike = |(a, b): (&Motion, &Motion)| a.q.len() == b.q.len() && a.v.len() == b.v.len();
+        let finite = |poses: &[Pose]| poses.iter().all(|p| p.iter().all(|x| x.is_finite()));
+        let alike = |(a, b): (&Motion, &Motion)| {
+            a.q.len() == b.q.len() && a.v.len() == b.v.len() && finite(&a.q) && finite(&a.v)
+        };
         let followed = state.shown.followed();
         poses(&state.q)
             && poses(&state.v)
             && numbers(&state.rise, self.rise.len())
             && numbers(&state.sources, self.sources.len())
             && state.next_step > 0.0
-            && state.elapsed >= 0.0
+            && (0.0..f64::INFINITY).contains(&state.elapsed)
+            && state.shown.numbers().into_iter().flatten().all(|x| x.is_finite())
             && (followed == 0 || followed == self.signals.len() + self.ports.len())
             && (state.carried.is_empty()
                 || state.carried.len() == carried.len() && state.carried.iter().zip(carried).all(alike))

@@ -28,6 +28,7 @@ pub(crate) fn kind(text: &str, file: u16) -> Kind {
     // statements that end with a semicolon, and the first of them; lines with a list of nodes
     let (mut ended, mut first, mut lists) = (0, None, 0);
     for line in text.split_inclusive('\n') {
+        crate::budget::check();
         let at = |offset: usize| u32::try_from(offset).unwrap_or(u32::MAX);
         let span = Span { file, start: at(start), end: at(start + line.trim_end().len()) };
         start += line.len();

@@ -141,6 +141,7 @@ impl<'a> Parser<'a> {
             std::mem::take(&mut self.blocks),
         );
         while self.peek().kind != Kind::End {
+            crate::budget::check();
             self.leaving = false;
             if let Some(close) = self.eat(Kind::CloseList) {
                 self.sink.error("E011", close.span, "this `]` closes nothing".into(), "");

@@ -25,7 +25,7 @@ impl Calls {
     async fn analyse<T: Send + 'static>(
         &self,
         id: &str,
-        job: impl FnOnce(&Model) -> Result<T, Status> + Send + 'static,
+        job: impl Fn(&Model) -> Result<T, Status> + Send + Sync + 'static,
     ) -> Reply<T> {
         let model = self.0.models.get(id)?;
         self.0.work.run(move || job(&model)).await.map(Response::new)

@@ -1,5 +1,6 @@
 //! The bodies of requests and answers, as they pass the gate: what comes in is counted, and how an answer ends is noted.
 
+use super::accounts::Account;
 use super::framing::Framing;
 use super::gate::Call;
 use http_body::{Frame, SizeHint};
@@ -13,10 +14,11 @@ use tonic::codegen::Bytes;
 use tonic::{Code, Status};
 use tracing::Span;
 
-/// The body of a request, counted.
+/// The body of a request: counted, and passed on by whole messages.
 pub(super) struct Received {
     body: Body,
     call: Arc<Call>,
+    account: Arc<Account>,
     framing: Framing,
     /// Silence between two messages is no pause.
     stream: bool,
@@ -24,8 +26,25 @@ pub(super) struct Received {
 }
 
 impl Received {
-    pub(super) fn new(body: Body, call: Arc<Call>, stream: bool) -> Self {
-        Self { body, call, framing: Framing::default(), stream, pause: None }
+    /// Of no body yet.
+    pub(super) fn new(call: Arc<Call>, account: Arc<Account>, stream: bool) -> Self {
+        Self { body: Body::empty(), call, account, framing: Framing::default(), stream, pause: None }
+    }
+
+    /// The same of a body.
+    pub(super) fn of(self, body: Body) -> Self {
+        Self { body, ..self }
+    }
+
+    /// Counts what has come.
+    fn take(&mut self, data: Bytes) -> Result<(), Status> {
+        self.call.hold(data.len())?;
+        let (call, account) = (&self.call, &self.account);
+        self.framing.take(data, |length| call.announce(length, account))?;
+        if self.stream && self.framing.is_between() {
+            self.call.release();
+        }
+        Ok(())
     }
 }
 
@@ -35,44 +54,43 @@ impl http_body::Body for Received {
 
     fn poll_frame(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<Option<Result<Frame<Bytes>, Status>>> {
         let this = &mut *self;
-        match Pin::new(&mut this.body).poll_frame(cx) {
-            Poll::Ready(Some(Ok(frame))) => {
-                // who asks for health has one pause for all of it
-                if !this.call.is_health() {
-                    this.pause = None;
-                }
-                if let Some(data) = frame.data_ref() {
-                    this.call.hold(data.len())?;
-                    this.framing.take(data);
-                    if this.stream && this.framing.whole() {
-                        this.call.release();
+        loop {
+            if let Some(part) = this.framing.next() {
+                return Poll::Ready(Some(Ok(Frame::data(part))));
+            }
+            match Pin::new(&mut this.body).poll_frame(cx) {
+                Poll::Ready(Some(Ok(frame))) => {
+                    // who asks for health has one pause for all of it
+                    if !this.call.is_health() {
+                        this.pause = None;
+                    }
+                    match frame.into_data() {
+                        Ok(data) => this.take(data)?,
+                        Err(trailers) => return Poll::Ready(Some(Ok(trailers))),
                     }
                 }
-                Poll::Ready(Some(Ok(frame)))
-            }
-            Poll::Ready(end) => Poll::Ready(end),
-            Poll::Pending => {
-                if this.stream && this.framing.whole() {
+                Poll::Ready(None) if !this.framing.is_between() => {
+                    let text = "expected messages of the protocol (proto/bimorph): the request ended within one";
+                    return Poll::Ready(Some(Err(Status::invalid_argument(text))));
+                }
+                Poll::Ready(end) => return Poll::Ready(end),
+                Poll::Pending if this.stream && this.framing.is_between() => return Poll::Pending,
+                Poll::Pending => {
+                    let longest = this.call.longest_pause();
+                    let pause =
+                        this.pause.get_or_insert_with(|| Box::pin(tokio::time::sleep_until(Instant::now() + longest)));
+                    if pause.as_mut().poll(cx).is_ready() {
+                        let text = format!("request_pause: a request was begun and did not go on for {longest:?}");
+                        return Poll::Ready(Some(Err(Status::new(Code::DeadlineExceeded, text))));
+                    }
                     return Poll::Pending;
                 }
-                let longest = this.call.longest_pause();
-                let pause =
-                    this.pause.get_or_insert_with(|| Box::pin(tokio::time::sleep_until(Instant::now() + longest)));
-                if pause.as_mut().poll(cx).is_ready() {
-                    let text = format!("request_pause: a request was begun and did not go on for {longest:?}");
-                    return Poll::Ready(Some(Err(Status::new(Code::DeadlineExceeded, text))));
-                }
-                Poll::Pending
             }
         }
     }
 
     fn is_end_stream(&self) -> bool {
-        self.body.is_end_stream()
-    }
-
-    fn size_hint(&self) -> SizeHint {
-        self.body.size_hint()
+        self.framing.is_empty() && self.framing.is_between() && self.body.is_end_stream()
     }
 }
 

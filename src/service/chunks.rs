@@ -53,7 +53,7 @@ impl<T> Outlet<T> {
                 return;
             }
         };
-        let client = self.place.take().map(|place| place.client());
+        let party = self.place.take().map(|place| place.party());
         self.open = self.open
             && self.runtime.block_on(async {
                 tokio::select! {
@@ -61,10 +61,10 @@ impl<T> Outlet<T> {
                     () = shared.shutdown.ending.cancelled() => false,
                 }
             });
-        if let Some(client) = client.filter(|_| self.open) {
+        if let Some(party) = party.filter(|_| self.open) {
             self.place = self.runtime.block_on(async {
                 tokio::select! {
-                    place = shared.work.again(client) => place,
+                    place = shared.work.again(party) => place,
                     () = sender.closed() => None,
                 }
             });

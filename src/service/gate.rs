@@ -1,14 +1,14 @@
 //! The gate through which calls come in: counts of them and of what their requests hold, and who may ask.
 
-use super::accounts::Accounts;
+use super::accounts::{Account, Accounts, Counted};
 use super::guard::Guard;
 use super::ids::Ids;
 use super::limits::Limits;
 use super::metrics::{self, Metrics};
 use super::presence::Presence;
 use super::status;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicI32, AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 use tonic::body::Body;
 use tonic::codegen::http;
@@ -22,6 +22,10 @@ pub(super) struct Gate {
     pub(super) held: AtomicUsize,
     pub(super) most_calls: usize,
     pub(super) most_held: usize,
+    /// Bytes of requests of one connection, by the lengths that they announce.
+    most_announced: usize,
+    /// Bytes of one message.
+    most_message: usize,
     pub(super) pause: Duration,
     pub(super) guard: Arc<Guard>,
     pub(super) accounts: Arc<Accounts>,
@@ -57,6 +61,8 @@ impl Gate {
             held: AtomicUsize::new(0),
             most_calls: limits.calls,
             most_held: limits.held_bytes,
+            most_announced: limits.connection_bytes.max(limits.message_bytes),
+            most_message: limits.message_bytes,
             pause: limits.request_pause,
             guard,
             accounts: Arc::clone(accounts),
@@ -95,6 +101,8 @@ impl Gate {
             presence: request.extensions().get().cloned(),
             health: is_health.then(|| usize::from(path.ends_with("/Watch"))),
             held: AtomicUsize::new(0),
+            announced: Mutex::default(),
+            counted: OnceLock::new(),
             place: metrics::place(path),
             started: Instant::now(),
             // of who goes away before the end
@@ -110,14 +118,21 @@ impl Gate {
     }
 
     /// Whether a call may go on, and whose it is.
-    pub(super) fn admit(&self, call: &Call, headers: &http::HeaderMap) -> Result<String, Status> {
+    pub(super) fn admit(&self, call: &Call, headers: &http::HeaderMap) -> Result<Arc<Account>, Status> {
         let presence = call.presence.as_ref().ok_or_else(|| Status::unauthenticated("nobody is known to ask"))?;
         let (most, name) = if call.is_health() { (HEALTH_CALLS, "health") } else { (self.most_calls, "calls") };
         if call.count().load(Ordering::Relaxed) > most {
             return Err(status::limit(name, most, "one more; end some"));
         }
         let known = if call.is_health() { self.guard.hear(presence) } else { self.guard.admit(presence, headers) };
-        known.map(|who| who.to_string())
+        let account = self.accounts.of(&known?.to_string());
+        if !call.is_health() {
+            if presence.counted.get().is_none() {
+                let _ = presence.counted.set(account.connection()?);
+            }
+            let _ = call.counted.set(account.call()?);
+        }
+        Ok(account)
     }
 }
 
@@ -128,6 +143,10 @@ pub(super) struct Call {
     /// Its kind among those of health; none: any other.
     pub(super) health: Option<usize>,
     pub(super) held: AtomicUsize,
+    /// Bytes that its request announces, and whose account has them.
+    announced: Mutex<(usize, Option<Arc<Account>>)>,
+    /// Its place in the account of its client.
+    counted: OnceLock<Counted>,
     /// Its place among the calls that are counted.
     pub(super) place: usize,
     pub(super) started: Instant,
@@ -173,9 +192,7 @@ impl Call {
     pub(super) fn hold(&self, bytes: usize) -> Result<(), Status> {
         let own = self.held.fetch_add(bytes, Ordering::Relaxed) + bytes;
         if self.is_health() {
-            let refused =
-                || Status::resource_exhausted(format!("a request of health has at most {HEALTH_BYTES} bytes"));
-            return if own > HEALTH_BYTES { Err(refused()) } else { Ok(()) };
+            return if own > HEALTH_BYTES { Err(long_health()) } else { Ok(()) };
         }
         let held = self.gate.held.fetch_add(bytes, Ordering::Relaxed) + bytes;
         if held > self.gate.most_held {
@@ -184,13 +201,47 @@ impl Call {
         Ok(())
     }
 
-    /// What has come is not held any more.
+    /// A message of its request announces its length, which counts before any of it has come.
+    pub(super) fn announce(&self, bytes: usize, account: &Arc<Account>) -> Result<(), Status> {
+        if self.is_health() {
+            return if bytes > HEALTH_BYTES { Err(long_health()) } else { Ok(()) };
+        }
+        if bytes > self.gate.most_message {
+            return Err(status::limit("message_bytes", self.gate.most_message, bytes));
+        }
+        let mut announced = self.announced.lock().unwrap_or_else(PoisonError::into_inner);
+        account.announce(bytes)?;
+        if let Some(presence) = &self.presence {
+            let all = presence.requests.fetch_add(bytes, Ordering::Relaxed).saturating_add(bytes);
+            if all > self.gate.most_announced {
+                presence.requests.fetch_sub(bytes, Ordering::Relaxed);
+                account.release(bytes);
+                return Err(status::limit("connection_bytes", self.gate.most_announced, all));
+            }
+        }
+        announced.0 += bytes;
+        announced.1 = Some(Arc::clone(account));
+        Ok(())
+    }
+
+    /// What has come, and what was announced, is not held any more.
     pub(super) fn release(&self) {
+        let announced = std::mem::take(&mut *self.announced.lock().unwrap_or_else(PoisonError::into_inner));
+        if let (bytes, Some(account)) = announced {
+            account.release(bytes);
+            self.presence.iter().for_each(|presence| {
+                presence.requests.fetch_sub(bytes, Ordering::Relaxed);
+            });
+        }
         let bytes = self.held.swap(0, Ordering::Relaxed);
         if !self.is_health() {
             self.gate.held.fetch_sub(bytes, Ordering::Relaxed);
         }
     }
+}
+
+fn long_health() -> Status {
+    Status::resource_exhausted(format!("a request of health has at most {HEALTH_BYTES} bytes"))
 }
 
 impl Drop for Call {

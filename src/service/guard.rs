@@ -7,7 +7,7 @@ use super::tls::{ALPN, Pair, PemError, authorities, certificates, provider, vali
 use super::tokens::{TokenError, Tokens, is_open, sha256};
 use std::io;
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::{Arc, PoisonError, RwLock};
 use std::time::{SystemTime, UNIX_EPOCH};
 use thiserror::Error;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
@@ -63,7 +63,7 @@ pub enum GuardError {
 /// # Errors
 /// [`GuardError`].
 pub fn look_at(files: &GuardFiles) -> Result<Vec<String>, GuardError> {
-    let guard = Guard::read(files)?;
+    let guard = Read::of(files)?;
     let mut found = Vec::new();
     if let Some(path) = &files.certificate {
         let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs();
@@ -96,17 +96,20 @@ pub fn look_at(files: &GuardFiles) -> Result<Vec<String>, GuardError> {
 /// What is asked of clients.
 #[derive(Default)]
 pub(super) struct Guard {
+    files: GuardFiles,
+    read: RwLock<Arc<Read>>,
+}
+
+/// What the files held when they were read last.
+#[derive(Default)]
+struct Read {
     tls: Option<Arc<ServerConfig>>,
     certified: bool,
     tokens: Option<Tokens>,
 }
 
-impl Guard {
-    /// Reads the files.
-    ///
-    /// # Errors
-    /// [`GuardError`].
-    pub(super) fn read(files: &GuardFiles) -> Result<Self, GuardError> {
+impl Read {
+    fn of(files: &GuardFiles) -> Result<Self, GuardError> {
         let tls = match (&files.certificate, &files.key) {
             (Some(certificate), Some(key)) => {
                 let pair = Pair::read(certificate, key)?;
@@ -128,15 +131,41 @@ impl Guard {
         }
         Ok(Self { tls, certified: files.client_authority.is_some(), tokens })
     }
+}
+
+impl Guard {
+    /// Reads the files.
+    ///
+    /// # Errors
+    /// [`GuardError`].
+    pub(super) fn read(files: &GuardFiles) -> Result<Self, GuardError> {
+        Ok(Self { files: files.clone(), read: RwLock::new(Arc::new(Read::of(files)?)) })
+    }
+
+    /// Reads the files again: calls show the new tokens from here on, and new connections have the new certificates. Where a file is wrong,
+    /// all stays as it is.
+    ///
+    /// # Errors
+    /// [`GuardError`].
+    pub(super) fn reload(&self) -> Result<(), GuardError> {
+        let read = Arc::new(Read::of(&self.files)?);
+        *self.read.write().unwrap_or_else(PoisonError::into_inner) = read;
+        Ok(())
+    }
+
+    fn now(&self) -> Arc<Read> {
+        Arc::clone(&self.read.read().unwrap_or_else(PoisonError::into_inner))
+    }
 
     /// Whether TCP addresses speak TLS.
     pub(super) fn speaks_tls(&self) -> bool {
-        self.tls.is_some()
+        self.now().tls.is_some()
     }
 
     /// Whether other machines may be let in: nothing travels in the clear, and not everybody may ask.
     pub(super) fn is_enough(&self) -> bool {
-        self.tls.is_some() && (self.certified || self.tokens.is_some())
+        let now = self.now();
+        now.tls.is_some() && (now.certified || now.tokens.is_some())
     }
 
     /// Who is there, if it speaks as this address does.
@@ -151,7 +180,7 @@ impl Guard {
     pub(super) fn admit(&self, presence: &Presence, headers: &HeaderMap) -> Result<Who, Status> {
         match self.hear(presence)? {
             Who::Local => Ok(Who::Local),
-            known => match &self.tokens {
+            known => match &self.now().tokens {
                 Some(tokens) => tokens.who(headers).map(Who::Named),
                 None => Ok(known),
             },
@@ -162,7 +191,7 @@ impl Guard {
     ///
     /// A client that speaks plain HTTP/2 to TLS is let in, to be told so by every call.
     pub(super) async fn greet(&self, socket: TcpStream) -> io::Result<(Voice, Who)> {
-        let Some(tls) = &self.tls else { return Ok((Voice::Plain(socket), Who::Unknown)) };
+        let Some(tls) = self.now().tls.clone() else { return Ok((Voice::Plain(socket), Who::Unknown)) };
         let mut first = [0];
         if socket.peek(&mut first).await? == 0 {
             return Err(io::ErrorKind::UnexpectedEof.into());
@@ -170,7 +199,7 @@ impl Guard {
         if first == *b"P" {
             return Ok((Voice::Plain(socket), Who::Plain));
         }
-        match TlsAcceptor::from(Arc::clone(tls)).accept(socket).into_fallible().await {
+        match TlsAcceptor::from(tls).accept(socket).into_fallible().await {
             Ok(stream) => {
                 let shown = stream.get_ref().1.peer_certificates().and_then(<[_]>::first);
                 let who = shown.map_or(Who::Unknown, |certificate| Who::Certified(sha256(certificate)));

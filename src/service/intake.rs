@@ -42,6 +42,24 @@ impl<S: NamedService> NamedService for Intake<S> {
     const NAME: &'static str = S::NAME;
 }
 
+/// Whether a request says that it is gRPC with messages of Protocol Buffers.
+fn is_grpc(headers: &http::HeaderMap) -> bool {
+    let kind = headers.get(http::header::CONTENT_TYPE).and_then(|value| value.to_str().ok());
+    let rest = kind.and_then(|kind| kind.strip_prefix("application/grpc"));
+    rest.is_some_and(|rest| {
+        let rest = rest.strip_prefix("+proto").unwrap_or(rest);
+        rest.is_empty() || rest.starts_with(';')
+    })
+}
+
+/// 415 for any other request, as the gRPC protocol over HTTP/2 says.
+fn not_grpc() -> http::Response<Body> {
+    let mut response = http::Response::new(Body::empty());
+    *response.status_mut() = http::StatusCode::UNSUPPORTED_MEDIA_TYPE;
+    response.headers_mut().insert("accept", http::HeaderValue::from_static("application/grpc"));
+    response
+}
+
 type Answer = Pin<Box<dyn Future<Output = Result<http::Response<Body>, Infallible>> + Send>>;
 
 impl<S> Service<http::Request<Body>> for Intake<S>
@@ -58,6 +76,9 @@ where
     }
 
     fn call(&mut self, request: http::Request<Body>) -> Answer {
+        if !is_grpc(request.headers()) {
+            return Box::pin(std::future::ready(Ok(not_grpc())));
+        }
         let call = Arc::new(self.gate.enter(&request, S::NAME == OPEN));
         let id = self.gate.request_id(request.headers());
         let admitted = self.gate.admit(&call, request.headers());
@@ -66,21 +87,24 @@ where
             "request",
             id = id.to_str().unwrap_or_default(),
             call = name,
-            client = admitted.as_deref().unwrap_or("refused"),
+            client = admitted.as_ref().map_or("refused", |account| account.name()),
         );
-        if let Err(status) = &admitted {
-            span.in_scope(|| tracing::warn!(reason = status.message(), "refused"));
-            call.code.store(status.code() as i32, Ordering::Relaxed);
-            let mut response = status.clone().into_http();
-            response.headers_mut().insert(REQUEST_ID, id);
-            return Box::pin(std::future::ready(Ok(response)));
-        }
+        let account = match admitted {
+            Ok(account) => account,
+            Err(status) => {
+                span.in_scope(|| tracing::warn!(reason = status.message(), "refused"));
+                call.code.store(status.code() as i32, Ordering::Relaxed);
+                let mut response = status.into_http();
+                response.headers_mut().insert(REQUEST_ID, id);
+                return Box::pin(std::future::ready(Ok(response)));
+            }
+        };
         let stream = STREAMS.iter().any(|name| request.uri().path().ends_with(name));
         let number = call.presence.as_ref().map_or(0, |presence| presence.number());
-        let account = admitted.as_ref().ok().and_then(|name| self.gate.accounts.of(name));
-        let client = Client { number, account, name: admitted.unwrap_or_default().into() };
-        let received = Arc::clone(&call);
-        let request = request.map(|body| Body::new(Received::new(body, received, stream)));
+        let name = account.name().into();
+        let received = Received::new(Arc::clone(&call), Arc::clone(&account), stream);
+        let client = Client { number, account: Some(account), name };
+        let request = request.map(|body| Body::new(received.of(body)));
         let answer = CLIENT.scope(client, self.service.call(request)).instrument(span.clone());
         Box::pin(async move {
             let mut response = answer.await?;

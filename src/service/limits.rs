@@ -63,14 +63,27 @@ limits! {
     /// own for each trial, which costs some ten microseconds but lets other streams run meanwhile.
     inline_unknowns: Count = 2_000;
 
-    /// Most compiled models kept; the one unused for longest is forgotten first.
+    /// Most compiled models kept; the one unused for longest is forgotten first, and none that an open session or a computation
+    /// of another client has.
     models: Count = 64;
+
+    /// Most models of one client kept, whose own are forgotten first; 0: any.
+    client_models: CountOrNone = 0;
 
     /// Most bytes of all models kept, counted by what their compilation laid out.
     model_memory: Bytes = 512 << 20;
 
+    /// The same of the models of one client; 0: any. A single model may be larger.
+    client_model_memory: BytesOrNone = 0;
+
     /// Most sessions open at once. Each holds a bounded number of states.
     sessions: Count = 256;
+
+    /// Most bytes of all open sessions, counted as 4 kB for each unknown of their models and 176 bytes more for each of their ports.
+    session_memory: Bytes = 2 << 30;
+
+    /// The same of all sessions of one client; 0: any.
+    client_session_memory: BytesOrNone = 0;
 
     /// Most sessions of one client open at once; 0: any. A client is the owner of a token, or of a certificate; all who come by a Unix
     /// socket are one, and all who show nothing.
@@ -96,7 +109,7 @@ limits! {
     /// share the processors, in turns of their clients.
     sweeps: Count = 16;
 
-    /// Most jobs of one client kept, running or finished; 0: any.
+    /// Most jobs of one client kept, running or finished; with a folder `state_dir` most that run or wait, and 64 times as many in all. 0: any.
     client_sweeps: CountOrNone = 0;
 
     /// A finished job in the folder `state_dir` that nobody asks for is forgotten after so long; without such a folder, after `idle`.
@@ -132,8 +145,24 @@ limits! {
     /// Most calls at once of all connections, streams among them.
     calls: Count = 4096;
 
+    /// Most calls of one client at once, of all its connections; 0: any.
+    client_calls: CountOrNone = 0;
+
+    /// Most transients and tables of one client being sent at once; 0: any.
+    client_result_streams: CountOrNone = 0;
+
+    /// Most connections of one client with calls; 0: any.
+    client_connections: CountOrNone = 0;
+
     /// Most bytes of requests held at once: those being received, and those of unary calls until they are answered.
     held_bytes: Bytes = 256 << 20;
+
+    /// Most bytes of requests of one connection held at once, by the lengths that they announce: from the head of a message until it is
+    /// answered. At least `message_bytes`.
+    connection_bytes: Bytes = 128 << 20;
+
+    /// The same of all connections of one client; 0: any.
+    client_held_bytes: BytesOrNone = 0;
 
     /// Longest pause inside a request: a message that was begun must go on, or the call ends with `DEADLINE_EXCEEDED`.
     request_pause: Time = Duration::from_secs(20);

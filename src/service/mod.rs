@@ -3,6 +3,7 @@
 //! # Layout
 //! [`proto`] is what travels and [`convert`] the only place that knows both it and the library's own types. [`client`]
 //! is built with the feature `remote` alone, and shows what [`access`] says; `tls` is for both ends. The rest is the feature `server`: [`server`] listens and stops
+//! ([`until_signal`] by signals), [`descriptors`] compares what it may open, `shares` is what one client has of it where nobody says,
 //! (`sockets`, `connection`, `shutdown`), [`guard`] and `tokens` ask who comes, `accounts` what each has, `intake` counts what comes in as `bodies`, `rpc` answers calls (`analyses` those that compute), `stream` is the Newton loop, about
 //! a session that it has `joined`, [`inside`] is all of it without a network,
 //! `models`, `sessions` and `jobs` keep what clients can name, under `ids` that nobody guesses; a `session` answers each `question`, has its `usage` and its
@@ -30,6 +31,8 @@ mod bodies;
 mod chunks;
 #[cfg(feature = "server")]
 mod connection;
+#[cfg(feature = "server")]
+pub mod descriptors;
 #[cfg(feature = "server")]
 mod disk;
 #[cfg(feature = "server")]
@@ -71,6 +74,8 @@ mod presence;
 #[cfg(feature = "server")]
 mod question;
 #[cfg(feature = "server")]
+mod restored;
+#[cfg(feature = "server")]
 mod room;
 #[cfg(feature = "server")]
 mod rpc;
@@ -86,6 +91,8 @@ mod sessions;
 pub mod settings;
 #[cfg(feature = "server")]
 mod shared;
+#[cfg(feature = "server")]
+mod shares;
 #[cfg(feature = "server")]
 mod shutdown;
 #[cfg(feature = "server")]
@@ -110,6 +117,8 @@ pub mod tls;
 pub mod tokens;
 #[cfg(feature = "server")]
 mod turns;
+#[cfg(feature = "server")]
+pub mod until_signal;
 #[cfg(feature = "server")]
 mod usage;
 #[cfg(feature = "server")]

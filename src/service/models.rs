@@ -4,6 +4,7 @@ use super::convert::model::{bundle_bytes, bundle_to_wire, diagnostics_to_wire, s
 use super::convert::options::options_to_wire;
 use super::limits::Limits;
 use super::server::MakeDevice;
+use super::turns::client;
 use super::{proto, status};
 use crate::analysis::mesh;
 use crate::budget;
@@ -11,7 +12,7 @@ use crate::compile::{CompileOptions, Compiled, compile};
 use crate::content::Fnv;
 use crate::device::OpenRequest;
 use crate::netlist::Bundle;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, PoisonError};
 use tonic::Status;
 
@@ -53,9 +54,78 @@ pub(super) struct Models {
 
 #[derive(Default)]
 struct Kept {
-    /// By id: the model, and when it was last asked for (a count of requests).
-    models: BTreeMap<String, (Arc<Model>, u64)>,
+    models: BTreeMap<String, Entry>,
     requests: u64,
+}
+
+/// A model that is kept.
+struct Entry {
+    model: Arc<Model>,
+    /// When it was last asked for, as a count of requests.
+    used: u64,
+    /// Clients that asked for it.
+    clients: BTreeSet<Arc<str>>,
+}
+
+impl Entry {
+    /// Whether an open session or a computation has it.
+    fn is_in_use(&self) -> bool {
+        Arc::strong_count(&self.model) > 1
+    }
+}
+
+impl Kept {
+    fn bytes(&self) -> usize {
+        self.models.values().map(|entry| entry.model.bytes).sum()
+    }
+
+    /// The model unused for longest of those that may be forgotten.
+    fn oldest(&self, may: impl Fn(&Entry) -> bool) -> Option<String> {
+        let found = self.models.iter().filter(|(_, entry)| may(entry));
+        found.min_by_key(|(_, entry)| entry.used).map(|(id, _)| id.clone())
+    }
+
+    /// Makes room for one more model of a client: first of its own, where it has as many as one may have; then of the one unused for longest.
+    fn make_room(&mut self, client: &str, bytes: usize, limits: &Limits) -> Result<(), Status> {
+        let own = |kept: &Self| {
+            let own = kept.models.values().filter(|entry| entry.clients.contains(client));
+            own.fold((0, 0_usize), |(count, bytes), entry| (count + 1, bytes.saturating_add(entry.model.bytes)))
+        };
+        loop {
+            let (count, used) = own(self);
+            let many = limits.client_models > 0 && count >= limits.client_models;
+            let large = limits.client_model_memory > 0 && used.saturating_add(bytes) > limits.client_model_memory;
+            if count == 0 || !(many || large) {
+                break;
+            }
+            let own = |entry: &Entry| entry.clients.contains(client);
+            let free = self.oldest(|entry| own(entry) && !entry.is_in_use());
+            let Some(id) = free.or_else(|| self.oldest(own)) else { break };
+            // it stays for others that asked for it
+            let left = self.models.get_mut(&id).is_none_or(|entry| {
+                entry.clients.remove(client);
+                entry.clients.is_empty()
+            });
+            if left {
+                self.models.remove(&id);
+            }
+        }
+        while !self.models.is_empty()
+            && (self.models.len() >= limits.models || self.bytes().saturating_add(bytes) > limits.model_memory)
+        {
+            // a session goes on without the name of its model, but only its own client may take that away
+            let own = |entry: &Entry| entry.clients.iter().all(|other| **other == *client);
+            let free = self.oldest(|entry| !entry.is_in_use());
+            let Some(id) = free.or_else(|| self.oldest(own)) else {
+                let many = self.models.len() >= limits.models;
+                let (name, most) = if many { ("models", limits.models) } else { ("model_memory", limits.model_memory) };
+                let got = "one more, and sessions or computations of other clients have all that are kept";
+                return Err(status::limit(name, most, got));
+            };
+            self.models.remove(&id);
+        }
+        Ok(())
+    }
 }
 
 impl Models {
@@ -73,9 +143,13 @@ impl Models {
         let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         kept.requests += 1;
         let now = kept.requests;
-        let (model, used) = kept.models.get_mut(id)?;
-        *used = now;
-        Some(Arc::clone(model))
+        let entry = kept.models.get_mut(id)?;
+        entry.used = now;
+        let client = client().name;
+        if !entry.clients.contains(&client) {
+            entry.clients.insert(client);
+        }
+        Some(Arc::clone(&entry.model))
     }
 
     /// The model of a bundle: the one kept, or a new one. Takes as long as a compilation.
@@ -110,22 +184,19 @@ impl Models {
         let larger = in_circuit.unknowns().div_ceil(compiled.unknowns().max(1));
         let bytes = bytes.saturating_mul(1 + larger);
         let model = Arc::new(Model { compiled, in_circuit, description, bundle, options, bytes });
-        self.keep(Arc::clone(&model), limits);
+        self.keep(Arc::clone(&model), limits)?;
         Ok(model)
     }
 
-    fn keep(&self, model: Arc<Model>, limits: &Limits) {
+    fn keep(&self, model: Arc<Model>, limits: &Limits) -> Result<(), Status> {
         let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         kept.requests += 1;
-        let now = kept.requests;
-        kept.models.insert(model.id().to_owned(), (model, now));
-        let bytes = |kept: &Kept| kept.models.values().map(|(model, _)| model.bytes).sum::<usize>();
-        while kept.models.len() > 1 && (kept.models.len() > limits.models || bytes(&kept) > limits.model_memory) {
-            let oldest = kept.models.iter().min_by_key(|(_, (_, used))| *used).map(|(id, _)| id.clone());
-            if let Some(id) = oldest {
-                kept.models.remove(&id);
-            }
-        }
+        let (used, client) = (kept.requests, client().name);
+        kept.models.remove(model.id());
+        kept.make_room(&client, model.bytes, limits)?;
+        let id = model.id().to_owned();
+        kept.models.insert(id, Entry { model, used, clients: BTreeSet::from([client]) });
+        Ok(())
     }
 }
 

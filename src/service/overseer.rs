@@ -1,19 +1,19 @@
 //! What those ask who watch over a server, by plain HTTP/1.1 at an address of its own: `/metrics`, `/ready`, `/live`.
 //!
-//! Nothing secret is told, so nobody is asked for a token. A connection answers once and closes; few are served at once.
+//! Nothing secret is told, so nobody is asked for a token. A connection answers once and closes; few are open at once.
 
 use super::address::Address;
 use super::overseen::{Overseen, busy, text};
 use super::server::ServeError;
 use hyper_util::rt::{TokioIo, TokioTimer};
+use std::collections::VecDeque;
 use std::convert::Infallible;
-use std::sync::Arc;
 use std::time::Duration;
 use tokio::net::TcpListener;
-use tokio::sync::Semaphore;
+use tokio::task::{AbortHandle, JoinSet};
 use tonic::codegen::http::{Method, Request, Response, StatusCode};
 
-/// Connections served at once.
+/// Connections open at once.
 const MOST: usize = 16;
 /// Longest time for one.
 const PATIENCE: Duration = Duration::from_secs(5);
@@ -27,18 +27,26 @@ pub(super) async fn bind(address: &Address) -> Result<(TcpListener, Address), Se
     Ok((listener, bound))
 }
 
-/// Answers until it is dropped.
+/// Answers until it is dropped. A request is answered as it comes, so those that are open have not asked, or do not read: where all
+/// places are taken, the oldest one makes room.
 pub(super) async fn answer(listener: TcpListener, overseen: Overseen) {
-    let places = Arc::new(Semaphore::new(MOST));
+    // ends all that are open when this is dropped
+    let mut tasks = JoinSet::new();
+    let mut open: VecDeque<AbortHandle> = VecDeque::new();
     loop {
-        let Ok(place) = Arc::clone(&places).acquire_owned().await else { return };
         let Ok((socket, _)) = listener.accept().await else {
             tokio::time::sleep(Duration::from_millis(50)).await;
             continue;
         };
+        while tasks.try_join_next().is_some() {}
+        open.retain(|task| !task.is_finished());
+        if open.len() >= MOST
+            && let Some(oldest) = open.pop_front()
+        {
+            oldest.abort();
+        }
         let overseen = overseen.clone();
-        tokio::spawn(async move {
-            let _place = place;
+        open.push_back(tasks.spawn(async move {
             let service = hyper::service::service_fn(move |request| {
                 let reply = reply(&request, &overseen);
                 async { Ok::<_, Infallible>(reply) }
@@ -46,7 +54,7 @@ pub(super) async fn answer(listener: TcpListener, overseen: Overseen) {
             let mut builder = hyper::server::conn::http1::Builder::new();
             builder.timer(TokioTimer::new()).header_read_timeout(PATIENCE).keep_alive(false).max_buf_size(8192);
             let _ = tokio::time::timeout(PATIENCE, builder.serve_connection(TokioIo::new(socket), service)).await;
-        });
+        }));
     }
 }
 

@@ -1,5 +1,6 @@
 //! What is known of a connection from outside, and who is there.
 
+use super::accounts::Counted;
 use std::fmt;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, OnceLock};
@@ -15,11 +16,15 @@ pub(super) struct Presence {
     pub(super) opened: Instant,
     /// Calls under way.
     pub(super) calls: AtomicUsize,
+    /// Bytes of requests, by the lengths that they announce.
+    pub(super) requests: AtomicUsize,
     /// When the last call ended, after `opened` [ms].
     pub(super) used_ms: AtomicU64,
     pub(super) greeted: AtomicBool,
     /// Once its client has been understood.
     pub(super) who: OnceLock<Who>,
+    /// Its place in the account of its client, once it had a call.
+    pub(super) counted: OnceLock<Counted>,
     pub(super) cut: CancellationToken,
 }
 
@@ -29,9 +34,11 @@ impl Presence {
             number: NUMBERS.fetch_add(1, Ordering::Relaxed),
             opened: Instant::now(),
             calls: AtomicUsize::new(0),
+            requests: AtomicUsize::new(0),
             used_ms: AtomicU64::new(0),
             greeted: AtomicBool::new(false),
             who: OnceLock::new(),
+            counted: OnceLock::new(),
             cut: cut.child_token(),
         })
     }

@@ -65,7 +65,7 @@ impl proto::bimorph_server::Bimorph for Calls {
         let request = request.into_inner();
         let (bundle, options) = self.netlist(request.bundle, request.options)?;
         let shared = Arc::clone(&self.0);
-        let job = move || shared.models.compile(bundle, options, &shared.limits, shared.make);
+        let job = move || shared.models.compile(bundle.clone(), options.clone(), &shared.limits, shared.make);
         let model = self.0.desk.run(job).await?;
         Ok(Response::new(proto::CompileResponse { model: Some(model.description.clone()) }))
     }
@@ -79,8 +79,9 @@ impl proto::bimorph_server::Bimorph for Calls {
         let (shared, request) = (Arc::clone(&self.0), request.into_inner());
         let model = shared.models.get(&request.model)?;
         answerable(&request, model.compiled.parts.system.electrics.ports, &shared.limits)?;
+        let question = Question::Open(request);
         let job = move |budget: &Budget| {
-            shared.created(&model, |session| match session.answer(&Question::Open(request), budget) {
+            shared.created(&model, |session| match session.answer(&question, budget) {
                 Some(ReplyKind::Opened(opened)) => Ok(opened),
                 Some(ReplyKind::Fault(fault)) => Err(refusal(fault)),
                 _ => Err(status::fault()),
@@ -101,7 +102,7 @@ impl proto::bimorph_server::Bimorph for Calls {
         session.bound_small_signals(request.omega.len(), request.noise, &self.0.limits)?;
         let turn = session.turn().await?;
         let job = move || {
-            let _turn = turn;
+            let _turn = &turn;
             session.linearize(Token(request.token), &request.omega, request.noise)
         };
         let points = self.0.desk.run(job).await?;
@@ -114,7 +115,7 @@ impl proto::bimorph_server::Bimorph for Calls {
         let turn = session.turn().await?;
         let only = (request.token != 0).then_some(Token(request.token));
         let job = move || {
-            let _turn = turn;
+            let _turn = &turn;
             session.snapshot(only)
         };
         let snapshot = self.0.desk.run(job).await?;
@@ -133,7 +134,7 @@ impl proto::bimorph_server::Bimorph for Calls {
         let session = shared.session(&request.get_ref().session).await?;
         let turn = session.turn().await?;
         let job = move || {
-            let _turn = turn;
+            let _turn = &turn;
             shared.restored(session.model(), &session.snapshot(None)?)
         };
         self.0.desk.run(job).await.map(Response::new)

@@ -3,12 +3,12 @@
 use super::accounts::Accounts;
 use super::address::Address;
 use super::connection::Connections;
+use super::descriptors;
 use super::gate::Gate;
 use super::guard::Guard;
 use super::intake::Intake;
 use super::jobs::registry::Jobs;
 use super::limits::Limits;
-use super::log::{self, Lines};
 use super::models::Models;
 use super::overseen::{Overseen, busy};
 use super::overseer;
@@ -23,19 +23,15 @@ use super::survey::StoreError;
 use super::work::Work;
 use crate::device::local::LocalDevice;
 use std::future::Future;
-use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::net::TcpListener;
-use tokio::sync::{Semaphore, mpsc};
+use tokio::sync::{Notify, Semaphore, mpsc};
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::transport::Server;
 use tonic_health::ServingStatus;
 use tonic_health::server::HealthReporter;
-use tracing_subscriber::filter::{LevelFilter, Targets};
-use tracing_subscriber::layer::SubscriberExt;
-use tracing_subscriber::util::SubscriberInitExt;
 
 /// Bytes that a client may send ahead of what was read, over all streams of its connection.
 const CONNECTION_WINDOW: u32 = 256 << 10;
@@ -43,8 +39,6 @@ const CONNECTION_WINDOW: u32 = 256 << 10;
 const READY: &str = "ready";
 /// Time between two looks whether it is.
 const LOOK: Duration = Duration::from_millis(250);
-/// How long the last log lines may take to be written.
-const LAST_WORDS: Duration = Duration::from_millis(200);
 
 /// Serves until `shutdown` resolves, then drains for [`Limits::drain`] and cuts what is left.
 ///
@@ -84,7 +78,9 @@ async fn serve_until(options: ServeOptions, make: MakeDevice, shutdown: Waiting<
         settings,
         ready,
         while_stdin: _,
+        reload,
     } = options;
+    let limits = descriptors::within(limits);
     if listen.is_empty() {
         return Err(ServeError::NoAddress);
     }
@@ -100,6 +96,7 @@ async fn serve_until(options: ServeOptions, make: MakeDevice, shutdown: Waiting<
         accepting.spawn(listener.accept(Arc::clone(&connections), Arc::clone(&guard), signals.clone(), sender.clone()));
     }
     drop(sender);
+    let rereading = tokio::spawn(reread(Arc::clone(&guard), reload));
 
     let told = settings.map(|settings| settings.told()).unwrap_or_default();
     let shared = share(limits, told, (make, store, connections), &signals);
@@ -164,8 +161,22 @@ async fn serve_until(options: ServeOptions, make: MakeDevice, shutdown: Waiting<
     }
     shared.jobs.let_go(GRACE).await;
     housekeeping.abort();
+    rereading.abort();
     overseer.iter().for_each(tokio::task::JoinHandle::abort);
     ended.unwrap_or(Ok(())).map_err(|error| transport(&error))
+}
+
+/// Reads tokens and certificates again, whenever that is asked for.
+async fn reread(guard: Arc<Guard>, reload: Arc<Notify>) {
+    loop {
+        reload.notified().await;
+        let guard = Arc::clone(&guard);
+        match tokio::task::spawn_blocking(move || guard.reload()).await {
+            Ok(Ok(())) => tracing::info!("tokens and certificates were read again"),
+            Ok(Err(error)) => tracing::error!(%error, "tokens and certificates stay as they were"),
+            Err(_) => tracing::error!("tokens and certificates stay as they were: an internal fault"),
+        }
+    }
 }
 
 /// Goes on with the jobs in the folder, where there is one.
@@ -199,11 +210,10 @@ pub(super) fn share(
     (make, store, connections): (MakeDevice, Option<Arc<Store>>, Arc<Connections>),
     signals: &Shutdown,
 ) -> Arc<Shared> {
-    let places = |count| Work::new(count, &limits, signals.clone());
     Arc::new(Shared {
-        work: places(limits.analyses),
-        desk: places(limits.analyses),
-        trials: places(limits.analyses.saturating_mul(2)),
+        work: Work::sliced(limits.analyses, &limits, signals.clone()),
+        desk: Work::sliced(limits.analyses, &limits, signals.clone()),
+        trials: Work::new(limits.analyses.saturating_mul(2), &limits, signals.clone()),
         results: Arc::new(Semaphore::new(limits.result_streams.min(Semaphore::MAX_PERMITS))),
         told,
         make,
@@ -217,71 +227,6 @@ pub(super) fn share(
         shutdown: signals.clone(),
         limits,
     })
-}
-
-/// SIGXFSZ, on Linux and on BSDs.
-const FILE_TOO_LARGE: i32 = 25;
-
-/// [`run`] on threads of its own, until SIGINT or SIGTERM, or the end of standard input where
-/// [`ServeOptions::while_stdin`] says so: what `bimorph serve` calls. A second signal stops at once.
-/// What happens is logged on standard error: warnings and faults, or what the environment variable `BIMORPH_LOG` says
-/// (`info`, `debug`, …).
-///
-/// # Errors
-/// [`ServeError`].
-pub fn run_until_signal(options: ServeOptions) -> Result<(), ServeError> {
-    let wanted = std::env::var("BIMORPH_LOG").ok().and_then(|text| text.parse::<Targets>().ok());
-    let filter = wanted.unwrap_or_else(|| Targets::new().with_default(LevelFilter::WARN));
-    // A host program that logs already goes on as it does.
-    let ansi = std::io::stderr().is_terminal();
-    let log = tracing_subscriber::fmt().with_max_level(LevelFilter::TRACE).with_writer(|| Lines);
-    let _ = match options.log_json {
-        true => log.json().flatten_event(true).with_span_list(false).finish().with(filter).try_init(),
-        false => log.with_ansi(ansi).finish().with(filter).try_init(),
-    };
-    let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build().map_err(ServeError::Runtime)?;
-    let outcome = runtime.block_on(async {
-        use tokio::signal::unix::{SignalKind, signal};
-        let mut interrupt = signal(SignalKind::interrupt()).map_err(ServeError::Runtime)?;
-        let mut terminate = signal(SignalKind::terminate()).map_err(ServeError::Runtime)?;
-        // a file that may not grow is an error of who writes it, as a full disk is, and not the end of the server
-        let _too_large = signal(SignalKind::from_raw(FILE_TOO_LARGE));
-        let input = input_ends(options.while_stdin);
-        let (first, told) = tokio::sync::oneshot::channel();
-        let mut serving = std::pin::pin!(run(options, async {
-            let _ = told.await;
-        }));
-        tokio::select! {
-            outcome = &mut serving => return outcome,
-            _ = interrupt.recv() => {}
-            _ = terminate.recv() => {}
-            () = input => {}
-        }
-        let _ = first.send(());
-        tokio::select! {
-            outcome = &mut serving => outcome,
-            _ = interrupt.recv() => Ok(()),
-            _ = terminate.recv() => Ok(()),
-        }
-    });
-    // A computation that nobody waits for any more must not hold the process.
-    runtime.shutdown_background();
-    log::flush(LAST_WORDS);
-    outcome
-}
-
-/// Resolves when standard input ends; never without `asked`.
-async fn input_ends(asked: bool) {
-    let (ended, end) = tokio::sync::oneshot::channel::<()>();
-    let reader = move || {
-        let _ = std::io::copy(&mut std::io::stdin().lock(), &mut std::io::sink());
-        drop(ended);
-    };
-    if asked && std::thread::Builder::new().name("stdin".into()).spawn(reader).is_ok() {
-        let _ = end.await;
-    } else {
-        std::future::pending::<()>().await;
-    }
 }
 
 /// Tells by the health service whether this server is ready for more.

@@ -10,6 +10,7 @@ use crate::device::Device;
 use std::path::PathBuf;
 use std::sync::Arc;
 use thiserror::Error;
+use tokio::sync::Notify;
 
 /// What a server may be told.
 pub struct ServeOptions {
@@ -31,9 +32,11 @@ pub struct ServeOptions {
     pub state_unsynced: bool,
     /// What all this comes from, for `Info`; none: the limits alone are told.
     pub settings: Option<Settings>,
-    /// Whether [`run_until_signal`] also ends when standard input does: a program that starts a server for itself holds the
+    /// Whether [`super::until_signal::run_until_signal`] also ends when standard input does: a program that starts a server for itself holds the
     /// other end of a pipe, which the system closes however that program ends.
     pub while_stdin: bool,
+    /// Notified, the server reads tokens and certificates again; where a file is wrong, those before stay.
+    pub reload: Arc<Notify>,
     /// Called once, when every address accepts connections, with the addresses as bound (port 0 replaced), that of metrics last.
     pub ready: Ready,
 }
@@ -57,6 +60,7 @@ impl Default for ServeOptions {
             state_unsynced: false,
             settings: None,
             while_stdin: false,
+            reload: Arc::default(),
             ready: Box::new(|_| {}),
         }
     }
@@ -137,7 +141,7 @@ impl Settings {
                 token_file: self.token_file.clone(),
             },
             insecure: self.insecure,
-            limits: self.limits.clone(),
+            limits: self.limits_of_clients(),
             metrics: self.metrics.clone(),
             log_json: self.log_json,
             state_dir: self.state_dir.clone(),

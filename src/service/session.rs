@@ -1,7 +1,6 @@
 //! One open device with its states: who may ask it, and what of it is kept.
 
 use super::accounts::Seat;
-use super::answerable::bounded;
 use super::convert::device as wire;
 use super::keeper::{Keeper, forget, with_those_before};
 use super::limits::Limits;
@@ -40,7 +39,7 @@ pub(super) struct Session {
     pub(super) usage: Usage,
     closed: AtomicBool,
     /// Its place in the account of who opened it, where that is bounded.
-    seat: Mutex<Option<Seat>>,
+    pub(super) seat: Mutex<Option<Seat>>,
     /// What its trials draw on.
     purse: Option<Arc<Purse>>,
     /// Where its accepted states are kept, if they are to outlive the server.
@@ -73,7 +72,7 @@ impl Session {
         let seat = client().account.map(|account| account.seat(model.unknowns())).transpose()?;
         Ok(Arc::new(Self {
             id,
-            purse: seat.as_ref().map(Seat::purse),
+            purse: seat.as_ref().and_then(Seat::purse),
             seat: Mutex::new(seat),
             accepted: AtomicU64::new(keeper.as_ref().map_or(0, |keeper| keeper.accepted)),
             keeper: keeper.map(|keeper| Arc::new(Mutex::new(keeper))),
@@ -174,6 +173,11 @@ impl Session {
         }
         let answer = match question {
             Question::Open(request) => {
+                let own = self.model.compiled.parts.system.electrics.ports;
+                let ports = if request.ports.is_empty() { own } else { request.ports.len() };
+                if let Err(status) = self.take_memory(ports) {
+                    return self.refuse(question, &status);
+                }
                 let request = wire::open_from_wire(request);
                 device.open(&request).map(|description| {
                     let description = wire::description_to_wire(&description);
@@ -265,24 +269,7 @@ impl Session {
         self.keep(&**device, None).map(|_| ())
     }
 
-    /// Its states as a sealed snapshot.
-    pub(super) fn snapshot(&self, only: Option<Token>) -> Result<Vec<u8>, Status> {
-        self.usage.touch();
-        let states =
-            self.lock()?.save(only.as_ref().map(std::slice::from_ref)).map_err(|error| status::device(&error))?;
-        Ok(snapshots::seal(self.model.id(), &states))
-    }
-
-    /// Starts with the states of a sealed snapshot.
-    pub(super) fn restore(&self, sealed: &[u8], limits: &Limits) -> Result<proto::OpenResponse, Status> {
-        let states = snapshots::open(self.model.id(), sealed)?;
-        let described = self.lock()?.load(states).map_err(|error| status::device(&error))?;
-        bounded(described.ports.len(), described.signals.len(), limits)?;
-        *self.description.lock().unwrap_or_else(PoisonError::into_inner) = wire::description_to_wire(&described);
-        Ok(self.opened())
-    }
-
-    fn lock(&self) -> Result<MutexGuard<'_, Box<dyn Device>>, Status> {
+    pub(super) fn lock(&self) -> Result<MutexGuard<'_, Box<dyn Device>>, Status> {
         if self.is_closed() {
             return Err(status::not_found("session", &self.id));
         }

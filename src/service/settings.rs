@@ -174,6 +174,11 @@ impl Settings {
         true
     }
 
+    /// Whether anybody said what a setting is.
+    pub(super) fn is_set(&self, name: &str) -> bool {
+        self.sources.contains_key(name)
+    }
+
     /// Takes what variables say, those whose names begin with [`ENVIRONMENT`]. Kubernetes tells every container of a service called
     /// `bimorph-serve` in variables that begin so, too: those are passed over.
     ///
@@ -258,7 +263,8 @@ impl Settings {
             let hidden = setting.place == File::PLACE && !value.is_empty();
             (setting.name, if hidden { "given".to_owned() } else { value })
         });
-        let limits = LIMITS.iter().map(|limit| (limit.name, self.limits.get(limit)));
+        let own = self.limits_of_clients();
+        let limits = LIMITS.iter().map(|limit| (limit.name, own.get(limit)));
         let source = |name| match self.sources.get(name) {
             None => "default",
             Some(Source::File) => "file",

@@ -1,6 +1,6 @@
 //! What all calls of a server share.
 
-use super::accounts::Accounts;
+use super::accounts::{Accounts, Counted};
 use super::connection::Connections;
 use super::jobs::registry::Jobs;
 use super::limits::Limits;
@@ -10,6 +10,7 @@ use super::server::MakeDevice;
 use super::sessions::Sessions;
 use super::shutdown::Shutdown;
 use super::store::Store;
+use super::turns::client;
 use super::work::Work;
 use super::{proto, status};
 use std::sync::Arc;
@@ -46,14 +47,23 @@ pub(super) struct Shared {
 #[derive(Clone)]
 pub(super) struct Calls(pub(super) Arc<Shared>);
 
+/// A place for results that are being sent, until it is dropped.
+pub(super) struct Sending {
+    _place: OwnedSemaphorePermit,
+    _counted: Option<Counted>,
+}
+
 /// The answer of a call.
 pub(super) type Reply<T> = Result<Response<T>, Status>;
 
 impl Calls {
     /// A place for results that are being sent.
-    pub(super) fn sending(&self) -> Result<OwnedSemaphorePermit, Status> {
+    pub(super) fn sending(&self) -> Result<Sending, Status> {
+        let counted = client().account.map(|account| account.stream()).transpose()?;
         let most = self.0.limits.result_streams;
         let place = Arc::clone(&self.0.results).try_acquire_owned();
-        place.map_err(|_| status::limit("result_streams", most, "one more; read or end those that are open"))
+        let place =
+            place.map_err(|_| status::limit("result_streams", most, "one more; read or end those that are open"))?;
+        Ok(Sending { _place: place, _counted: counted })
     }
 }

@@ -25,7 +25,12 @@ impl Session {
         match caught(&budget, || omega.iter().map(|omega| one(omega, device.as_mut())).collect::<Result<_, _>>()) {
             Some(Ok(answer)) => answer.map_err(|error| status::device(&error)),
             Some(Err(why)) => {
-                device.recover();
+                // what was stopped may not stop this as well
+                let free = Budget::new(Allowance::default());
+                match caught(&free, || device.recover()) {
+                    Some(Ok(())) => {}
+                    _ => self.fault(),
+                }
                 Err(status::stopped(why))
             }
             None => {

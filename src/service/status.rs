@@ -114,6 +114,11 @@ pub(super) fn not_found(kind: &str, id: &str) -> Status {
     Status::not_found(format!("no {kind} \"{id}\" here; {way_out}"))
 }
 
+/// DATA_LOSS for what a disk does not give back as it was.
+pub(super) fn damaged(kind: &str, id: &str, way_out: &str) -> Status {
+    Status::data_loss(format!("what is kept of {kind} \"{}\" is damaged; {way_out}", cut(id.to_owned(), 80)))
+}
+
 /// States that cannot be kept: RESOURCE_EXHAUSTED where there is no room for them, UNAVAILABLE for anything else.
 pub(super) fn not_kept(what: &str, error: &std::io::Error) -> Status {
     use std::io::ErrorKind;

@@ -161,7 +161,16 @@ impl Store {
 
     /// What is kept of a session: the newer of its files that is whole.
     pub(super) fn load(&self, id: &str, model: &str) -> Option<Kept> {
-        let read = |slot| fs::read(self.session(id, model, slot)).ok().and_then(|bytes| Kept::read(&bytes));
+        let read = |slot| {
+            let bytes = fs::read(self.session(id, model, slot)).ok()?;
+            let kept = Kept::read(&bytes);
+            if kept.is_none() {
+                let text =
+                    "a file of its states is not whole: a write was cut off, or it is damaged; the one before it holds";
+                tracing::warn!(session = id, slot, "{text}");
+            }
+            kept
+        };
         [read(0), read(1)].into_iter().flatten().max_by_key(|kept| kept.sequence)
     }
 

@@ -94,7 +94,7 @@ async fn later(shared: Arc<Shared>, session: Arc<Session>, question: Question) -
     };
     let silent = question.is_silent();
     let job = move |budget: &Budget| {
-        let _turn = turn;
+        let _turn = &turn;
         // a state that was computed is accepted whatever is left
         let free = Budget::new(Allowance::default());
         Ok(session.answer(&question, if question.is_accept() { &free } else { budget }))

@@ -1,11 +1,12 @@
-//! Places that clients take in turn.
+//! Places for computations, taken in turns of clients.
 //!
-//! Who asks for many computations at once waits for its own, not others for it: of those that wait, each connection gets
-//! one place before any gets its second.
+//! A client with many computations waits for its own, and others do not wait for it. Of those that wait, each client gets one place
+//! before any gets its second, and so do the connections of one client. Where every client has a place of its own, a client of which
+//! nothing is computed does not wait at all: the operating system shares the processors among the threads.
 
 use super::accounts::Account;
-use std::collections::VecDeque;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use tokio::sync::oneshot;
 
 tokio::task_local! {
@@ -20,8 +21,15 @@ pub(super) struct Client {
     pub(super) number: u64,
     /// What it is called; all of one name are one.
     pub(super) name: Arc<str>,
-    /// What the client has of this server, where that is bounded.
+    /// What the client has of this server.
     pub(super) account: Option<Arc<Account>>,
+}
+
+impl Client {
+    /// Whose turn it is when a computation of this task waits.
+    pub(super) fn party(&self) -> Party {
+        Party { client: Arc::clone(&self.name), number: self.number }
+    }
 }
 
 /// Whom this task works for; the server itself where nobody is known.
@@ -29,84 +37,180 @@ pub(super) fn client() -> Client {
     CLIENT.try_with(Client::clone).unwrap_or_default()
 }
 
+/// Who waits for a place: a client, and which of its connections (or jobs).
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Party {
+    pub(super) client: Arc<str>,
+    pub(super) number: u64,
+}
+
 /// So many places.
 #[derive(Debug)]
-pub(super) struct Turns(Mutex<State>);
+pub(super) struct Turns {
+    state: Mutex<State>,
+    /// Whether a client that has no place gets one beside those that are shared.
+    own: bool,
+}
+
+type Waits = oneshot::Sender<Place>;
+/// Those that wait, by whom; the one whose turn is next in front.
+type Queue<K, T> = VecDeque<(K, T)>;
 
 #[derive(Debug)]
 struct State {
+    /// Shared places that are free.
     free: usize,
-    /// Those that wait, by client; the client whose turn is next in front.
-    waiting: VecDeque<(u64, VecDeque<oneshot::Sender<Place>>)>,
+    waiting: Queue<Arc<str>, Queue<u64, VecDeque<Waits>>>,
+    /// Places that each client has, its own among them.
+    taken: BTreeMap<Arc<str>, usize>,
 }
 
-/// A place; dropped, it goes to who is next.
+/// A place; dropped, it goes to the next in turn.
 #[derive(Debug)]
 pub(super) struct Place {
     turns: Option<Arc<Turns>>,
-    client: u64,
+    party: Party,
+    /// Whether it is one that is shared.
+    shared: bool,
 }
 
 impl Place {
     /// Whose it is.
-    pub(super) fn client(&self) -> u64 {
-        self.client
+    pub(super) fn party(&self) -> Party {
+        self.party.clone()
     }
 }
 
 impl Drop for Place {
     fn drop(&mut self) {
-        if let Some(turns) = self.turns.take() {
-            turns.pass_on();
+        let Some(turns) = self.turns.take() else { return };
+        let mut state = turns.state();
+        state.free += usize::from(self.shared);
+        state.leave(&self.party.client);
+        turns.serve(&mut state);
+    }
+}
+
+impl State {
+    fn leave(&mut self, client: &Arc<str>) {
+        if let Some(count) = self.taken.get_mut(client) {
+            *count -= 1;
+            if *count == 0 {
+                self.taken.remove(client);
+            }
+        }
+    }
+
+    fn wait(&mut self, party: &Party, sender: Waits) {
+        let own = of(&mut self.waiting, &party.client);
+        of(own, &party.number).push_back(sender);
+    }
+
+    /// The next in turn, and who: of any client, or of that one.
+    fn next(&mut self, only: Option<&str>) -> Option<(Party, Waits)> {
+        loop {
+            let at = only.map_or(Some(0), |only| self.waiting.iter().position(|(client, _)| **client == *only))?;
+            let (client, mut own) = self.waiting.remove(at)?;
+            let found = own.pop_front().and_then(|(number, mut senders)| {
+                let sender = senders.pop_front();
+                if !senders.is_empty() {
+                    own.push_back((number, senders));
+                }
+                sender.map(|sender| (Party { client: Arc::clone(&client), number }, sender))
+            });
+            if !own.is_empty() {
+                self.waiting.push_back((client, own));
+            }
+            // those that went away are passed over
+            if let Some((party, sender)) = found
+                && !sender.is_closed()
+            {
+                return Some((party, sender));
+            }
         }
     }
 }
 
+/// The entry of a key, made where there is none.
+fn of<'a, K: PartialEq + Clone, T: Default>(queue: &'a mut Queue<K, T>, key: &K) -> &'a mut T {
+    let at = queue.iter().position(|(other, _)| other == key).unwrap_or_else(|| {
+        queue.push_back((key.clone(), T::default()));
+        queue.len() - 1
+    });
+    &mut queue[at].1
+}
+
 impl Turns {
+    /// So many places, all shared.
     pub(super) fn new(places: usize) -> Arc<Self> {
-        Arc::new(Self(Mutex::new(State { free: places.max(1), waiting: VecDeque::new() })))
+        Self::with(places, false)
+    }
+
+    /// So many places, and one more for each client that has none.
+    pub(super) fn and_own(places: usize) -> Arc<Self> {
+        Self::with(places, true)
+    }
+
+    fn with(places: usize, own: bool) -> Arc<Self> {
+        let state = State { free: places.max(1), waiting: VecDeque::new(), taken: BTreeMap::new() };
+        Arc::new(Self { state: Mutex::new(state), own })
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Waits for a place for a client. Dropped, it waits no more.
-    pub(super) async fn place(self: &Arc<Self>, client: u64) -> Place {
-        let waits = {
-            let mut state = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-            if state.free > 0 {
-                state.free -= 1;
-                return Place { turns: Some(Arc::clone(self)), client };
-            }
-            let (sender, waits) = oneshot::channel();
-            match state.waiting.iter_mut().find(|(other, _)| *other == client) {
-                Some((_, own)) => own.push_back(sender),
-                None => state.waiting.push_back((client, VecDeque::from([sender]))),
-            }
-            waits
-        };
+    pub(super) async fn place(self: &Arc<Self>, party: Party) -> Place {
+        let (sender, waits) = oneshot::channel();
+        {
+            let mut state = self.state();
+            state.wait(&party, sender);
+            self.serve(&mut state);
+        }
         // a sender goes away with its place alone
-        waits.await.unwrap_or(Place { turns: None, client })
+        waits.await.unwrap_or(Place { turns: None, party, shared: false })
     }
 
     /// How many wait for a place.
     pub(super) fn waiting(&self) -> usize {
-        let state = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        state.waiting.iter().map(|(_, own)| own.iter().filter(|sender| !sender.is_closed()).count()).sum()
+        let state = self.state();
+        let all = state.waiting.iter().flat_map(|(_, own)| own).flat_map(|(_, senders)| senders);
+        all.filter(|sender| !sender.is_closed()).count()
     }
 
-    /// Gives a place to the next client that still waits.
-    fn pass_on(self: Arc<Self>) {
-        let mut state = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        while let Some((client, mut own)) = state.waiting.pop_front() {
-            let Some(sender) = own.pop_front() else { continue };
-            if !own.is_empty() {
-                state.waiting.push_back((client, own));
-            }
-            match sender.send(Place { turns: Some(Arc::clone(&self)), client }) {
-                Ok(()) => return,
-                // who does not wait any more takes none
-                Err(mut place) => place.turns = None,
+    /// Gives out what is free.
+    fn serve(self: &Arc<Self>, state: &mut State) {
+        while state.free > 0 {
+            let Some(next) = state.next(None) else { return };
+            state.free -= usize::from(self.give(state, next, true));
+        }
+        if !self.own {
+            return;
+        }
+        let without = |state: &State, client: &Arc<str>| !state.taken.contains_key(client);
+        let poor: Vec<Arc<str>> =
+            state.waiting.iter().filter(|(client, _)| without(state, client)).map(|(c, _)| Arc::clone(c)).collect();
+        for client in poor {
+            while without(state, &client) {
+                let Some(next) = state.next(Some(&client)) else { break };
+                self.give(state, next, false);
             }
         }
-        state.free += 1;
+    }
+
+    /// Gives a place; whether it was taken.
+    fn give(self: &Arc<Self>, state: &mut State, (party, sender): (Party, Waits), shared: bool) -> bool {
+        *state.taken.entry(Arc::clone(&party.client)).or_default() += 1;
+        match sender.send(Place { turns: Some(Arc::clone(self)), party, shared }) {
+            Ok(()) => true,
+            Err(mut place) => {
+                // the client went away, and the state is locked here
+                place.turns = None;
+                state.leave(&place.party.client);
+                false
+            }
+        }
     }
 }
 
@@ -115,34 +219,80 @@ mod tests {
     //! Clients take turns, those that went away are passed over, and no place is lost.
     use super::*;
     use std::future::Future;
-    use std::pin::pin;
+    use std::pin::{Pin, pin};
     use std::task::{Context, Poll, Waker};
 
-    #[test]
-    fn clients_take_turns() {
-        let turns = Turns::new(1);
+    fn party(client: &str, number: u64) -> Party {
+        Party { client: client.into(), number }
+    }
+
+    type Waiting<'a> = Vec<Pin<Box<dyn Future<Output = Place> + 'a>>>;
+
+    /// The places that are given now.
+    fn given(waiting: &mut Waiting<'_>) -> Vec<Place> {
         let mut cx = Context::from_waker(Waker::noop());
-        let Poll::Ready(mut place) = pin!(turns.place(1)).poll(&mut cx) else { panic!("one is free") };
-        let mut waiting: Vec<_> = [1, 1, 1, 2, 3, 2].map(|client| Box::pin(turns.place(client))).into();
-        for waits in &mut waiting {
-            assert!(waits.as_mut().poll(&mut cx).is_pending());
-        }
-        // the only one of client 3 goes away
+        let mut given = Vec::new();
+        waiting.retain_mut(|waits| match waits.as_mut().poll(&mut cx) {
+            Poll::Ready(place) => {
+                given.push(place);
+                false
+            }
+            Poll::Pending => true,
+        });
+        given
+    }
+
+    /// One place; of clients a, b and c the connections 1 and 2 wait.
+    #[test]
+    fn clients_and_their_connections_take_turns() {
+        let turns = Turns::new(1);
+        let ask = |client: &str, number| -> Pin<Box<dyn Future<Output = Place>>> {
+            let (turns, party) = (Arc::clone(&turns), party(client, number));
+            Box::pin(async move { turns.place(party).await })
+        };
+        let mut waiting: Waiting<'_> = vec![ask("a", 1)];
+        let mut places = given(&mut waiting);
+        assert_eq!(places.len(), 1, "one is free");
+        let asked = [("a", 1), ("a", 1), ("a", 2), ("b", 1), ("c", 1), ("b", 1)];
+        waiting.extend(asked.map(|(client, number)| ask(client, number)));
+        assert!(given(&mut waiting).is_empty());
+        // the only one of client c goes away
         drop(waiting.remove(4));
+        assert_eq!(turns.waiting(), 5);
         let mut order = Vec::new();
         while !waiting.is_empty() {
-            drop(place);
-            let ready = waiting.iter_mut().enumerate().find_map(|(k, waits)| match waits.as_mut().poll(&mut cx) {
-                Poll::Ready(place) => Some((k, place)),
-                Poll::Pending => None,
-            });
-            let (k, next) = ready.expect("a place is passed on");
-            order.push(next.client());
-            place = next;
-            drop(waiting.remove(k));
+            drop(places);
+            places = given(&mut waiting);
+            assert_eq!(places.len(), 1, "a place is passed on");
+            order.extend(places.iter().map(|place| format!("{}{}", place.party().client, place.party().number)));
         }
-        assert_eq!(order, [1, 2, 1, 2, 1]);
-        drop(place);
-        assert!(pin!(turns.place(9)).poll(&mut cx).is_ready(), "the place is there again");
+        assert_eq!(order, ["a1", "b1", "a2", "b1", "a1"]);
+        drop(places);
+        assert!(pin!(turns.place(party("z", 9))).poll(&mut Context::from_waker(Waker::noop())).is_ready());
+    }
+
+    /// A client that has no place gets one of its own at once, and no second one before its turn.
+    #[test]
+    fn a_client_without_a_place_gets_its_own() {
+        let turns = Turns::and_own(2);
+        let ask = |client: &str| -> Pin<Box<dyn Future<Output = Place>>> {
+            let (turns, party) = (Arc::clone(&turns), party(client, 1));
+            Box::pin(async move { turns.place(party).await })
+        };
+        let mut waiting: Waiting<'_> = (0..6).map(|_| ask("a")).collect();
+        let mut shared = given(&mut waiting);
+        assert_eq!(shared.len(), 2);
+        waiting.extend([ask("b"), ask("b")]);
+        let own = given(&mut waiting);
+        assert_eq!(own.len(), 1);
+        assert_eq!(&*own[0].party().client, "b");
+        // its own place is used again by itself alone
+        drop(own);
+        let own = given(&mut waiting);
+        assert_eq!((own.len(), &*own[0].party().client), (1, "b"));
+        drop(own);
+        assert!(given(&mut waiting).is_empty(), "it is not one for all");
+        drop(shared.pop());
+        assert_eq!(given(&mut waiting).len(), 1);
     }
 }

@@ -72,7 +72,12 @@ impl Shared {
         loop {
             let Some(asleep) = store.asleep(id) else { return self.sessions.get(id) };
             self.sessions.room(&self.limits)?;
-            let kept = store.load(id, &asleep.model).ok_or_else(|| status::not_found("session", id))?;
+            let kept = store.load(id, &asleep.model).ok_or_else(|| {
+                match [0, 1].iter().any(|slot| store.session(id, &asleep.model, *slot).exists()) {
+                    true => status::damaged("session", id, "open a new one"),
+                    false => status::not_found("session", id),
+                }
+            })?;
             let model = self.model_of(store, &asleep.model)?;
             let keeper = Keeper::after(store, id, model.id(), &kept);
             let session = Session::new(id.to_owned(), Some(keeper), &model, self.make, &self.limits)?;

@@ -1,51 +1,115 @@
 //! Computations that take their time: off the event loop, a few at once, each under a budget.
+//!
+//! A computation first has [`SLICE`] in a place for short ones. What is not done by then is stopped and computed anew in a place for
+//! long ones, which changes nothing but its time: computations are pure until they end. So a call of a millisecond waits for slices of
+//! others, not for their minutes. A connection with a computation that is known to be long has no slices meanwhile.
 
 use super::limits::Limits;
 use super::shutdown::Shutdown;
 use super::status;
-use super::turns::{CLIENT, Place, Turns, client};
+use super::turns::{CLIENT, Party, Place, Turns, client};
 use crate::budget::{self, Allowance, Budget, Stopped};
+use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::pin::Pin;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::task::{Context, Poll};
 use std::time::{Duration, Instant};
 use tokio_stream::Stream;
 use tonic::Status;
 
+/// Wall time of a computation in a place for short ones.
+const SLICE: Duration = Duration::from_millis(30);
+/// Processor time of a slice below which a computation was kept from the processor by others, and gets another slice.
+const STARVED: Duration = Duration::from_millis(8);
+
 /// Places for computations.
 pub(super) struct Work {
     places: Arc<Turns>,
+    /// Places for short ones; none: there are no slices.
+    short: Option<Arc<Turns>>,
+    long: Arc<Long>,
     timeout: Duration,
     allowance: Allowance,
     shutdown: Shutdown,
 }
 
+/// Connections whose computations are known to be long, and how many each has.
+#[derive(Default)]
+struct Long(Mutex<BTreeMap<u64, usize>>);
+
+/// A computation that is known to be long, until it ends.
+struct Known {
+    long: Arc<Long>,
+    number: u64,
+}
+
+/// What came of a computation.
+struct Done<T> {
+    answer: Result<T, Status>,
+    /// Whether it was stopped for want of time.
+    is_late: bool,
+    /// Processor time of one that was.
+    cpu: Option<Duration>,
+}
+
+impl Long {
+    fn has(&self, number: u64) -> bool {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).contains_key(&number)
+    }
+
+    fn enter(self: &Arc<Self>, number: u64) -> Known {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner).entry(number).or_default() += 1;
+        Known { long: Arc::clone(self), number }
+    }
+}
+
+impl Drop for Known {
+    fn drop(&mut self) {
+        let mut long = self.long.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(count) = long.get_mut(&self.number) {
+            *count -= 1;
+            if *count == 0 {
+                long.remove(&self.number);
+            }
+        }
+    }
+}
+
 impl Work {
-    /// At most `places` at once, each answered within the limit of a unary call.
+    /// At most `places` long ones at once and one more of each client that has none, each answered within the limit of a unary call.
     pub(super) fn new(places: usize, limits: &Limits, shutdown: Shutdown) -> Self {
-        let places = Turns::new(places);
-        Self { places, timeout: limits.request_timeout, allowance: allowance(limits), shutdown }
+        let (places, long) = (Turns::and_own(places), Arc::default());
+        Self { places, short: None, long, timeout: limits.request_timeout, allowance: allowance(limits), shutdown }
+    }
+
+    /// The same with as many places for short ones.
+    pub(super) fn sliced(places: usize, limits: &Limits, shutdown: Shutdown) -> Self {
+        Self { short: Some(Turns::new(places)), ..Self::new(places, limits, shutdown) }
     }
 
     /// How many computations wait for a place.
     pub(super) fn waiting(&self) -> usize {
-        self.places.waiting()
+        self.places.waiting() + self.short.as_ref().map_or(0, |short| short.waiting())
     }
 
     /// Waits for a place, in the turn of the client at hand.
     pub(super) async fn place(&self) -> Result<Place, Status> {
+        self.place_of(&self.places, client().party(), Instant::now() + self.timeout).await
+    }
+
+    async fn place_of(&self, places: &Arc<Turns>, party: Party, deadline: Instant) -> Result<Place, Status> {
         tokio::select! {
-            place = self.places.place(client().number) => Ok(place),
-            () = tokio::time::sleep(self.timeout) => Err(self.late("waiting for its turn")),
+            place = places.place(party) => Ok(place),
+            () = tokio::time::sleep_until(deadline.into()) => Err(self.late("waiting for its turn")),
             () = self.shutdown.ending.cancelled() => Err(status::stopping()),
         }
     }
 
     /// Waits for a place as long as it takes, for a computation that gave its own back; none when the server stops.
-    pub(super) async fn again(&self, client: u64) -> Option<Place> {
+    pub(super) async fn again(&self, party: Party) -> Option<Place> {
         tokio::select! {
-            place = self.places.place(client) => Some(place),
+            place = self.places.place(party) => Some(place),
             () = self.shutdown.ending.cancelled() => None,
         }
     }
@@ -56,31 +120,64 @@ impl Work {
     }
 
     /// Runs `job` on a thread of its own. It is stopped when its time is over, when the server stops, and when nobody
-    /// waits for it any more, which drops this future.
+    /// waits for it any more, which drops this future. It may be stopped and run anew, so it must be pure until it ends.
     pub(super) async fn run<T: Send + 'static>(
         &self,
-        job: impl FnOnce() -> Result<T, Status> + Send + 'static,
+        job: impl Fn() -> Result<T, Status> + Send + Sync + 'static,
     ) -> Result<T, Status> {
-        self.run_with(|budget| guarded(budget, job)).await
+        self.run_with(move |budget| guarded(budget, &job)).await
     }
 
     /// The same for a job that enters its budget itself.
     pub(super) async fn run_with<T: Send + 'static>(
         &self,
-        job: impl FnOnce(&Budget) -> Result<T, Status> + Send + 'static,
+        job: impl Fn(&Budget) -> Result<T, Status> + Send + Sync + 'static,
     ) -> Result<T, Status> {
-        let place = self.place().await?;
-        let deadline = Some(Instant::now() + self.timeout);
-        let budget = Budget::new(Allowance { deadline, ..of_client(self.allowance.clone()) });
+        let deadline = Instant::now() + self.timeout;
+        let (party, job) = (client().party(), Arc::new(job));
+        while let Some(short) = self.short.as_ref().filter(|_| !self.long.has(party.number)) {
+            let place = self.place_of(short, party.clone(), deadline).await?;
+            // others of its connection may have turned out to be long while it waited
+            if self.long.has(party.number) {
+                break;
+            }
+            let end = deadline.min(Instant::now() + SLICE);
+            let Done { answer, is_late, cpu } = self.compute(Arc::clone(&job), place, end, deadline).await?;
+            if !is_late || end == deadline {
+                return answer.map_err(|status| self.told(status));
+            }
+            if cpu.is_none_or(|cpu| cpu >= STARVED) {
+                break;
+            }
+        }
+        let _known = self.short.as_ref().map(|_| self.long.enter(party.number));
+        let place = self.place_of(&self.places, party, deadline).await?;
+        let Done { answer, .. } = self.compute(job, place, deadline, deadline).await?;
+        answer.map_err(|status| self.told(status))
+    }
+
+    /// Computes in a place until `end`.
+    async fn compute<T: Send + 'static>(
+        &self,
+        job: Arc<impl Fn(&Budget) -> Result<T, Status> + Send + Sync + 'static>,
+        place: Place,
+        end: Instant,
+        deadline: Instant,
+    ) -> Result<Done<T>, Status> {
+        let budget = Budget::new(Allowance { deadline: Some(end), ..of_client(self.allowance.clone()) });
         let guard = CancelOnDrop(budget.clone());
         let (span, client) = (tracing::Span::current(), client());
         let running = tokio::task::spawn_blocking(move || {
             let _place = place;
-            CLIENT.sync_scope(client, || span.in_scope(|| job(&budget)))
+            let before = budget::thread_cpu();
+            let answer = CLIENT.sync_scope(client, || span.in_scope(|| job(&budget)));
+            let is_late = budget.is_late();
+            let cpu = before.filter(|_| is_late).and_then(|before| Some(budget::thread_cpu()?.saturating_sub(before)));
+            Done { answer, is_late, cpu }
         });
         tokio::select! {
-            answer = running => answer.unwrap_or_else(|_| Err(status::fault())).map_err(|status| self.told(status)),
-            () = tokio::time::sleep(self.timeout) => {
+            answer = running => answer.map_err(|_| status::fault()),
+            () = tokio::time::sleep_until(deadline.into()) => {
                 guard.0.late();
                 Err(self.late("computing"))
             }
@@ -101,7 +198,7 @@ impl Work {
 
 /// The same, drawn on what the client at hand has.
 pub(super) fn of_client(allowance: Allowance) -> Allowance {
-    Allowance { purse: client().account.map(|account| Arc::clone(&account.purse)), ..allowance }
+    Allowance { purse: client().account.and_then(|account| account.purse.clone()), ..allowance }
 }
 
 /// What one computation may use.

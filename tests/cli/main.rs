@@ -15,6 +15,7 @@ mod kept;
 mod killed_clients;
 mod killed_jobs;
 mod layouts;
+mod operations;
 mod outputs;
 mod overseen;
 mod secure;

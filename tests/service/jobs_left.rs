@@ -83,7 +83,8 @@ fn a_job_of_another_version_is_left_to_it() {
     });
 }
 
-/// A journal that is damaged in the middle is told, and not mended by taking away what stands behind the damage.
+/// A journal of a finished job that is damaged in the middle has all rows again: that of the damage is computed anew, and nothing that stands
+/// behind the damage is taken away.
 #[test]
 fn a_damaged_journal_keeps_what_it_has() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -96,13 +97,15 @@ fn a_damaged_journal_keeps_what_it_has() {
     let running = server(folder.path());
     block_on(async {
         let mut wire = running.client().await;
+        let sorted = |rows: &[proto::JobRow]| {
+            let mut rows: Vec<_> = rows.iter().map(|row| row.row.clone().expect("a row")).collect();
+            rows.sort_by_key(|row| row.point);
+            rows
+        };
         for _ in 0..2 {
-            let lost = rows(&mut wire, &name).await.expect_err("they are not all there");
-            assert_eq!(lost.code(), Code::DataLoss, "{lost}");
+            assert_eq!(sorted(&rows(&mut wire, &name).await.expect("its rows").0), sorted(&whole));
         }
-        assert_eq!(std::fs::read(&path).expect("a journal"), damaged);
-        std::fs::write(&path, &sound).expect("mended");
-        assert_eq!(rows(&mut wire, &name).await.expect("its rows").0, whole);
+        assert!(std::fs::read(&path).expect("a journal").starts_with(&damaged));
     });
 }
 

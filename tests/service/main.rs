@@ -1,6 +1,7 @@
 //! The service from outside: every call over a real socket, on port 0 or a temporary path.
 #![cfg(feature = "server")]
 
+mod announced;
 mod attached;
 mod attacks;
 mod calls;
@@ -16,9 +17,12 @@ mod jobs_kept;
 mod jobs_left;
 mod kept;
 mod leases;
+mod leaving;
 mod limits;
 mod lines;
 mod listening;
+mod lying;
+mod neighbours;
 mod older;
 mod quotas;
 mod random;

@@ -15,11 +15,11 @@ use tonic::service::interceptor::InterceptedService;
 use tonic::transport::{Channel, Endpoint};
 use tonic::{Code, Request, Status};
 
-const TOKENS: &str = "alice alice-0123456789abcdef\nbob bob-0123456789abcdef\n";
+pub(crate) const TOKENS: &str = "alice alice-0123456789abcdef\nbob bob-0123456789abcdef\n";
 
 /// Shows a token.
 #[derive(Clone)]
-pub(crate) struct Shows(&'static str);
+pub(crate) struct Shows(pub(crate) &'static str);
 
 impl Interceptor for Shows {
     fn call(&mut self, mut request: Request<()>) -> Result<Request<()>, Status> {

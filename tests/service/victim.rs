@@ -64,33 +64,9 @@ impl Wire {
 
     /// A `Check` whose message is announced with `announced` bytes and sent up to `sent`, as far as the server lets it.
     pub(crate) async fn half_sent(&self, announced: u32, sent: usize) -> TcpStream {
-        let mut socket = self.raw(b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n\0\0\0\x04\0\0\0\0\0").await;
-        let mut headers = Vec::new();
-        for (name, value) in [
-            (":method", "POST"),
-            (":scheme", "http"),
-            (":authority", "localhost"),
-            (":path", "/bimorph.v1.Bimorph/Check"),
-            ("content-type", "application/grpc"),
-            ("te", "trailers"),
-        ] {
-            // a literal header without indexing (RFC 7541, §6.2.2)
-            headers.push(0);
-            for text in [name, value] {
-                headers.push(text.len() as u8);
-                headers.extend(text.bytes());
-            }
-        }
-        let frame = |kind: u8, flags: u8, stream: u32, body: &[u8]| {
-            let mut out = (body.len() as u32).to_be_bytes()[1..].to_vec();
-            out.extend([kind, flags]);
-            out.extend(stream.to_be_bytes());
-            out.extend(body);
-            out
-        };
-        let _ = socket.write_all(&frame(1, 4, 1, &headers)).await;
-        let mut message = vec![0];
-        message.extend(announced.to_be_bytes());
+        let mut socket = self.raw(GREETING).await;
+        let _ = socket.write_all(&check_headers(1)).await;
+        let mut message = announcement(announced).to_vec();
         message.resize(5 + sent, b' ');
         for chunk in message.chunks(16_000) {
             let framed = frame(0, 0, 1, chunk);
@@ -105,6 +81,55 @@ impl Wire {
         let _ = tokio::time::timeout(Duration::from_millis(1), socket.read(&mut [0; 64])).await;
         socket
     }
+
+    /// A connection with so many calls of `Check`, each of which announces so many bytes and sends none of them.
+    pub(crate) async fn announcing(&self, calls: u32, announced: u32) -> TcpStream {
+        let mut words = GREETING.to_vec();
+        for stream in (0..calls).map(|call| 2 * call + 1) {
+            words.extend(check_headers(stream));
+            words.extend(frame(0, 0, stream, &announcement(announced)));
+        }
+        self.raw(&words).await
+    }
+}
+
+/// The preface of HTTP/2 and settings without any.
+const GREETING: &[u8] = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n\0\0\0\x04\0\0\0\0\0";
+
+/// Head of a gRPC message.
+fn announcement(bytes: u32) -> [u8; 5] {
+    let [a, b, c, d] = bytes.to_be_bytes();
+    [0, a, b, c, d]
+}
+
+/// A frame of HTTP/2.
+fn frame(kind: u8, flags: u8, stream: u32, body: &[u8]) -> Vec<u8> {
+    let mut out = (body.len() as u32).to_be_bytes()[1..].to_vec();
+    out.extend([kind, flags]);
+    out.extend(stream.to_be_bytes());
+    out.extend(body);
+    out
+}
+
+/// Begins a call of `Check`.
+fn check_headers(stream: u32) -> Vec<u8> {
+    let mut headers = Vec::new();
+    for (name, value) in [
+        (":method", "POST"),
+        (":scheme", "http"),
+        (":authority", "localhost"),
+        (":path", "/bimorph.v1.Bimorph/Check"),
+        ("content-type", "application/grpc"),
+        ("te", "trailers"),
+    ] {
+        // a literal header without indexing (RFC 7541, §6.2.2)
+        headers.push(0);
+        for text in [name, value] {
+            headers.push(text.len() as u8);
+            headers.extend(text.bytes());
+        }
+    }
+    frame(1, 4, stream, &headers)
 }
 
 /// A netlist as it travels.
@@ -186,7 +211,19 @@ impl Victim {
     }
 
     fn start_with(reader: Reader, options: &[&str]) -> Self {
-        let mut process = Command::new(env!("CARGO_BIN_EXE_bimorph"))
+        Self::spawn(reader, Command::new(env!("CARGO_BIN_EXE_bimorph")), options)
+    }
+
+    /// The same in an address space of so many gigabytes.
+    pub(crate) fn within(gigabytes: u32, options: &[&str]) -> Self {
+        let mut shell = Command::new("sh");
+        let script = format!("ulimit -v {} && exec \"$0\" \"$@\"", gigabytes << 20);
+        shell.args(["-c", &script, env!("CARGO_BIN_EXE_bimorph")]);
+        Self::spawn(Reader::Reads, shell, options)
+    }
+
+    fn spawn(reader: Reader, mut command: Command, options: &[&str]) -> Self {
+        let mut process = command
             .args(["serve", "--listen", "127.0.0.1:0"])
             .args(options)
             .env("BIMORPH_LOG", if reader == Reader::Reads { "warn" } else { "trace" })
@@ -219,6 +256,16 @@ impl Victim {
                 return;
             }
         }
+    }
+
+    /// The most that it has held [kB].
+    pub(crate) fn peak_kb(&self) -> u64 {
+        self.status_kb("VmHWM:")
+    }
+
+    /// Where it listens.
+    pub(crate) fn address(&self) -> &str {
+        &self.address
     }
 
     /// What it holds now [kB].

@@ -66,6 +66,7 @@ impl<'a> Samples<'a> {
             if t > s + h && !last || t > (s + h) * (1.0 + 1e-12) {
                 break;
             }
+            crate::budget::check();
             interpolate(before, after, h, ((t - s) / h).min(1.0), &mut now);
             self.take(t, &now);
             self.next += 1;

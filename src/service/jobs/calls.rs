@@ -43,7 +43,7 @@ impl Calls {
         let job = move || {
             let task = Task::of(request.clone()).map_err(status::violation)?;
             check_size(&task.bundle, &shared.limits)?;
-            let job = shared.jobs.submit(asked, task, &request, &shared.limits)?;
+            let job = shared.jobs.submit(asked.clone(), task, &request, &shared.limits)?;
             if shared.shutdown.draining.is_cancelled() {
                 // it came after those that run were told
                 job.stop(Stop::Suspended);

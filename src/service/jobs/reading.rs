@@ -1,8 +1,10 @@
 //! The rows of a job as they are read, from memory or from the disk.
 
 use super::super::{proto, status};
+use super::folder::End;
 use super::job::{Job, held};
 use super::rows::{Reading, Rows};
+use super::standing::state_of;
 use crate::jobs::sweep::journal::Kept;
 use crate::jobs::sweep::{self, SweepTable};
 use std::sync::{Arc, MutexGuard};
@@ -26,12 +28,32 @@ impl Job {
         let read = file.read_rows().map_err(|error| lost(error.to_string()))?;
         let expected = self.standing().rows;
         if (read.len() as u64) < expected {
-            return Err(lost(format!("there are {} of {expected}", read.len())));
+            let status = lost(format!(
+                "{} of {expected} are damaged; a server that starts computes them again, or submit the job again",
+                expected - read.len() as u64
+            ));
+            tracing::warn!(job = self.id, reason = status.message(), "damaged");
+            self.lose(&status);
+            return Err(status);
         }
         let mut found = Rows::default();
         read.into_iter().for_each(|kept| found.push(kept));
         *rows = Some(found);
         Ok(rows)
+    }
+
+    /// Its rows are damaged on the disk: it is not done any more. That is not kept, so the next server computes them again.
+    fn lose(&self, why: &Status) {
+        self.standing.send_modify(|standing| {
+            let lost = standing.end.as_ref().map(|end| End {
+                code: why.code() as i32,
+                message: why.message().to_owned(),
+                ..end.clone()
+            });
+            if lost.is_some() {
+                (standing.state, standing.end) = (state_of(why.code() as i32), lost);
+            }
+        });
     }
 
     /// The next rows of a stream.

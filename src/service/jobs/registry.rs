@@ -164,11 +164,18 @@ impl Jobs {
         let request = proto::SubmitJobRequest::decode(&*request).map_err(|error| error.to_string())?;
         let wire_options = request.options.clone();
         let Task { spec, bundle, options } = Task::of(request).map_err(|violation| violation.description)?;
-        let purse = accounts.of(&asked.owner).map(|account| Arc::clone(&account.purse));
+        let purse = accounts.of(&asked.owner).purse.clone();
         let budget = Budget::new(Allowance { purse, ..allowance(limits) });
-        // what it was told of is there: its rows are read when somebody asks for them
+        // what it was told of is there, whole: its rows are read again when somebody asks for them
         let whole = |end: &End| end.code != Code::Ok as i32 || end.rows == asked.points;
-        if let Some(end) = end.clone().filter(|end| end.bytes == file.row_bytes() && whole(end)) {
+        let are_there = |end: &End| {
+            let found = file.read_rows().map_or(0, |rows| rows.len() as u64);
+            if found < end.rows {
+                tracing::warn!(job = id, "{} of its {} rows are damaged", end.rows - found, end.rows);
+            }
+            found >= end.rows
+        };
+        if let Some(end) = end.clone().filter(|end| end.bytes == file.row_bytes() && whole(end) && are_there(end)) {
             let (state, rows, failed) = (state_of(end.code), end.rows, end.failed);
             let standing = Standing { state, rows, failed, end: Some(end), ..Standing::default() };
             let job = Job::new(id.clone(), (asked, spec, wire_options), budget, Some(file), (None, standing));
@@ -176,14 +183,24 @@ impl Jobs {
             return Ok(());
         }
         let mut rows = Rows::default();
-        file.open().map_err(|error| error.to_string())?.into_iter().for_each(|kept| rows.push(kept));
+        let lost = match file.open() {
+            Ok(found) => {
+                found.into_iter().for_each(|kept| rows.push(kept));
+                None
+            }
+            Err(error) => {
+                tracing::warn!(job = id, %error, "its journal is damaged");
+                Some(status::damaged("job", &id, "submit it again"))
+            }
+        };
         let standing =
             Standing { state: State::Waiting, rows: rows.len(), failed: rows.failed(), ..Standing::default() };
         let cancelled = end.filter(|end| end.code != Code::Ok as i32);
         let why_not = goes_on(&asked, &bundle, limits).err().filter(|_| standing.rows < asked.points);
         let job = Job::new(id.clone(), (asked, spec, wire_options), budget, Some(file), (Some(rows), standing));
         self.kept().insert(id, Arc::clone(&job));
-        match (cancelled, why_not) {
+        match (cancelled, lost.or(why_not)) {
+            (None, Some(why)) if why.code() == Code::DataLoss => job.refuse(&why),
             (Some(end), _) => job.finish(Some(Status::new(Code::from_i32(end.code), end.message))),
             (None, Some(why)) => job.refuse(&why),
             (None, None) => self.crews.start(&job, bundle, options),
@@ -293,10 +310,12 @@ fn room(kept: &BTreeMap<String, Arc<Job>>, owner: &str, limits: &Limits) -> Resu
     if kept.values().filter(counts).count() >= limits.sweeps || kept.len() >= limits.sweeps.saturating_mul(ENDED) {
         return Err(status::limit("sweeps", limits.sweeps, way_out));
     }
-    let own = kept.values().filter(|job| job.asked.owner == owner).count();
+    let own = || kept.values().filter(|job| job.asked.owner == owner);
     match limits.client_sweeps {
         0 => Ok(()),
-        most if own >= most => Err(status::limit("client_sweeps", most, way_out)),
+        most if own().filter(counts).count() >= most || own().count() >= most.saturating_mul(ENDED) => {
+            Err(status::limit("client_sweeps", most, way_out))
+        }
         _ => Ok(()),
     }
 }

@@ -6,10 +6,9 @@
 
 use super::super::limits::Limits;
 use super::super::status;
-use super::super::turns::Turns;
+use super::super::turns::{Party, Turns};
 use super::super::work::caught;
 use super::job::Job;
-use crate::content::Fnv;
 use crate::jobs::sweep::{self, Crew, Pool, SweepError};
 use crate::netlist::Bundle;
 use crate::options::CompileOptions;
@@ -30,7 +29,7 @@ pub(super) struct Crews {
 struct Taken<'a> {
     crews: &'a Crews,
     pool: &'a Pool,
-    client: u64,
+    party: Party,
     stopped: &'a CancellationToken,
     /// Told of each piece that is begun.
     begin: &'a (dyn Fn() + Sync),
@@ -68,11 +67,8 @@ impl Crews {
 
     fn run(&self, job: &Arc<Job>, bundle: &Bundle, options: &CompileOptions) -> Result<bool, SweepError> {
         let pool = self.pool.get_or_init(|| Pool::new(self.places)).as_ref().map_err(Clone::clone)?;
-        let mut client = Fnv::default();
-        client.text(&job.asked.owner);
-        // the upper half only tells more clients apart than there are
-        let client = client.value() as u64;
-        let crew = Taken { crews: self, pool, client, stopped: &job.stopped, begin: &|| job.begin() };
+        let party = Party { client: job.asked.owner.as_str().into(), number: job.asked.sequence };
+        let crew = Taken { crews: self, pool, party, stopped: &job.stopped, begin: &|| job.begin() };
         let known = job.points()?;
         let mut numbers = job.spec.point_numbers()?;
         numbers.retain(|number| !known.contains(number));
@@ -91,7 +87,7 @@ impl Crew for Taken<'_> {
             for number in 0..count {
                 let place = self.crews.runtime.block_on(async {
                     tokio::select! {
-                        place = self.crews.turns.place(self.client) => Some(place),
+                        place = self.crews.turns.place(self.party.clone()) => Some(place),
                         () = self.stopped.cancelled() => None,
                         () = over.cancelled() => None,
                     }
@@ -117,6 +113,10 @@ mod tests {
     use super::*;
     use std::sync::Mutex;
 
+    fn other() -> Party {
+        Party { client: "other".into(), number: 9 }
+    }
+
     /// One place. While it is taken, two jobs of one client and one of another queue up for it. From then on every second piece is the
     /// other's until it is done, and the two of one client alternate.
     #[test]
@@ -128,9 +128,10 @@ mod tests {
         };
         let (pool, order, stopped) =
             (Pool::new(1).expect("a thread"), Mutex::new(String::new()), CancellationToken::new());
-        let jobs = [(1, 'a', 40), (1, 'b', 40), (2, 'c', 10)];
-        let run = |client: u64, job: char, count: usize| {
-            let crew = Taken { crews: &crews, pool: &pool, client, stopped: &stopped, begin: &|| {} };
+        let jobs = [("one", 'a', 40), ("one", 'b', 40), ("two", 'c', 10)];
+        let run = |client: &str, job: char, count: usize| {
+            let party = Party { client: client.into(), number: u64::from(job) };
+            let crew = Taken { crews: &crews, pool: &pool, party, stopped: &stopped, begin: &|| {} };
             crew.run(count, &|_| {
                 let mut order = order.lock().expect("no panic");
                 order.push(job);
@@ -143,7 +144,7 @@ mod tests {
             });
         };
         std::thread::scope(|scope| {
-            let place = runtime.block_on(crews.turns.place(9));
+            let place = runtime.block_on(crews.turns.place(other()));
             for (client, job, count) in jobs {
                 let run = &run;
                 scope.spawn(move || run(client, job, count));
@@ -169,8 +170,14 @@ mod tests {
         let crews = Crews::new(&Limits { analyses: 1, ..Limits::default() });
         let (pool, stopped) = (Pool::new(1).expect("a thread"), CancellationToken::new());
         let place = std::thread::scope(|scope| {
-            let place = scope.spawn(|| runtime.block_on(crews.turns.place(9))).join().expect("no panic");
-            let crew = Taken { crews: &crews, pool: &pool, client: 1, stopped: &stopped, begin: &|| {} };
+            let place = scope.spawn(|| runtime.block_on(crews.turns.place(other()))).join().expect("no panic");
+            let crew = Taken {
+                crews: &crews,
+                pool: &pool,
+                party: Party { client: "one".into(), number: 1 },
+                stopped: &stopped,
+                begin: &|| {},
+            };
             let waits = scope.spawn(move || crew.run(5, &|_| panic!("nothing is begun")));
             while crews.turns.waiting() < 1 {
                 std::thread::yield_now();

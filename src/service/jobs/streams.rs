@@ -2,6 +2,7 @@
 
 use super::super::convert::sweep::row_to_wire;
 use super::super::pace::{CHUNK_BYTES, HEARTBEAT};
+use super::super::shared::Sending;
 use super::super::shutdown::Shutdown;
 use super::super::{proto, status};
 use super::job::Job;
@@ -14,7 +15,7 @@ use std::pin::Pin;
 use std::sync::Arc;
 use std::task::{Context, Poll};
 use std::time::Duration;
-use tokio::sync::{OwnedSemaphorePermit, mpsc, watch};
+use tokio::sync::{mpsc, watch};
 use tokio_stream::Stream;
 use tokio_stream::wrappers::ReceiverStream;
 use tokio_util::sync::WaitForCancellationFutureOwned;
@@ -101,7 +102,7 @@ pub(super) fn watch<T: Send + 'static>(job: Arc<Job>, shutdown: &Shutdown, say: 
 pub(super) fn rows(
     job: Arc<Job>,
     (first, only_finished): (u64, bool),
-    place: OwnedSemaphorePermit,
+    place: Sending,
     shutdown: &Shutdown,
 ) -> RowStream {
     let (sender, receiver) = mpsc::channel(1);
@@ -182,12 +183,12 @@ pub(in super::super) struct TableStream {
     /// Rows sent; none before the first message.
     sent: Option<usize>,
     ending: Pin<Box<WaitForCancellationFutureOwned>>,
-    _place: OwnedSemaphorePermit,
+    _place: Sending,
 }
 
 impl TableStream {
     /// A table from its first row on.
-    pub(super) fn new(table: Arc<SweepTable>, place: OwnedSemaphorePermit, shutdown: &Shutdown) -> Self {
+    pub(super) fn new(table: Arc<SweepTable>, place: Sending, shutdown: &Shutdown) -> Self {
         Self { table, sent: None, ending: Box::pin(shutdown.ending.clone().cancelled_owned()), _place: place }
     }
 

@@ -35,7 +35,12 @@ impl Ports {
         let nothing = Pattern::new(0, &[]);
         Self {
             sources: sources.to_vec(),
-            stages: sources.iter().map(|_| Stages::new(model)).collect(),
+            stages: (sources.iter())
+                .map(|_| {
+                    crate::budget::check();
+                    Stages::new(model)
+                })
+                .collect(),
             tangent: BlockMatrix::new(if sources.is_empty() { &nothing } else { &model.pattern }),
             change: system.electrics.drive(),
             scratch: vec![Pose::zeros(); if sources.is_empty() { 0 } else { model.bodies.len() }],
