@@ -10,24 +10,41 @@ three-dimensional, beam-elements", Comput. Methods Appl. Mech. Engrg. 81 (1990),
 import numpy as np
 from scipy import linalg
 from scipy.sparse import coo_matrix, diags
-from scipy.sparse.linalg import splu
+from scipy.sparse.linalg import eigsh, splu
+
+
+def elements(scene, least):
+    """Elements of each beam: a power of two times `least`, each no longer than half of the length √(EI/F) within which the loads F can bend a
+    beam, up to 256."""
+    force = sum(abs(load.F) for load in scene.loads)
+    counts = []
+    for beam in scene.beams:
+        length = np.hypot(*np.subtract(scene.places[beam.b], scene.places[beam.a]))
+        bending = np.sqrt(scene.E * scene.h * beam.w**3 / 12 / force) if force else np.inf
+        count = least
+        while count < min(256, 2 * length / bending):
+            count *= 2
+        counts.append(count)
+    return counts
 
 
 class Frame:
-    """Beams divided into elements. Coordinates: x [m], y [m], rotation [rad] of each node; `free` selects those that are not anchored."""
+    """Beams divided into elements, `pieces` of each beam. Coordinates: x [m], y [m], rotation [rad] of each node; `free` selects those that are
+    not anchored."""
 
     def __init__(self, scene, pieces):
         self.scene = scene
         places = [np.array(p) for p in scene.places]
         ends, length, angle, ea, ei, rest, mass = [], [], [], [], [], [], []
-        self.inner = []
-        for beam in scene.beams:
+        self.inner, whole = [], []
+        for beam, pieces in zip(scene.beams, [pieces] * len(scene.beams) if isinstance(pieces, int) else pieces):
             a, b = beam.a, beam.b
             chord = places[b] - places[a]
             inner = list(range(len(places), len(places) + pieces - 1))
             places += [places[a] + chord * (k / pieces) for k in range(1, pieces)]
             chain = [a, *inner, b]
             self.inner.append(chain)
+            whole.append(np.hypot(*chord))
             for i, j in zip(chain, chain[1:]):
                 ends.append((i, j))
                 length.append(np.hypot(*chord) / pieces)
@@ -49,7 +66,7 @@ class Frame:
         for load in scene.loads:
             self.load[load.node] += [load.F * np.cos(load.oz), load.F * np.sin(load.oz), load.M]
         self.load = self.load.ravel()
-        self.scale = float(np.mean(self.length)) * pieces
+        self.scale = float(np.mean(whole))
 
     def evaluate(self, u, s=1.0):
         """Residual [N, N·m] and stiffness at the displacements u for the fraction s of loads and temperatures, and the element strains."""
@@ -79,7 +96,7 @@ class Frame:
         G[:, 1, 2] += one
         G[:, 2, 5] += one
         force = np.einsum("mki,mk->mi", G, f)
-        K = np.einsum("mki,mkl,mlj->mij", G, h, G)
+        K = np.swapaxes(G, 1, 2) @ h @ G
         K += (f[:, 0] / l)[:, None, None] * z[:, :, None] * z[:, None, :]
         K += ((f[:, 1] + f[:, 2]) / l**2)[:, None, None] * (r[:, :, None] * z[:, None, :] + z[:, :, None] * r[:, None, :])
         residual = np.zeros(3 * n)
@@ -179,13 +196,13 @@ class Frame:
 
     def stable(self, u, s=1.0):
         """Whether the stiffness at u is positive definite."""
-        K = self.evaluate(u, s)[1].toarray()
-        weight = np.where(self.free % 3 == 2, 1 / self.scale, 1.0)
+        weight = diags(np.where(self.free % 3 == 2, 1 / self.scale, 1.0))
         try:
-            np.linalg.cholesky(K * weight[:, None] * weight[None, :])
-        except np.linalg.LinAlgError:
+            # pivots on the diagonal alone: by Sylvester's law of inertia as many negative ones as negative eigenvalues
+            factor = splu((weight @ self.evaluate(u, s)[1] @ weight).tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+        except RuntimeError:
             return False
-        return True
+        return bool(np.all(factor.perm_r == factor.perm_c) and np.all(factor.U.diagonal() > 0))
 
     def follow(self, first=1.0, smallest=2e-3):
         """The stable path from rest: (displacements, fraction reached). It ends where stability is lost within `smallest` of the present load."""
@@ -305,11 +322,13 @@ class Frame:
 
     def frequencies(self, u, count, s=1.0):
         """The lowest natural frequencies [Hz] about u."""
-        K = self.evaluate(u, s)[1].toarray()
-        M = self.mass(u).toarray()
-        weight = np.where(self.free % 3 == 2, 1 / self.scale, 1.0)
-        both = weight[:, None] * weight[None, :]
-        values = linalg.eigh(K * both, M * both, eigvals_only=True, subset_by_index=[0, min(count, len(K)) - 1])
+        weight = diags(np.where(self.free % 3 == 2, 1 / self.scale, 1.0))
+        K, M = (weight @ matrix @ weight for matrix in (self.evaluate(u, s)[1], self.mass(u)))
+        n = len(self.free)
+        if n > 4 * count + 100:
+            values = np.sort(eigsh(K.tocsc(), count, M.tocsc(), sigma=0.0, v0=np.ones(n), return_eigenvectors=False))
+        else:
+            values = linalg.eigh(K.toarray(), M.toarray(), eigvals_only=True, subset_by_index=[0, min(count, n) - 1])
         return np.sqrt(np.maximum(values, 0)) / (2 * np.pi)
 
     def modes_at_rest(self):

@@ -50,6 +50,8 @@ pub enum AnalysisError {
     NoEquilibrium {
         /// Where it stopped and why.
         detail: String,
+        /// Beams whose segments bent so far there that shorter ones are needed, by index; empty where that is not the reason.
+        coarse: Vec<usize>,
     },
     /// The structure can move without any stiffness against it.
     #[error("singular structure: {detail}")]
@@ -116,7 +118,9 @@ impl From<crate::solve::SolveError> for AnalysisError {
         use crate::solve::SolveError;
         match error {
             SolveError::Singular { .. } => Self::Singular { detail: error.to_string() },
-            SolveError::Lost { .. } => Self::NoEquilibrium { detail: error.to_string() },
+            SolveError::Lost { ref coarse, .. } => {
+                Self::NoEquilibrium { detail: error.to_string(), coarse: coarse.clone() }
+            }
             SolveError::StepTooSmall { t, dt, .. } | SolveError::StepFailed { t, dt, .. } => {
                 Self::StepFailed { t, dt, detail: error.to_string() }
             }

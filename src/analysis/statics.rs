@@ -204,7 +204,8 @@ pub(crate) fn operating_point(compiled: &Compiled, voltages: &PortVoltages) -> R
     let sources = source_vector(compiled, voltages)?;
     let rest = vec![0.0; sources.len()];
     let q = vec![Pose::zeros(); compiled.parts.system.bodies()];
-    settle(compiled, q, sources, (&rest, [0.0, 1.0]), EquilibriumOptions::default())
+    let options = EquilibriumOptions::with_side(compiled.options.other_branch);
+    settle(compiled, q, sources, (&rest, [0.0, 1.0]), options)
 }
 
 /// The equilibrium next to `q`; that reached from rest where there is none, and then true.
@@ -215,7 +216,7 @@ pub(crate) fn operating_point_near(
 ) -> Result<(OperatingPoint, bool), AnalysisError> {
     let sources = source_vector(compiled, voltages)?;
     // another branch than that of `q` is of no use
-    let options = EquilibriumOptions { stop_at_fold: true, ..EquilibriumOptions::default() };
+    let options = EquilibriumOptions { stop_at_fold: true, ..Default::default() };
     match settle(compiled, q, sources.clone(), (&sources, [1.0, 1.0]), options) {
         Ok(point) if point.path.reached == 1.0 => Ok((point, false)),
         _ => Ok((operating_point(compiled, voltages)?, true)),

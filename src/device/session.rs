@@ -119,7 +119,7 @@ impl Session {
             signals,
             states: States::default(),
             first_step,
-            equilibrium: Equilibrium::new(system, EquilibriumOptions::default()),
+            equilibrium: Equilibrium::new(system, EquilibriumOptions::with_side(compiled.options.other_branch)),
             motion: Motion::zeros(n),
             rise: vec![0.0; heaters],
             rise_slope: vec![0.0; heaters],

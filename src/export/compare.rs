@@ -236,7 +236,7 @@ impl Exact {
             (Some(token), Status::Ok) => token,
             (_, status) => {
                 let detail = if let Status::Fail(text) = status { text } else { "no answer".into() };
-                return Err(crate::analysis::AnalysisError::NoEquilibrium { detail }.into());
+                return Err(crate::analysis::AnalysisError::NoEquilibrium { detail, coarse: Vec::new() }.into());
             }
         };
         let signals: Vec<f64> = request.signals.iter().map(|(_, scale)| *scale).collect();

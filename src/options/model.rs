@@ -95,6 +95,10 @@ options! {
     /// drawing's size; negative: to the other side. Lets what is compressed beyond buckling take a branch.
     imperfection: Option<f64> = None, "imperfection" = 12, ["1"], Range::Within(-0.1, 0.1), "none: as drawn";
 
+    /// At a bifurcation, where two sides are alike, take the other one: of the beams that bend most, the first of the netlist goes to the right of its
+    /// drawn direction instead of the left.
+    other_branch: bool = false, "other_branch" = 15, [""], Range::Flag, "";
+
     /// As SUGAR 2 computes, in one switch: linear, beams that meet in points (junctions=centreline), gaps between facing beams along
     /// the straight lines between their ends, beams in modes as stiff as drawn whatever they bear. `bimorph modes` takes one cubic
     /// element for each beam then.

@@ -51,6 +51,8 @@ pub enum SolveError {
         passed: String,
         /// Why there is none beyond.
         reason: String,
+        /// Beams whose segments bent so far there that shorter ones are needed, by index.
+        coarse: Vec<usize>,
     },
     /// The integrator's steps became too small.
     #[error(

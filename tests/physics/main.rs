@@ -30,6 +30,7 @@ mod responses;
 mod run_errors;
 mod scenes;
 mod schemes;
+mod sharp_bends;
 mod small_parts;
 mod stability_losses;
 mod swung;

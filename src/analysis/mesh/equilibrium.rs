@@ -16,6 +16,7 @@ use super::super::{AnalysisError, BeamMotions, PortVoltages};
 use super::finer::MOST_NEAR_LIMIT;
 use super::hidden::{Hidden, hidden};
 use super::meshed::{chosen, meshed, on};
+use super::refined::Refinement;
 use super::softening;
 use super::warnings::{near_buckling, of_fingers, of_heat, of_segments, of_stress};
 use crate::compile::Compiled;
@@ -29,9 +30,6 @@ use std::borrow::Cow;
 /// Share of the mechanism's size below which a displacement is rounding.
 pub(super) const ROUNDING: f64 = 1e-12;
 
-/// How often all segments are doubled where a mesh has no equilibrium.
-const MAX_DOUBLINGS: usize = 5;
-
 /// Share of the path beyond which a fold that it passed is looked for anew on each mesh: the one before may have passed it by mistake.
 const NEAR_THE_END: f64 = 0.9;
 
@@ -44,21 +42,19 @@ pub(super) fn order(
     if chosen(compiled) {
         return estimated(compiled, voltages, segments);
     }
-    let (mut segments, mut doublings, mut lost) = (segments, 0, None);
+    let (mut segments, mut refinement, mut lost) = (segments, Refinement::default(), None);
     loop {
         let mut search = Search::new(compiled, voltages);
         let from = segments.clone();
         let order = match doubling::fit(&compiled.structure, &compiled.options, segments, &mut |s| search.follow(s)) {
-            // a leg in one piece may bear nothing that one in two does, and a segment far from its chord is none of a beam
-            Err(error @ AnalysisError::NoEquilibrium { .. }) if doublings < MAX_DOUBLINGS => {
-                segments = doubling::doubled(&compiled.options, &from, |_| true);
-                if segments == from || segments.iter().sum::<usize>() > MOST_NEAR_LIMIT {
-                    return Err(error);
+            Err(error @ AnalysisError::NoEquilibrium { .. }) => match refinement.next(compiled, &from, &error) {
+                Some(finer) => {
+                    segments = finer;
+                    lost = Some(error);
+                    continue;
                 }
-                doublings += 1;
-                lost = Some(error);
-                continue;
-            }
+                None => return Err(error),
+            },
             Err(error) => return Err(lost.unwrap_or(error)),
             Ok(order) => order,
         };
@@ -68,12 +64,19 @@ pub(super) fn order(
             None => match search.ended(order)? {
                 (_, _, Some(buckled)) if buckled != from => segments = buckled,
                 (order, point, _) => {
-                    let beyond = |model: &Compiled| Equilibrium::beyond_beams(&model.parts.system, &point.q).is_some();
-                    return match lost.take() {
-                        // a mesh fine enough stretches whatever is drawn; that is no beam
-                        Some(error) if beyond(&*meshed(compiled, &order.segments)?) => Err(error),
-                        _ => Ok((order, point)),
-                    };
+                    let Some(mut error) = lost.take() else { return Ok((order, point)) };
+                    let model = meshed(compiled, &order.segments)?;
+                    let system = &model.parts.system;
+                    // a segment that is too long for its bend may stretch and be stable: that is no beam
+                    if Equilibrium::beyond_beams(system, &point.q).is_none() {
+                        return Ok((order, point));
+                    }
+                    if let AnalysisError::NoEquilibrium { coarse, .. } = &mut error {
+                        *coarse = Equilibrium::coarse_beams(system, &point.q);
+                    }
+                    let Some(finer) = refinement.next(compiled, &order.segments, &error) else { return Err(error) };
+                    segments = finer;
+                    lost = Some(error);
                 }
             },
         }

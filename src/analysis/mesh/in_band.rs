@@ -22,6 +22,7 @@ use super::super::harmonic::{BEYOND, GUARDS, HarmonicOptions, HarmonicResult, ha
 use super::super::{AnalysisError, Watch};
 use super::equilibrium::told_of_static;
 use super::meshed::{chosen, meshed, on};
+use super::refined::refining;
 use crate::compile::Compiled;
 use crate::discretize::DiscretizeError;
 use crate::refine::counted;
@@ -68,6 +69,10 @@ pub fn harmonic_fitted(
 
 /// The model on the mesh for a response.
 pub(super) fn fitted(compiled: &Compiled, options: &HarmonicOptions) -> Result<Compiled, AnalysisError> {
+    refining(compiled, |compiled| fitted_from(compiled, options))
+}
+
+fn fitted_from(compiled: &Compiled, options: &HarmonicOptions) -> Result<Compiled, AnalysisError> {
     let fewer =
         HarmonicOptions { signals: options.signals.iter().take(MOST_SIGNALS).cloned().collect(), ..options.clone() };
     // every name is looked up once, whatever is compared

@@ -27,6 +27,7 @@ mod meshed;
 mod mode_pairs;
 mod path;
 mod pull_in;
+mod refined;
 mod seen;
 mod softening;
 mod swung;

@@ -9,6 +9,7 @@ use super::super::statics::operating_point;
 use super::super::{AnalysisError, PortVoltages, Watch};
 use super::equilibrium::{ROUNDING, SMALL, size};
 use super::meshed::{chosen, meshed, on};
+use super::refined::refining;
 use super::warnings::of_stress;
 use crate::compile::Compiled;
 use crate::refine::doubling::{self, Output};
@@ -27,6 +28,15 @@ const OTHER_BRANCH: f64 = 0.3;
 /// # Errors
 /// See [`trace`].
 pub fn path_fitted(
+    compiled: &Compiled,
+    request: &ContinuationRequest<'_>,
+    watch: Watch<'_>,
+) -> Result<(Compiled, ContinuationResult), AnalysisError> {
+    refining(compiled, |compiled| path_from(compiled, request, &mut *watch))
+}
+
+/// The path on the mesh of the model or on the one that it needs beyond that.
+fn path_from(
     compiled: &Compiled,
     request: &ContinuationRequest<'_>,
     watch: Watch<'_>,

@@ -5,6 +5,7 @@ use super::super::linear_stress::left_out;
 use super::super::pull_in::{PullInResult, pull_in, pull_in_with};
 use super::super::statics::operating_point;
 use super::meshed::{chosen, meshed, on};
+use super::refined::refining;
 use super::warnings::of_stress;
 use crate::compile::Compiled;
 use crate::netlist::Diagnostic;
@@ -55,6 +56,10 @@ pub(super) fn for_pull_in(
     port: Option<&str>,
     max: f64,
 ) -> Result<(ModelOrder, OfMeshes), AnalysisError> {
+    refining(compiled, |compiled| pull_in_from(compiled, port, max))
+}
+
+fn pull_in_from(compiled: &Compiled, port: Option<&str>, max: f64) -> Result<(ModelOrder, OfMeshes), AnalysisError> {
     let mut known: OfMeshes = Vec::new();
     let mut analyse = |segments: &[usize]| {
         let model = meshed(compiled, segments)?;

@@ -127,6 +127,7 @@ impl Sweep<'_> {
         }
         Err(AnalysisError::NoEquilibrium {
             detail: format!("no release found after {MAX_LIMIT_POINTS} folds of the closed branch"),
+            coarse: Vec::new(),
         })
     }
 

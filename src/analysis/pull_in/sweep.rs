@@ -60,7 +60,7 @@ impl<'a> Sweep<'a> {
             system,
             off,
             source,
-            equilibrium: Equilibrium::new(system, EquilibriumOptions::default()),
+            equilibrium: Equilibrium::new(system, EquilibriumOptions::with_side(compiled.options.other_branch)),
             jumped: None,
             rest: Vec::new(),
             passed: Vec::new(),
@@ -130,7 +130,7 @@ impl<'a> Sweep<'a> {
         let port = &self.system.electrics.names[self.source];
         let detail =
             format!("no pull-in found after {MAX_LIMIT_POINTS} folds of the open branch, at {port} = {from:.6} V");
-        Err(AnalysisError::NoEquilibrium { detail })
+        Err(AnalysisError::NoEquilibrium { detail, coarse: Vec::new() })
     }
 
     /// Why there is no pull-in up to `max`, for a part that is at `q` before the last piece of its way.
@@ -144,7 +144,8 @@ impl<'a> Sweep<'a> {
             Some(shut) => format!("`{}` is closed already before that", gap(shut)),
             None => "raise the largest voltage; a comb's force does not grow as it closes: it pulls nothing in".into(),
         };
-        AnalysisError::NoEquilibrium { detail: format!("{name} pulls nothing in up to {max} V; {way_out}") }
+        let detail = format!("{name} pulls nothing in up to {max} V; {way_out}");
+        AnalysisError::NoEquilibrium { detail, coarse: Vec::new() }
     }
 
     /// Sentences about jumps on the way and about the closed branch.

@@ -3,7 +3,7 @@
 use super::fall::Unsettled;
 use super::loss::MAX_LOSSES;
 use super::{Equilibrium, Path};
-use crate::domains::{Domain, System};
+use crate::domains::{BeamLine, Domain, System};
 use crate::multibody::factor::ZeroPivot;
 use crate::multibody::planar::Pose;
 use crate::solve::SolveError;
@@ -12,6 +12,8 @@ use crate::solve::SolveError;
 const UNHELD: f64 = 1e8;
 /// Rotation of the end of a segment from its chord beyond which its law means nothing [rad].
 const TURNED: f64 = 1.0;
+/// Rotation of an end of a segment from its chord, and between its ends, beyond which a refusal asks for shorter segments [rad].
+const COARSE: [f64; 2] = [0.7, 1.0];
 /// Axial strain beyond which a segment is no beam [1].
 const CRUSHED: f64 = 0.3;
 /// Longest displacement of a part that is still there, in lengths of the longest beam.
@@ -20,12 +22,14 @@ const GONE: f64 = 100.0;
 impl Equilibrium {
     /// The reason why the search ended at the displacement `q` beyond the last stable equilibrium at `share`.
     pub(super) fn lost(&mut self, system: &System, share: f64, why: Unsettled, done: &Path, q: &[Pose]) -> SolveError {
+        let coarse = Self::coarse_beams(system, q);
         let reason = (self.touching_without_contact(system, q))
             .or_else(|| Self::beyond_beams(system, q))
             .or_else(|| self.unheld(system, q))
             .or_else(|| self.gone(system, q))
+            .or_else(|| Self::folded(system, &coarse))
             .unwrap_or_else(|| self.unsettled(system, why, q));
-        Self::refused(share, done, reason)
+        Self::refused(share, done, reason, coarse)
     }
 
     /// A load that is far more than the part bears.
@@ -34,7 +38,7 @@ impl Equilibrium {
         let reason = format!(
             "\"{body}\" is deformed so far there that rounding hides what resists it: the load is too large for this part"
         );
-        Self::refused(share, done, reason)
+        Self::refused(share, done, reason, Vec::new())
     }
 
     /// A path that loses stability again and again.
@@ -42,15 +46,15 @@ impl Equilibrium {
         let reason = format!(
             "{MAX_LOSSES} stability losses lie below that load, as where a part is crumpled: the load is far beyond what the part bears"
         );
-        Self::refused(share, done, reason)
+        Self::refused(share, done, reason, Vec::new())
     }
 
-    fn refused(share: f64, done: &Path, reason: String) -> SolveError {
+    fn refused(share: f64, done: &Path, reason: String, coarse: Vec<usize>) -> SolveError {
         let first = done.passed.first().map(|passed| passed.share);
         let passed = first.map_or(String::new(), |first| {
             format!(" (the part as drawn loses its stability at {first:.4} of the load)")
         });
-        SolveError::Lost { share, passed, reason }
+        SolveError::Lost { share, passed, reason, coarse }
     }
 
     fn touching_without_contact(&self, system: &System, q: &[Pose]) -> Option<String> {
@@ -89,6 +93,24 @@ impl Equilibrium {
         } else {
             format!("{place} comes to a strain of {strain:.2} where the search ended: the load is beyond beams")
         })
+    }
+
+    /// Beams with segments that bend farther than their law describes well, by index.
+    pub fn coarse_beams(system: &System, q: &[Pose]) -> Vec<usize> {
+        let linear = system.model.linear;
+        let bends = |beam: &BeamLine, k: usize| {
+            let [a, b] = beam.segment(k, q, linear).turns;
+            a.abs().max(b.abs()) > COARSE[0] || (a - b).abs() > COARSE[1]
+        };
+        let coarse = |beam: &BeamLine| !linear && (0..beam.segments()).any(|k| bends(beam, k));
+        system.beams.iter().enumerate().filter(|(_, beam)| coarse(beam)).map(|(k, _)| k).collect()
+    }
+
+    fn folded(system: &System, coarse: &[usize]) -> Option<String> {
+        let beam = &system.beams[*coarse.first()?].name;
+        Some(format!(
+            "beam {beam} folds within a segment where the search ended: finer segments are needed (--segments), or the load is beyond beams"
+        ))
     }
 
     fn gone(&self, system: &System, q: &[Pose]) -> Option<String> {

@@ -44,6 +44,10 @@ class Options(TypedDict, total=False):
     share of the drawing's size; negative: to the other side. Lets what is compressed beyond buckling take a
     branch. Range: -0.1 to 0.1; default: none: as drawn."""
 
+    other_branch: bool | None
+    """At a bifurcation, where two sides are alike, take the other one: of the beams that bend most, the first of
+    the netlist goes to the right of its drawn direction instead of the left."""
+
     as_sugar: bool | None
     """As SUGAR 2 computes, in one switch: linear, beams that meet in points (junctions=centreline), gaps between
     facing beams along the straight lines between their ends, beams in modes as stiff as drawn whatever they
@@ -70,6 +74,7 @@ WIRE = {
     "shear": "shear",
     "rotary_inertia": "rotary_inertia",
     "imperfection": "imperfection",
+    "other_branch": "other_branch",
     "as_sugar": "as_sugar",
     "without_circuit": "without_circuit",
     "formulation": "formulation",

@@ -1,0 +1,100 @@
+//! Loads that bend beams within a length far below theirs: the equilibrium is found on segments as short as that takes, in falls that follow
+//! curved valleys of the energy, and on either branch of a bifurcation.
+
+use super::{balance, close, model, node};
+use bimorph::analysis::mesh::{modes_fitted, static_fitted};
+use bimorph::compile::CompileOptions;
+use bimorph::domains::System;
+use bimorph::multibody::planar::Pose;
+use bimorph::solve::equilibrium::{Equilibrium, EquilibriumOptions, LossKind, Path};
+use bimorph::solve::path::SourcePath;
+use std::f64::consts::PI;
+
+/// A cantilever 100 µm long that a force F pulls at 150° from its axis, √(EI/F) = 1 µm, 100th of its length: all of it but the clamp lies along the
+/// force. The long elastica has (∂θ/∂s)² = 2·F·(1 − cos θ)/EI and therefore, with θ₀ the angle at the clamp and ℓ = √(EI/F), its tip at
+/// L − 2ℓ·(1 − cos ½θ₀) along the force and 2ℓ·sin ½θ₀ across it (closed form). The force stretches it by 0.3 % and its own bend by as much.
+#[test]
+fn a_beam_bends_at_its_clamp_alone() {
+    let (length, bend, angle) = (100e-6, 1e-6, 150f64.to_radians());
+    let rigidity = 165e9 * 2e-6 * 0.2e-6f64.powi(3) / 12.0;
+    let force = rigidity / (bend * bend);
+    let text = format!("anchor p1 [a] []\nbeam2d p1 [a b] [l=100u w=0.2u]\nf2d * [b] [F={force:e} oz={angle}]");
+    let compiled = model(&text, &CompileOptions::default());
+    let (fitted, result, _) = static_fitted(&compiled, &[]).unwrap();
+    let tip = node(&result, "b");
+    let (x, y) = (length + tip.x, tip.y);
+    let along = x * angle.cos() + y * angle.sin();
+    let across = y * angle.cos() - x * angle.sin();
+    close(along, (1.0 + force / (165e9 * 0.4e-12)) * length - 2.0 * bend * (1.0 - (0.5 * angle).cos()), 2e-4);
+    close(across.abs(), 2.0 * bend * (0.5 * angle).sin(), 1e-2);
+    assert!(fitted.order.segments[0] >= 64, "{:?}", fitted.order.segments);
+    assert!(result.estimated_error.unwrap() <= 1e-3, "{:?}", result.estimated_error);
+    // the modes are about that state, on a mesh that has it: those of a string of length L under the force F, n·√(F/m)/(2L) with one free end
+    let (_, modes, _) = modes_fitted(&compiled, 1, &[]).unwrap();
+    let string = (force / (2300.0 * 0.4e-12)).sqrt() / (4.0 * length);
+    // the clamp shortens it by about ℓ, and its free end is stiff against shear by about as much
+    assert!((modes.frequencies_hz[0] / string - 1.0).abs() < 0.05, "{} {string}", modes.frequencies_hz[0]);
+}
+
+/// A frame of slender beams whose corner a force pulls around: the first loss of stability leads across most of its size.
+const FRAME: &str = "
+    anchor p1 [a] []
+    beam2d p1 [a b] [l=95u w=0.45u oz=-1.0]
+    beam2d p1 [a c] [l=104u w=0.5u oz=0.9]
+    beam2d p1 [b d] [l=130u w=3.6u oz=-2.31]
+    beam2d p1 [d e] [l=212u w=0.95u oz=-0.105]
+    beam2d p1 [e c] [w=0.47u]
+    beam2d p1 [c b] [w=1.3u]
+    beam2d p1 [d a] [w=3.7u]
+    anchor p1 [b] []
+    f2d * [e] [F=6e-5 oz=5.03]";
+
+/// Follows all loads from rest with a budget for falls.
+fn loaded(system: &System, fall_steps: usize) -> (Vec<Pose>, Path) {
+    let electrics = &system.electrics;
+    let sources = vec![0.0; electrics.sources()];
+    let path = SourcePath::new(electrics, &sources, &sources, [0.0, 1.0]);
+    let mut q = vec![Pose::zeros(); system.bodies()];
+    let mut solver = Equilibrium::new(system, EquilibriumOptions { fall_steps, ..EquilibriumOptions::default() });
+    let done = solver.follow(system, &path, &mut q).unwrap();
+    (q, done)
+}
+
+/// Where the trust region spends its budget, viscous steps end in the same equilibrium, for fewer factorizations than the trust region takes with ten
+/// times the budget.
+#[test]
+fn viscous_steps_fall_to_the_same_equilibrium() {
+    let compiled = model(FRAME, &CompileOptions { segments: Some(16), ..CompileOptions::default() });
+    let system = &compiled.parts.system;
+    let (straight, long) = loaded(system, 20_000);
+    let (curved, short) = loaded(system, 150);
+    assert!(!long.passed.is_empty() && long.passed.len() == short.passed.len(), "{long:?} {short:?}");
+    assert!(short.iterations < long.iterations, "{} {}", short.iterations, long.iterations);
+    let size = straight.iter().map(|p| p.x.hypot(p.y)).fold(0.0, f64::max);
+    for (a, b) in straight.iter().zip(&curved) {
+        assert!((a.x - b.x).hypot(a.y - b.y) < 1e-7 * size, "{a} {b}");
+    }
+}
+
+/// A column under 1.9 of Euler's load leans to the left of its drawn direction, and with `other_branch` to the right: mirror images, 1e-9 apart.
+#[test]
+fn the_other_branch_is_the_mirror_image() {
+    let euler = PI.powi(2) * (165e9 * 2e-6 * 1e-18 / 12.0) / (4.0 * 200e-6f64.powi(2));
+    let text = format!(
+        "anchor p1 [a] []\ncolumn beam2d p1 [a b] [l=200u w=1u oz=pi/2]\nf2d * [b] [F={:e} oz=-pi/2]",
+        1.9 * euler
+    );
+    let on = |other_branch: bool| {
+        balance(&model(&text, &CompileOptions { segments: Some(8), other_branch, ..CompileOptions::default() }), &[])
+    };
+    let (left, right) = (on(false), on(true));
+    for (result, direction) in [(&left, "column to the left"), (&right, "column to the right")] {
+        let [passed] = result.passed.as_slice() else { panic!("{:?}", result.passed) };
+        assert!(passed.kind == LossKind::Bifurcation && passed.direction == direction, "{passed:?}");
+    }
+    let (left, right) = (node(&left, "b"), node(&right, "b"));
+    assert!(left.x < -50e-6, "{left:?}");
+    close(right.x, -left.x, 1e-9);
+    close(right.y, left.y, 1e-9);
+    close(right.rz, -left.rz, 1e-9);
+}
