@@ -1,13 +1,10 @@
-//! Loads that bend beams within a length far below theirs: the equilibrium is found on segments as short as that takes, in falls that follow
-//! curved valleys of the energy, and on either branch of a bifurcation.
+//! Loads that bend beams within a length far below theirs: the equilibrium is found on segments as short as that takes. Either branch of a bifurcation
+//! can be chosen.
 
 use super::{balance, close, model, node};
 use bimorph::analysis::mesh::{modes_fitted, static_fitted};
 use bimorph::compile::CompileOptions;
-use bimorph::domains::System;
-use bimorph::multibody::planar::Pose;
-use bimorph::solve::equilibrium::{Equilibrium, EquilibriumOptions, LossKind, Path};
-use bimorph::solve::path::SourcePath;
+use bimorph::solve::equilibrium::LossKind;
 use std::f64::consts::PI;
 
 /// A cantilever 100 µm long that a force F pulls at 150° from its axis, √(EI/F) = 1 µm, 100th of its length: all of it but the clamp lies along the
@@ -34,46 +31,6 @@ fn a_beam_bends_at_its_clamp_alone() {
     let string = (force / (2300.0 * 0.4e-12)).sqrt() / (4.0 * length);
     // the clamp shortens it by about ℓ, and its free end is stiff against shear by about as much
     assert!((modes.frequencies_hz[0] / string - 1.0).abs() < 0.05, "{} {string}", modes.frequencies_hz[0]);
-}
-
-/// A frame of slender beams whose corner a force pulls around: the first loss of stability leads across most of its size.
-const FRAME: &str = "
-    anchor p1 [a] []
-    beam2d p1 [a b] [l=95u w=0.45u oz=-1.0]
-    beam2d p1 [a c] [l=104u w=0.5u oz=0.9]
-    beam2d p1 [b d] [l=130u w=3.6u oz=-2.31]
-    beam2d p1 [d e] [l=212u w=0.95u oz=-0.105]
-    beam2d p1 [e c] [w=0.47u]
-    beam2d p1 [c b] [w=1.3u]
-    beam2d p1 [d a] [w=3.7u]
-    anchor p1 [b] []
-    f2d * [e] [F=6e-5 oz=5.03]";
-
-/// Follows all loads from rest with a budget for falls.
-fn loaded(system: &System, fall_steps: usize) -> (Vec<Pose>, Path) {
-    let electrics = &system.electrics;
-    let sources = vec![0.0; electrics.sources()];
-    let path = SourcePath::new(electrics, &sources, &sources, [0.0, 1.0]);
-    let mut q = vec![Pose::zeros(); system.bodies()];
-    let mut solver = Equilibrium::new(system, EquilibriumOptions { fall_steps, ..EquilibriumOptions::default() });
-    let done = solver.follow(system, &path, &mut q).unwrap();
-    (q, done)
-}
-
-/// Where the trust region spends its budget, viscous steps end in the same equilibrium, for fewer factorizations than the trust region takes with ten
-/// times the budget.
-#[test]
-fn viscous_steps_fall_to_the_same_equilibrium() {
-    let compiled = model(FRAME, &CompileOptions { segments: Some(16), ..CompileOptions::default() });
-    let system = &compiled.parts.system;
-    let (straight, long) = loaded(system, 20_000);
-    let (curved, short) = loaded(system, 150);
-    assert!(!long.passed.is_empty() && long.passed.len() == short.passed.len(), "{long:?} {short:?}");
-    assert!(short.iterations < long.iterations, "{} {}", short.iterations, long.iterations);
-    let size = straight.iter().map(|p| p.x.hypot(p.y)).fold(0.0, f64::max);
-    for (a, b) in straight.iter().zip(&curved) {
-        assert!((a.x - b.x).hypot(a.y - b.y) < 1e-7 * size, "{a} {b}");
-    }
 }
 
 /// A column under 1.9 of Euler's load leans to the left of its drawn direction, and with `other_branch` to the right: mirror images, 1e-9 apart.

@@ -29,6 +29,7 @@ def test_every_option_reaches_the_server(client: bimorph.Client) -> None:
         {"formulation": "rcr"},
         {"imperfection": 1e-3},
         {"as_sugar": True},
+        {"other_branch": True},
         {"without_circuit": True},
     ]
     assert {name for other in others for name in other} == set(bimorph.Options.__annotations__)
