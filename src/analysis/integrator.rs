@@ -93,6 +93,16 @@ impl Integrator {
         !matches!(self, Self::Radau5 | Self::Rk45)
     }
 
+    /// True for methods that gain energy without bound where parts touch: they take forces at points of a step, and a contact that begins
+    /// inside it gives back more than it took.
+    pub fn gains_in_contact(self) -> bool {
+        match self {
+            Self::Midpoint | Self::Newmark => true,
+            Self::GeneralizedAlpha { rho } => rho > 0.0,
+            Self::Rodas4 | Self::AverageField | Self::TrBdf2 | Self::Radau5 | Self::Rk45 | Self::Sdirk4 => false,
+        }
+    }
+
     /// Advances `motion` over bodies from the start of the ramp to its end; `h` is the first step to try [s]. Methods without an
     /// error estimate go by step doubling under [`Control::Tolerance`]. The work is told even where it ends in an error.
     #[allow(clippy::too_many_arguments)]

@@ -1,5 +1,6 @@
 //! The verbs that every front shares: the command, the service and sweeps call these and nothing below.
 
+pub mod after_contact;
 pub mod backbending;
 pub mod chart;
 pub(crate) mod contact_range;

@@ -114,7 +114,7 @@ fn first<T>(
 ) -> Result<Made<T>, AnalysisError> {
     let unknowns = model.unknowns() as f64;
     let long = Cell::new(options.points * options.signals.len() > MOST_KEPT);
-    let (mut kept, mut picked) = (Kept::default(), Picked::new(options, usize::MAX));
+    let (mut kept, mut picked) = (Kept::default(), Picked::new(options));
     let mut keep = |t: f64, values: &[f64]| {
         picked.add(values);
         if long.get() {
@@ -160,7 +160,7 @@ fn sharper<T>(
             break;
         }
         let options = TransientOptions { tol: ratio * made.tol, ..options.clone() };
-        let (mut kept, mut picked) = (Kept::default(), Picked::new(&options, usize::MAX));
+        let (mut kept, mut picked) = (Kept::default(), Picked::new(&options));
         let mut keep = |t: f64, values: &[f64]| {
             picked.add(values);
             kept.keep(t, values);

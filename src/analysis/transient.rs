@@ -22,9 +22,9 @@ use crate::solve::time::defect::{Estimated, SeeError};
 use crate::solve::time::method::{Motion, Work};
 use crate::solve::time::rodas4::Rodas4;
 pub use first_step::first_step;
-pub use options::TransientOptions;
+pub use options::{TransientOptions, Until};
 use record::{Carrier, record};
-pub use result::{Counters, Event, TransientResult};
+pub use result::{Counters, Event, Statistics, TransientResult};
 
 /// The bodies' own coordinates, joints as springs.
 struct Compliant<'a> {

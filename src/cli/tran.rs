@@ -13,7 +13,7 @@ use bimorph::analysis::integrator::Integrator;
 use bimorph::analysis::joint_transient::{JointReport, joint_transient};
 use bimorph::analysis::mesh::fitted_in_time;
 use bimorph::analysis::step_error::with_step_error;
-use bimorph::analysis::transient::{TransientOptions, TransientResult, transient};
+use bimorph::analysis::transient::{TransientOptions, TransientResult, Until, transient};
 use bimorph::compile::{Compiled, Formulation};
 use bimorph::multibody::relative::Unfit;
 use bimorph::options::Value;
@@ -28,16 +28,17 @@ use std::path::PathBuf;
 /// Signals: NODE.x, NODE.y [m], NODE.rz [rad], NODE.vx, NODE.vy [m/s], NODE.vrz [rad/s], BEAM.T [K], GAP.q [C], GAP.gap [m], GAP.C [F], GAP.F [N].
 /// JSON: "t" [s]; "signals": samples by name in SI; "units" by name; "method"; "counters": the work done; "events":
 /// crossings of --event levels and contacts of gaps, each with its time "t" [s] and "direction" up or down; "formulation",
-/// "estimated_error" by the mesh, "step_error" by the steps, of the amplitude; and for rcr "joint_coordinates": n, m, evaluations near singular configurations, largest gap of a loop [m].
+/// "estimated_error" by the mesh, "step_error" by the steps, of the amplitude; "stopped_at" [s] with --until; "reliable_until" [s], up to when
+/// the tolerance holds after contact (null: to the end), and "after_contact", the statistics of each signal from there on; and for rcr "joint_coordinates": n, m, evaluations near singular configurations, largest gap of a loop [m].
 #[derive(Debug, Args)]
 #[command(after_help = "Methods, with their orders; steps follow --tol, or are equal with --step:\n  \
     rodas4 (4)             the default: one factorization a step; fast motions die out\n  \
     radau5 (5)             the most accurate; one real and one complex factorization a step; fast motions die out\n  \
     tr-bdf2 (2)            cheap and robust; fast motions die out\n  \
-    generalized-alpha (2)  fast motions damped as chosen: --rho 0 (at once) to 1 (not at all)\n  \
+    generalized-alpha (2)  fast motions damped as chosen: --rho 0 (at once) to 1 (not at all); 0 alone for parts that touch\n  \
     avf (2)                keeps the energy of an undamped motion, whatever the step\n  \
-    midpoint (2)           keeps the energy on average\n  \
-    newmark (2)            average acceleration; may gain energy when steps are long\n  \
+    midpoint (2)           keeps the energy on average; not for parts that touch\n  \
+    newmark (2)            average acceleration; may gain energy when steps are long; not for parts that touch\n  \
     sdirk4 (4)             five implicit stages; fast motions die out\n  \
     rk45 (5)               explicit: tiny steps, and needs inertia in every direction\n\
 Joint coordinates (--formulation rcr, rcr-elastic) have rodas4, the default, with loops closed by springs; and rk45, tr-bdf2,\n\
@@ -94,6 +95,10 @@ pub(crate) struct Tran {
     #[arg(long = "event", value_name = "NAME=LEVEL", value_parser = value::volts)]
     events: Vec<(String, f64)>,
 
+    /// End the run when parts touch (contact), part again (release), or a signal crosses a level in its SI unit (SIGNAL=VALUE)
+    #[arg(long, value_name = "EVENT", value_parser = value::until)]
+    until: Option<Until>,
+
     /// Draw the moving mechanism: a page with a slider (.html), or its last state (.svg, .png)
     #[arg(long, value_name = "FILE")]
     draw: Option<PathBuf>,
@@ -138,6 +143,7 @@ impl Tran {
             method,
             step: self.step,
             events: self.events.clone(),
+            until: self.until.clone(),
             solver: self.solver.linear(),
             estimate: false,
             keep: true,
@@ -172,6 +178,9 @@ impl Tran {
             formulation_taken: taken.clone(),
             unknowns: result.unknowns,
             step_error: result.step_error,
+            stopped_at: result.stopped_at,
+            reliable_until: result.reliable_until,
+            after_contact: &result.after_contact,
             solver: self.solver,
             release: self.release.as_deref(),
             port_voltages_v: Named(&self.ports),
@@ -200,6 +209,7 @@ impl Tran {
                 ("--step", self.step.is_some()),
                 ("--rho", self.rho.is_some()),
                 ("--event", !self.events.is_empty()),
+                ("--until", self.until.is_some()),
             ];
             if let Some((option, _)) = given.iter().find(|(_, given)| *given) {
                 let got = "--solver frame, which moves by Newmark's rule with steps of its own".to_owned();

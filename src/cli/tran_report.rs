@@ -5,7 +5,7 @@ use super::model::{Context, Named};
 use super::report;
 use super::solver::SolverChoice;
 use bimorph::analysis::joint_transient::JointReport;
-use bimorph::analysis::transient::{Counters, Event, TransientResult};
+use bimorph::analysis::transient::{Counters, Event, Statistics, TransientResult};
 use bimorph::compile::Compiled;
 use bimorph::results::plot::axis::quantity;
 use bimorph::results::plot::chart::{self, Chart, Panel, Series};
@@ -27,6 +27,9 @@ pub(super) struct Document<'a> {
     pub(super) formulation_taken: Option<String>,
     pub(super) unknowns: usize,
     pub(super) step_error: Option<f64>,
+    pub(super) stopped_at: Option<f64>,
+    pub(super) reliable_until: Option<f64>,
+    pub(super) after_contact: &'a [Statistics],
     pub(super) solver: SolverChoice,
     pub(super) release: Option<&'a str>,
     pub(super) port_voltages_v: Named<'a, f64>,
@@ -103,6 +106,15 @@ pub(super) fn text(
     let crossed = |name: &str, level: f64| result.events.iter().any(|e| e.signal == name && e.level == level);
     for (name, level) in asked.iter().filter(|(name, level)| !crossed(name, *level)) {
         events.push_str(&format!("{name} does not cross {level:e}\n"));
+    }
+    if let Some(t) = result.stopped_at {
+        events.push_str(&format!("stopped at {}\n", quantity(t, "s")));
+    }
+    let unit = |name: &str| result.signals.iter().find(|(n, ..)| n == name).map_or("", |(_, unit, _)| unit);
+    for s in &result.after_contact {
+        let [mean, error, rms] = [s.mean, s.mean_error, s.rms].map(|x| quantity(x, unit(&s.signal)));
+        let [from, to] = [s.from, s.to].map(|t| quantity(t, "s"));
+        events.push_str(&format!("{} from {from} to {to}: mean {mean} ± {error}, rms about it {rms}\n", s.signal));
     }
     let work = match joints {
         None => format!("{} factorizations, {} solves", c.factorizations, c.solves),

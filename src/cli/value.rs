@@ -1,5 +1,6 @@
 //! Values on the command line: numbers with netlist suffixes, `NAME=VALUE`, lists of names.
 
+use bimorph::analysis::transient::Until;
 use bimorph::jobs::sweep;
 use bimorph::netlist::Setting;
 
@@ -22,6 +23,18 @@ pub(crate) fn setting(text: &str) -> Result<(String, Setting), String> {
 pub(crate) fn volts(text: &str) -> Result<(String, f64), String> {
     let (name, value) = pair(text)?;
     Ok((name, number(&value)?))
+}
+
+/// What a run goes on until: `contact`, `release` or `SIGNAL=VALUE`.
+pub(crate) fn until(text: &str) -> Result<Until, String> {
+    match text {
+        "contact" => Ok(Until::Contact),
+        "release" => Ok(Until::Release),
+        _ => match volts(text) {
+            Ok((name, level)) => Ok(Until::Level(name, level)),
+            Err(_) => Err(format!("expected contact, release or SIGNAL=VALUE, got \"{text}\"")),
+        },
+    }
 }
 
 fn pair(text: &str) -> Result<(String, String), String> {
@@ -75,6 +88,9 @@ mod tests {
         // in a netlist a comment would begin there
         assert!(number("0.1%").is_err() && volts("heat=200%").is_err() && setting("w=50%").is_err());
         assert_eq!(setting("w='50%'"), Ok(("w".into(), Setting::Text("50%".into()))));
+        assert_eq!(until("contact"), Ok(Until::Contact));
+        assert_eq!(until("a(8).y=-0.5u"), Ok(Until::Level("a(8).y".into(), -0.5e-6)));
+        assert!(until("closing").is_err() && until("a.y=").is_err());
         assert!(volts("heat=ten").is_err() && setting("w").is_err() && setting("=1").is_err());
         assert_eq!(scaled("yoke.y:1M"), ("yoke.y".into(), Some(1e6)));
         assert_eq!(scaled("odd:name"), ("odd:name".into(), None));

@@ -16,6 +16,7 @@
 
 pub mod agitation;
 mod answer;
+mod contact_steps;
 mod contract;
 mod growth;
 mod half_cycles;

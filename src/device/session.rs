@@ -1,6 +1,7 @@
 //! What is open of a device: its ports, its signals, its states, and the storage that every trial reuses.
 
 use super::agitation::Shaken;
+use super::contact_steps::ContactSteps;
 use super::growth::{Difference, Growth};
 use super::ports::Ports;
 use super::ringing::Ringing;
@@ -59,6 +60,8 @@ pub(super) struct Session {
     /// How fast the last trial's motion grows at fixed voltages.
     pub(super) growth: Growth,
     pub(super) difference: Difference,
+    /// Steps of the point at hand where parts touch.
+    pub(super) contact_steps: ContactSteps,
 }
 
 /// Doubles for each port and body: stages, displacements, velocities, and those of states that are kept.
@@ -136,6 +139,7 @@ impl Session {
             ringing: Ringing::default(),
             growth: Growth::default(),
             difference: Difference::new(n),
+            contact_steps: ContactSteps::default(),
         };
         Ok((session, description))
     }

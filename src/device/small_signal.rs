@@ -263,6 +263,7 @@ impl Session {
         if self.linear.as_ref().is_none_or(|(t, _)| *t != token) {
             let mut tangent = BlockMatrix::new(&system.model.pattern);
             system.tangent(&state.q, &self.drive, &mut tangent, &mut self.motion.q);
+            self.harmonic.about(system, &state.q);
             self.linear = Some((token, tangent));
         }
         let Some((_, tangent)) = &self.linear else { return Err(DeviceError::NotOpen) };

@@ -3,6 +3,7 @@
 
 use super::agitation::Shaken;
 use super::answer::STEP_SHARE;
+use super::contact_steps::{ContactSteps, MAX_ERROR, near};
 use super::growth::{Bound, rate_along};
 use super::session::Session;
 use super::states::Snapshot;
@@ -84,21 +85,8 @@ impl Session {
         let own = self.ports.system.clone();
         let system = Self::system(&own, compiled);
         self.fill_sources(&system.electrics, request.voltages);
-        let from: Vec<f64> = match parent {
-            Some(p) => {
-                self.motion.q.copy_from_slice(&p.q);
-                self.motion.v.copy_from_slice(&p.v);
-                self.rise.copy_from_slice(&p.rise);
-                p.sources.clone()
-            }
-            None => {
-                self.motion.q.fill(Pose::zeros());
-                self.motion.v.fill(Pose::zeros());
-                self.rise.fill(0.0);
-                vec![0.0; self.sources.len()]
-            }
-        };
-        self.stepper.method.begin(parent.map_or(&[], |p| &p.carried));
+        let rest = vec![0.0; self.sources.len()];
+        let from = parent.map_or(rest, |p| p.sources.clone());
         let electrics = &system.electrics;
         if let Some(shaken) = &mut self.shaken {
             let start = parent.map_or(0.0, |p| p.elapsed);
@@ -107,27 +95,38 @@ impl Session {
                 return;
             }
         }
+        let tol = STEP_SHARE * compiled.options.tol;
+        let kept = parent.is_some_and(|parent| self.keep_steps(system, (request, parent), &from, tol));
+        self.begin(parent);
         let push = self.shaken.as_ref().map_or(&[][..], Shaken::mean);
-        let ramp = Ramp::new(electrics, &from, &self.sources, &self.rise, request.dt).pushed(push);
-        let mut h = parent.map_or(self.first_step, |p| p.next_step);
-        let advanced = self.stepper.advance(
-            &mut Bodies::weighed(system, &ramp, &self.weights),
-            &mut self.motion,
-            &mut h,
-            Control::Tolerance(STEP_SHARE * compiled.options.tol),
-            MAX_INTERNAL_STEPS,
-            &mut |_, _, _, _| true,
-        );
-        match advanced {
-            // the observer below never stops it
-            Ok(Advance::Done | Advance::Stopped) => {}
-            Ok(Advance::OutOfSteps(reached)) => {
-                reply.status = Status::NeedDt(f64::max(0.5 * reached, 1e-3 * request.dt));
-                return;
-            }
-            Err(error) => {
-                reply.status = Status::Fail(error.begun_at(request.t - request.dt).to_string());
-                return;
+        let mut ramp = Ramp::new(electrics, &from, &self.sources, &self.rise, request.dt).pushed(push);
+        let mut h = self.contact_steps.next;
+        let ends = &self.contact_steps.ends;
+        let bodies = &mut Bodies::weighed(system, &ramp, &self.weights);
+        if !(kept && self.stepper.along(bodies, &mut self.motion, ends, (tol, MAX_ERROR))) {
+            self.begin(parent);
+            h = parent.map_or(self.first_step, |p| p.next_step);
+            let push = self.shaken.as_ref().map_or(&[][..], Shaken::mean);
+            ramp = Ramp::new(electrics, &from, &self.sources, &self.rise, request.dt).pushed(push);
+            let advanced = self.stepper.advance(
+                &mut Bodies::weighed(system, &ramp, &self.weights),
+                &mut self.motion,
+                &mut h,
+                Control::Tolerance(tol),
+                MAX_INTERNAL_STEPS,
+                &mut |_, _, _, _| true,
+            );
+            match advanced {
+                // the observer above never stops it
+                Ok(Advance::Done | Advance::Stopped) => {}
+                Ok(Advance::OutOfSteps(reached)) => {
+                    reply.status = Status::NeedDt(f64::max(0.5 * reached, 1e-3 * request.dt));
+                    return;
+                }
+                Err(error) => {
+                    reply.status = Status::Fail(error.begun_at(request.t - request.dt).to_string());
+                    return;
+                }
             }
         }
         if let Err(error) = within_contact_range(compiled, &self.motion.q) {
@@ -148,6 +147,62 @@ impl Session {
             Bound::Next(longest) => reply.dt_next = reply.dt_next.min(longest),
             Bound::This(longest) => (reply.status, reply.token) = (Status::NeedDt(longest), None),
         }
+    }
+
+    /// The state that a trial starts from.
+    fn begin(&mut self, parent: Option<&Snapshot>) {
+        match parent {
+            Some(p) => {
+                self.motion.q.copy_from_slice(&p.q);
+                self.motion.v.copy_from_slice(&p.v);
+                self.rise.copy_from_slice(&p.rise);
+            }
+            None => {
+                self.motion.q.fill(Pose::zeros());
+                self.motion.v.fill(Pose::zeros());
+                self.rise.fill(0.0);
+            }
+        }
+        self.stepper.method.begin(parent.map_or(&[], |p| &p.carried));
+    }
+
+    /// The steps that all trials of a point take, see [`super::contact_steps`]. False where each takes its own.
+    fn keep_steps(
+        &mut self,
+        system: &System,
+        (request, parent): (&Trial<'_>, &Snapshot),
+        from: &[f64],
+        tol: f64,
+    ) -> bool {
+        let Some(state) = request.parent.filter(|_| near(system, &parent.q, &parent.v, request.dt)) else {
+            return false;
+        };
+        if self.contact_steps.is_of(state, request.dt) {
+            return !self.contact_steps.ends.is_empty();
+        }
+        self.begin(Some(parent));
+        let push = self.shaken.as_ref().map_or(&[][..], Shaken::mean);
+        let ramp = Ramp::new(&system.electrics, from, from, &self.rise, request.dt).pushed(push);
+        let (mut h, mut touches) = (parent.next_step, system.contact_energy(&parent.q) > 0.0);
+        let ContactSteps { ends, next, .. } = &mut self.contact_steps;
+        let advanced = self.stepper.advance(
+            &mut Bodies::weighed(system, &ramp, &self.weights),
+            &mut self.motion,
+            &mut h,
+            Control::Tolerance(tol),
+            MAX_INTERNAL_STEPS,
+            &mut |t, step, _, after| {
+                ends.push(t + step);
+                touches |= system.contact_energy(&after.q) > 0.0;
+                true
+            },
+        );
+        if !touches || !matches!(advanced, Ok(Advance::Done)) {
+            ends.clear();
+        } else if let Some(last) = ends.last_mut() {
+            (*last, *next) = (request.dt, h);
+        }
+        !ends.is_empty()
     }
 
     /// Rate at which the motion at the end of a trial grows at fixed voltages [1/s]; 0 where nothing shows that it does.

@@ -28,6 +28,7 @@
 
 pub(crate) mod bar;
 pub mod beam;
+mod contact_mass;
 pub mod cubic;
 mod error;
 mod excess;
@@ -169,14 +170,11 @@ pub fn discretize_like(
         Some(other) => Arc::clone(&other.system.electrics),
         None => Arc::new(ports::lay(structure, &heaters, &gaps, &rigid)?),
     };
-    let narrowest = structure.beams.iter().map(|b| b.width).fold(f64::INFINITY, f64::min);
-    let gap_scale = structure.plate_gaps.iter().map(|g| g.gap).chain(structure.combs.iter().map(|c| c.gap));
-    let scale = gap_scale.fold(narrowest, f64::min);
     if rigid.bodies.is_empty() {
         return Err(DiscretizeError::NothingMoves);
     }
     budget::lay_out(rigid.bodies.len() * BODY_BYTES);
-    let bodies = rigid.finish_bodies();
+    let bodies = contact_mass::weighed(rigid.finish_bodies(), &gaps, options);
     for joint in &mut joints {
         rigid.center(joint.a, joint.b, &mut joint.frame);
     }
@@ -185,22 +183,23 @@ pub fn discretize_like(
     }
     couplings.extend(coupled.iter().flat_map(Coupling::pairs));
     let (model, place) = Model::new(bodies, joints, dampers, &couplings, options.linear);
-    let placed = |id: BodyId| if let BodyId::Free(k) = id { BodyId::Free(place[k]) } else { id };
     for Coupling { first, second, .. } in &mut coupled {
+        let placed = |id: BodyId| if let BodyId::Free(k) = id { BodyId::Free(place[k]) } else { id };
         (*first, *second) = ((placed(first.0), placed(first.1)), (placed(second.0), placed(second.1)));
     }
     let model = model.couple(coupled);
     let moved = |p: Point| rigid.centered(p, &place);
     let gap_names = gaps.iter().filter(|laid| laid.member.is_gap()).map(|laid| laid.name.to_owned()).collect();
     let beams: Vec<Arc<[Point]>> = beams.into_iter().map(|points| points.into_iter().map(moved).collect()).collect();
-    let system = System {
+    let mut system = System {
         beams: Arc::new(structure.beams.iter().zip(&beams).map(|(drawn, points)| line(drawn, points)).collect()),
         model,
         members: gaps.into_iter().map(|laid| laid.member.moved(&moved)).collect(),
         loads: loads.into_iter().map(|l| Load { point: moved(l.point), ..l }).collect(),
         electrics,
-        length_scale: if scale.is_finite() { scale } else { 1e-6 },
+        length_scale: length_scale(structure),
     };
+    system.settle_impacts();
     let nodes =
         (0..structure.nodes.len()).map(|n| structure.nodes[n].mechanical.then(|| moved(rigid.point(n)))).collect();
     let offsets = ends.beams.iter().map(|[a, b]| [a.offset, b.offset]).collect();
@@ -212,6 +211,14 @@ impl Discretized {
     pub fn beyond_table(&self, structure: &Structure) -> Option<junction_limits::Beyond> {
         junction_limits::beyond(structure, &self.ends)
     }
+}
+
+/// The smallest width of a beam, or gap of plates and combs [m]; 1 µm without any.
+fn length_scale(structure: &Structure) -> f64 {
+    let narrowest = structure.beams.iter().map(|b| b.width).fold(f64::INFINITY, f64::min);
+    let gaps = structure.plate_gaps.iter().map(|g| g.gap).chain(structure.combs.iter().map(|c| c.gap));
+    let scale = gaps.fold(narrowest, f64::min);
+    if scale.is_finite() { scale } else { 1e-6 }
 }
 
 /// The centreline of a beam.

@@ -106,6 +106,33 @@ impl Approach {
         m.gradient.fixed_rows::<3>(0).dot(&da) + m.gradient.fixed_rows::<3>(3).dot(&db)
     }
 
+    /// Rate of u where it was measured, with the rate of each body [m/s].
+    #[inline]
+    pub(super) fn rate(&self, m: &Measured, rate: &impl Fn(usize) -> Pose) -> f64 {
+        let of = |id: BodyId| if let BodyId::Free(k) = id { rate(k) } else { Pose::zeros() };
+        m.gradient.fixed_rows::<3>(0).dot(&of(self.a.body)) + m.gradient.fixed_rows::<3>(3).dot(&of(self.b.body))
+    }
+
+    /// Derivatives over the pair of a force l(u, u̇) along u: with displacements its symmetric part, and with rates.
+    pub(super) fn rate_tangent(
+        &self,
+        m: &Measured,
+        rate: &impl Fn(usize) -> Pose,
+        (value, by_u, by_rate): (f64, f64, f64),
+    ) -> [Matrix6<f64>; 2] {
+        let turn = |id: BodyId| if let BodyId::Free(k) = id { rate(k).z } else { 0.0 };
+        let mut stiffness = m.hessian(value, by_u);
+        // ∂u̇/∂q has the two rotations alone
+        for (i, turned) in [(2, m.bend[0] * turn(self.a.body)), (5, m.bend[1] * turn(self.b.body))] {
+            let half = m.gradient * (0.5 * by_rate * turned);
+            for k in 0..6 {
+                stiffness[(k, i)] += half[k];
+                stiffness[(i, k)] += half[k];
+            }
+        }
+        [stiffness, m.gradient * m.gradient.transpose() * by_rate]
+    }
+
     /// The forces of that potential on its points: −φ′·n on a, φ′·n on b.
     pub(super) fn levers(&self, first: f64, mut lever: impl FnMut(Point, Vector2<f64>)) {
         lever(self.a, self.axis * -first);

@@ -5,8 +5,8 @@
 //! ```text
 //! forces ∂Π/∂q      tangent ∂²Π/∂q²      change of the forces with what drives it ∂²Π/∂q∂u      charge −∂Π/∂u
 //! ```
-//! Damping is linear and constant, and belongs to the mechanism: a domain hands its dampers over when it is laid
-//! ([`super::drawn::Drawn::dampers`]), and every integrator, frequency response and noise has them. Only heat has states of its own
+//! Constant damping belongs to the mechanism: a domain hands its dampers over when it is laid ([`super::drawn::Drawn::dampers`]), and
+//! every integrator, frequency response and noise has them. A force that depends on rates beside is that of [`Domain::add_loss`]. Only heat has states of its own
 //! ([`super::lag`]): temperatures follow voltages alone, so that they come before the mechanism and not with it.
 //!
 //! Nothing here is called through a pointer: [`super::member::Member`] is one of the registered domains, chosen by a `match`.
@@ -14,6 +14,7 @@
 use super::approach::{Approach, Point};
 use super::capacitor::Capacitor;
 use super::contact::Contact;
+use super::contact_loss::Loss;
 use super::stop::Stop;
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, BodyId, Pattern};
@@ -26,6 +27,15 @@ pub struct At<'a> {
     pub q: &'a [Pose],
     /// Small displacements about the drawing.
     pub linear: bool,
+}
+
+/// A step of length `h` [s]: its start, middle and end.
+#[derive(Debug, Clone, Copy)]
+pub struct Chord<'a> {
+    /// Configurations at the start, the middle and the end.
+    pub at: [At<'a>; 3],
+    /// Length [s].
+    pub h: f64,
 }
 
 /// A law of one approach, as other simulators can write it down.
@@ -171,6 +181,53 @@ pub trait Domain {
     fn contact_work(&self, at: At<'_>, dq: &[Pose]) -> f64 {
         let _ = (at, dq);
         0.0
+    }
+
+    /// What its contact loses; none: it has no contact.
+    fn loss(&self) -> Option<Loss> {
+        None
+    }
+
+    /// Replaces it.
+    fn set_loss(&mut self, loss: Loss) {
+        let _ = loss;
+    }
+
+    /// `r +=` a load that closes its contact as drawn, of any size. Returns how far its parts fall, as [`super::contact_speed`] takes it [m].
+    fn add_closing(&self, at: At<'_>, r: &mut [Pose]) -> f64 {
+        let _ = (at, r);
+        0.0
+    }
+
+    /// `r +=` the force that rates add to ∂Π/∂q where contact loses energy, `rate` the rate of each body.
+    fn add_loss(&self, at: At<'_>, rate: &impl Fn(usize) -> Pose, r: &mut [Pose]) {
+        let _ = (at, rate, r);
+    }
+
+    /// Adds the derivatives of that force with displacements to `stiffness` and with rates to `damping`. True where there are any.
+    fn add_loss_tangent(
+        &self,
+        at: At<'_>,
+        rate: &impl Fn(usize) -> Pose,
+        pattern: &Pattern,
+        stiffness: &mut BlockMatrix<f64, 3>,
+        damping: &mut BlockMatrix<f64, 3>,
+    ) -> bool {
+        let _ = (at, rate, pattern, stiffness, damping);
+        false
+    }
+
+    /// Adds its discrete force over a step, loss included, and the symmetric part of the tangent with the end of the step.
+    fn add_quotient(
+        &self,
+        chord: &Chord<'_>,
+        given: Self::Given,
+        pattern: &Pattern,
+        r: &mut [Pose],
+        tangent: &mut BlockMatrix<f64, 3>,
+    ) {
+        self.add_force(chord.at[1], given, r);
+        self.add_tangent(chord.at[1], given, pattern, tangent);
     }
 
     /// What it is a function of, and how, where that is one approach.

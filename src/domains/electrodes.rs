@@ -3,12 +3,14 @@
 use super::approach::{Approach, Point};
 use super::capacitor::{Capacitance, Capacitor};
 use super::contact::{Contact, touching_distance};
-use super::domain::{At, Domain, Law};
+use super::contact_loss::{Loss, fall_at_pull_in};
+use super::domain::{At, Chord, Domain, Law};
 use super::drawn::{Drawing, Drawn};
+use super::quotient::{self, quotient};
 use crate::multibody::model::locate;
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, BodyId, Pattern};
-use crate::structure::GapVoltage;
+use crate::structure::{GapVoltage, Impact};
 use nalgebra::Vector2;
 
 /// Two electrodes.
@@ -20,12 +22,28 @@ pub struct Electrodes {
     pub capacitor: Capacitor,
     /// How they touch; none: never.
     pub contact: Option<Contact>,
+    /// What an impact loses.
+    pub loss: Loss,
 }
 
 impl Electrodes {
     /// The force of contact with the distance left at approach `u` [N], and its derivative [N/m].
     fn pressed(&self, u: f64) -> (f64, f64) {
         self.contact.map_or((0.0, 0.0), |contact| contact.force(self.capacitor.distance(u)))
+    }
+}
+
+impl Electrodes {
+    /// What rates add to that force at approach `u` that changes at `rate` [m/s], and its derivatives with both.
+    fn lost(&self, (u, rate): (f64, f64)) -> (f64, f64, f64) {
+        let (force, slope) = self.pressed(u);
+        let (added, by_rate) = self.loss.fraction(rate);
+        (force * added, -slope * added, force * by_rate)
+    }
+
+    /// True where its contact loses energy.
+    fn loses(&self, at: At<'_>) -> bool {
+        self.loss.acts() && self.contact.is_some_and(|contact| self.distance(at) < contact.touch)
     }
 }
 
@@ -37,14 +55,16 @@ impl Drawn for Electrodes {
             let slope = comb.gaps * comb.permittivity * comb.height / comb.gap;
             let overlap = if comb.finite { comb.overlap } else { f64::INFINITY };
             let capacitor = Capacitor::Comb { slope, overlap, blend: comb.gap, parasitic: comb.parasitic };
-            put(&comb.name, Some(&comb.voltage), Self { approach, capacitor, contact: None });
+            let loss = Loss::new(&Impact::default());
+            put(&comb.name, Some(&comb.voltage), Self { approach, capacitor, contact: None, loss });
         }
         for plate in &drawing.structure.plate_gaps {
             let approach = drawing.approach(plate.a, plate.b, plate.axis);
             let contact = Contact { touch: plate.touch.unwrap_or(touching_distance(plate.gap)), area: plate.area };
             let strength = plate.permittivity * plate.area;
             let capacitor = Capacitor::Plates { strength, gap: plate.gap, closest: contact.least() };
-            put(&plate.name, Some(&plate.voltage), Self { approach, capacitor, contact: Some(contact) });
+            let loss = Loss::new(&plate.impact);
+            put(&plate.name, Some(&plate.voltage), Self { approach, capacitor, contact: Some(contact), loss });
         }
     }
 
@@ -148,6 +168,78 @@ impl Domain for Electrodes {
     fn contact_work(&self, at: At<'_>, dq: &[Pose]) -> f64 {
         let force = self.contact.map_or(0.0, |contact| contact.force(self.distance(at)).0);
         if force == 0.0 { 0.0 } else { force * self.distance_change(at, dq) }
+    }
+
+    fn loss(&self) -> Option<Loss> {
+        self.contact.map(|_| self.loss)
+    }
+
+    fn set_loss(&mut self, loss: Loss) {
+        self.loss = loss;
+    }
+
+    fn add_closing(&self, at: At<'_>, r: &mut [Pose]) -> f64 {
+        self.add_force_change(at, 1.0, -1.0, r);
+        self.contact.map_or(0.0, |contact| fall_at_pull_in(self.distance(at), contact.touch))
+    }
+
+    fn add_loss(&self, at: At<'_>, rate: &impl Fn(usize) -> Pose, r: &mut [Pose]) {
+        if self.loses(at) {
+            let m = self.approach.measure(at.q, at.linear);
+            self.approach.add_force(&m, self.lost((m.value, self.approach.rate(&m, rate))).0, r);
+        }
+    }
+
+    fn add_loss_tangent(
+        &self,
+        at: At<'_>,
+        rate: &impl Fn(usize) -> Pose,
+        pattern: &Pattern,
+        stiffness: &mut BlockMatrix<f64, 3>,
+        damping: &mut BlockMatrix<f64, 3>,
+    ) -> bool {
+        if !self.loses(at) {
+            return false;
+        }
+        let m = self.approach.measure(at.q, at.linear);
+        let lost = self.lost((m.value, self.approach.rate(&m, rate)));
+        let [k, c] = self.approach.rate_tangent(&m, rate, lost);
+        let place = locate(pattern, self.approach.a.body, self.approach.b.body);
+        place.add(stiffness, &k);
+        place.add(damping, &c);
+        true
+    }
+
+    fn add_quotient(
+        &self,
+        chord: &Chord<'_>,
+        volts: f64,
+        pattern: &Pattern,
+        r: &mut [Pose],
+        tangent: &mut BlockMatrix<f64, 3>,
+    ) {
+        let factor = -0.5 * volts * volts;
+        let law = |u0: f64, u1: f64| {
+            let field = |u: f64| {
+                let Capacitance { slope, curvature, .. } = self.capacitor.at(u);
+                (factor * slope, factor * curvature)
+            };
+            let ends = [u0, u1].map(|u| (u, factor * self.capacitor.at(u).value));
+            let (mut force, mut slope) = quotient(ends[0], ends[1], field);
+            if let Some(contact) = self.contact {
+                let pressed = |u: f64| {
+                    let (force, slope) = contact.force(self.capacitor.distance(u));
+                    (force, -slope)
+                };
+                let ends = [u0, u1].map(|u| (u, contact.energy(self.capacitor.distance(u))));
+                let (mean, by_end) = quotient(ends[0], ends[1], pressed);
+                let (added, by_rate) = self.loss.fraction((u1 - u0) / chord.h);
+                force += mean * (1.0 + added);
+                slope += by_end * (1.0 + added) + mean * by_rate / chord.h;
+            }
+            (force, slope)
+        };
+        quotient::add(&self.approach, chord, law, pattern, r, tangent);
     }
 
     fn law(&self) -> Option<(&Approach, Law)> {

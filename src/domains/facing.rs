@@ -52,7 +52,7 @@ impl Facing {
             value += c;
             gradient += n * slope;
             if self.chord {
-                let m = measure(node);
+                let m = self.measure(node);
                 hessian += (n * m.transpose() + m * n.transpose()) * (0.5 * curvature);
             } else {
                 hessian += n * (n * curvature).transpose();
@@ -92,9 +92,8 @@ impl Facing {
     fn field(&self, z: &Vector4<f64>, mut see: impl FnMut(&Abscissa, [f64; 3])) {
         let closest = self.least();
         let (scaled, along) = (z.component_mul(&self.scale()), self.strength * self.length);
-        let rule: &[Abscissa] = if self.alone { &GAUSS_6 } else { &GAUSS_3 };
-        for node in rule {
-            let n = if self.chord { measure(node) } else { Vector4::from(node.shape) };
+        for node in self.gauss() {
+            let n = self.measure(node);
             let g = self.gap + n.dot(&scaled);
             let d = g.max(closest);
             let (inverse, k) = (1.0 / d, along * node.weight);
@@ -111,17 +110,33 @@ impl Facing {
 
     /// What the shape functions of a unit length take z by.
     #[inline]
-    fn scale(&self) -> Vector4<f64> {
+    pub(super) fn scale(&self) -> Vector4<f64> {
         Vector4::new(1.0, self.length, 1.0, self.length)
     }
 
     /// The distance at a point of a rule [m].
     #[inline]
-    fn distance(&self, node: &Abscissa, z: &Vector4<f64>) -> f64 {
+    pub(super) fn distance(&self, node: &Abscissa, z: &Vector4<f64>) -> f64 {
         self.gap + Vector4::from(node.shape).dot(&z.component_mul(&self.scale()))
     }
 
-    fn lobatto(&self) -> &'static [Abscissa] {
+    /// The rule of the field.
+    #[inline]
+    pub(super) fn gauss(&self) -> &'static [Abscissa] {
+        if self.alone { &GAUSS_6 } else { &GAUSS_3 }
+    }
+
+    /// The weights with which the gap is measured at a point of that rule, of a unit length.
+    #[inline]
+    pub(super) fn measure(&self, node: &Abscissa) -> Vector4<f64> {
+        match self.chord {
+            true => Vector4::new(1.0 - node.at, 0.0, node.at, 0.0),
+            false => Vector4::from(node.shape),
+        }
+    }
+
+    /// The rule of the contact.
+    pub(super) fn lobatto(&self) -> &'static [Abscissa] {
         if self.alone { &LOBATTO_9 } else { &LOBATTO_5 }
     }
 
@@ -145,7 +160,8 @@ impl Facing {
         self.gap + least >= self.touch
     }
 
-    fn piece(&self, weight: f64) -> Contact {
+    /// The contact that a point of that rule of some weight stands for.
+    pub(super) fn piece(&self, weight: f64) -> Contact {
         Contact { touch: self.touch, area: self.height * self.length * weight }
     }
 
@@ -201,11 +217,6 @@ impl Facing {
         }
         self.lobatto().iter().map(|node| self.piece(node.weight).energy(self.distance(node, z))).sum()
     }
-}
-
-/// The weights with which the gap along a straight line is measured, of a unit length.
-fn measure(node: &Abscissa) -> Vector4<f64> {
-    Vector4::new(1.0 - node.at, 0.0, node.at, 0.0)
 }
 
 #[cfg(test)]

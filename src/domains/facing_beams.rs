@@ -3,158 +3,19 @@
 
 use super::approach::Point;
 use super::contact::touching_distance;
-use super::domain::{At, Domain};
+use super::contact_loss::{Loss, fall_at_pull_in};
+use super::domain::{At, Chord, Domain};
 use super::drawn::{Drawing, Drawn};
 use super::facing::Facing;
-use super::facing_side::{Deflection, Flank, Opening, Walk, back, onto, values};
+pub use super::facing_local::FacingBeams;
+use super::facing_local::SIGNS;
+use super::facing_loss;
+use super::facing_side::{Opening, back};
 use super::facing_stretches::{BeamRows, Stretch, stretches};
 use crate::multibody::planar::Pose;
-use crate::multibody::{BlockMatrix, BodyId, Pattern};
+use crate::multibody::{BlockMatrix, BodyId, Model, Pattern};
 use crate::structure::GapVoltage;
-use nalgebra::{Matrix4, Vector2, Vector4};
-
-/// Facing beams: the upper side runs from a to b, the lower one from c to d.
-#[derive(Debug, Clone, PartialEq)]
-pub struct FacingBeams {
-    /// Direction in which the gap opens.
-    pub frame: Opening,
-    /// The upper side, then the lower one.
-    pub sides: [Flank; 2],
-    /// From a to b.
-    stretches: Vec<Stretch>,
-}
-
-/// A stretch at a configuration.
-struct Local<'a> {
-    stretch: &'a Stretch,
-    /// Its relative end displacements and slopes.
-    z: Vector4<f64>,
-    /// The ends of its segments, upper then lower.
-    ends: [&'a [Deflection; 2]; 2],
-}
-
-/// The sides' parts in a relative displacement.
-const SIGNS: [f64; 2] = [1.0, -1.0];
-
-impl FacingBeams {
-    /// Calls `each` for the stretches in turn.
-    #[inline(always)]
-    fn along(&self, at: At<'_>, mut each: impl FnMut(&Local<'_>)) {
-        let mut upper = Walk::new(self.frame, &self.sides[0], at.q, at.linear);
-        let mut lower = Walk::new(self.frame, &self.sides[1], at.q, at.linear);
-        for stretch in &self.stretches {
-            let ends = [upper.to(stretch.segments[0]), lower.to(stretch.segments[1])];
-            let part = |side: usize| match self.sides[side].fixed {
-                true => Vector4::zeros(),
-                false => onto(&stretch.weights[side], values(ends[side])),
-            };
-            each(&Local { stretch, z: part(0) - part(1), ends });
-        }
-    }
-
-    /// The sum of `of` over the stretches.
-    #[inline]
-    fn sum(&self, at: At<'_>, mut of: impl FnMut(&Local<'_>) -> f64) -> f64 {
-        let mut sum = 0.0;
-        self.along(at, |local| sum += of(local));
-        sum
-    }
-
-    /// The sides that move.
-    #[inline]
-    fn moving(&self) -> impl Iterator<Item = usize> + use<> {
-        let fixed = [self.sides[0].fixed, self.sides[1].fixed];
-        (0..2).filter(move |side| !fixed[*side])
-    }
-
-    /// The points at the ends of a stretch's segments.
-    #[inline]
-    fn points(&self, stretch: &Stretch, side: usize) -> [&Point; 2] {
-        let segment = stretch.segments[side];
-        [&self.sides[side].stations[segment].point, &self.sides[side].stations[segment + 1].point]
-    }
-
-    /// `r +=` the forces of what is `first` per z.
-    #[inline]
-    fn add(&self, local: &Local<'_>, first: Vector4<f64>, r: &mut [Pose]) {
-        for side in self.moving() {
-            let first = back(&local.stretch.weights[side], first) * SIGNS[side];
-            for (end, point) in self.points(local.stretch, side).into_iter().enumerate() {
-                if let BodyId::Free(k) = point.body {
-                    r[k] += self.frame.force(&local.ends[side][end], [first[2 * end], first[2 * end + 1]]);
-                }
-            }
-        }
-    }
-
-    /// Change of z.
-    fn change(&self, local: &Local<'_>, dq: &[Pose]) -> Vector4<f64> {
-        let [upper, lower] = [0, 1].map(|side| {
-            let points = self.points(local.stretch, side);
-            let [a, b] = [0, 1].map(|end| self.frame.change(&local.ends[side][end], points[end], dq));
-            onto(&local.stretch.weights[side], Vector4::new(a[0], a[1], b[0], b[1]))
-        });
-        upper - lower
-    }
-
-    /// The stretch with the smallest distance, that distance [m], and its derivative with z.
-    fn closest(&self, at: At<'_>, mut each: impl FnMut(&Local<'_>, f64, Vector4<f64>)) {
-        let mut least = f64::INFINITY;
-        self.along(at, |local| {
-            let (distance, weights) = local.stretch.facing.closest(&local.z);
-            if distance < least {
-                least = distance;
-                each(local, distance, weights);
-            }
-        });
-    }
-
-    /// `tangent +=` what `first` and `second` per z of a stretch add.
-    #[inline]
-    fn add_stiffness(
-        &self,
-        local: &Local<'_>,
-        (first, second): (Vector4<f64>, Matrix4<f64>),
-        pattern: &Pattern,
-        tangent: &mut BlockMatrix<f64, 3>,
-    ) {
-        let weights = &local.stretch.weights;
-        for (one, other) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-            if self.sides[one].fixed || self.sides[other].fixed {
-                continue;
-            }
-            let ids = [one, other].map(|side| self.points(local.stretch, side).map(|point| point.body));
-            let mut h = second * (SIGNS[one] * SIGNS[other]);
-            if let Some(weights) = &weights[one] {
-                h = weights.tr_mul(&h);
-            }
-            if let Some(weights) = &weights[other] {
-                h *= **weights;
-            }
-            for (i, j) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-                let (BodyId::Free(row), BodyId::Free(column)) = (ids[0][i], ids[1][j]) else { continue };
-                if row < column {
-                    continue;
-                }
-                let part = h.fixed_view::<2, 2>(2 * i, 2 * j).into_owned();
-                let block = self.frame.block(&local.ends[one][i], &local.ends[other][j], &part);
-                if row == column {
-                    tangent.diagonal[row] += block;
-                } else if let Some(at) = pattern.block(row, column) {
-                    tangent.below[at] += block;
-                }
-            }
-        }
-        for side in self.moving() {
-            let first = back(&weights[side], first) * SIGNS[side];
-            for (end, point) in self.points(local.stretch, side).into_iter().enumerate() {
-                if let BodyId::Free(k) = point.body {
-                    tangent.diagonal[k][(2, 2)] += first[2 * end] * local.ends[side][end].bend;
-                }
-            }
-        }
-    }
-}
+use nalgebra::{Vector2, Vector4};
 
 impl Drawn for FacingBeams {
     fn lay<'a>(drawing: &Drawing<'a, '_>, mut put: impl FnMut(&'a str, Option<&'a GapVoltage>, Self)) {
@@ -183,7 +44,8 @@ impl Drawn for FacingBeams {
                 segments: cut.segments,
                 weights: cut.weights,
             });
-            put(&gap.name, Some(&gap.voltage), Self { frame, sides, stretches: stretches.collect() });
+            let (stretches, loss) = (stretches.collect(), Loss::new(&gap.impact));
+            put(&gap.name, Some(&gap.voltage), Self { frame, sides, stretches, loss });
         }
     }
 
@@ -267,7 +129,7 @@ impl Domain for FacingBeams {
     }
 
     fn capacitance_change(&self, at: At<'_>, dq: &[Pose]) -> f64 {
-        self.sum(at, |local| local.stretch.facing.gradient(&local.z).dot(&self.change(local, dq)))
+        self.sum(at, |local| local.stretch.facing.gradient(&local.z).dot(&self.change(local, |id| Model::pose(dq, id))))
     }
 
     fn pull(&self, at: At<'_>) -> f64 {
@@ -281,7 +143,7 @@ impl Domain for FacingBeams {
         self.along(at, |local| {
             let c = local.stretch.facing.at(&local.z);
             sum += c.gradient;
-            change += c.hessian * self.change(local, dq);
+            change += c.hessian * self.change(local, |id| Model::pose(dq, id));
         });
         (-(sum[0] + sum[2]), -(change[0] + change[2]))
     }
@@ -316,7 +178,7 @@ impl Domain for FacingBeams {
 
     fn distance_change(&self, at: At<'_>, dq: &[Pose]) -> f64 {
         let mut change = 0.0;
-        self.closest(at, |local, _, weights| change = weights.dot(&self.change(local, dq)));
+        self.closest(at, |local, _, weights| change = weights.dot(&self.change(local, |id| Model::pose(dq, id))));
         change
     }
 
@@ -339,7 +201,46 @@ impl Domain for FacingBeams {
     fn contact_work(&self, at: At<'_>, dq: &[Pose]) -> f64 {
         self.sum(at, |local| match local.stretch.facing.apart(&local.z) {
             true => 0.0,
-            false => local.stretch.facing.contact(&local.z).0.dot(&self.change(local, dq)),
+            false => local.stretch.facing.contact(&local.z).0.dot(&self.change(local, |id| Model::pose(dq, id))),
         })
+    }
+
+    fn loss(&self) -> Option<Loss> {
+        Some(self.loss)
+    }
+
+    fn set_loss(&mut self, loss: Loss) {
+        self.loss = loss;
+    }
+
+    fn add_closing(&self, at: At<'_>, r: &mut [Pose]) -> f64 {
+        self.add_force_change(at, 1.0, -1.0, r);
+        self.stretches.first().map_or(0.0, |first| fall_at_pull_in(first.facing.gap, first.facing.touch))
+    }
+
+    fn add_loss(&self, at: At<'_>, rate: &impl Fn(usize) -> Pose, r: &mut [Pose]) {
+        facing_loss::add(self, at, rate, r);
+    }
+
+    fn add_loss_tangent(
+        &self,
+        at: At<'_>,
+        rate: &impl Fn(usize) -> Pose,
+        pattern: &Pattern,
+        stiffness: &mut BlockMatrix<f64, 3>,
+        damping: &mut BlockMatrix<f64, 3>,
+    ) -> bool {
+        facing_loss::add_tangent(self, at, rate, pattern, [stiffness, damping])
+    }
+
+    fn add_quotient(
+        &self,
+        chord: &Chord<'_>,
+        volts: f64,
+        pattern: &Pattern,
+        r: &mut [Pose],
+        tangent: &mut BlockMatrix<f64, 3>,
+    ) {
+        facing_loss::add_quotient(self, chord, volts, pattern, r, tangent);
     }
 }

@@ -2,8 +2,8 @@
 
 use super::approach::Point;
 use super::drawn::Station;
+use crate::multibody::BodyId;
 use crate::multibody::planar::{self, Pose};
-use crate::multibody::{BodyId, Model};
 use nalgebra::{Matrix2, Matrix3, Matrix4, Vector2, Vector3, Vector4};
 
 /// The direction in which a gap opens, and the sign of the slope that a positive rotation makes along it.
@@ -65,9 +65,8 @@ impl Opening {
 
     /// Change of the displacement and of the slope of a station with a change of the pose of its body.
     #[inline]
-    pub(super) fn change(&self, seen: &Deflection, point: &Point, dq: &[Pose]) -> [f64; 2] {
-        let pose = Model::pose(dq, point.body);
-        [seen.gradient.dot(&pose), self.side * pose.z]
+    pub(super) fn change(&self, seen: &Deflection, pose: &Pose) -> [f64; 2] {
+        [seen.gradient.dot(pose), self.side * pose.z]
     }
 }
 

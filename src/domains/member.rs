@@ -1,7 +1,8 @@
 //! The register of domains: a mechanism's members of them stand in one list, and each call goes to the member's own law.
 
 use super::approach::{Approach, Point};
-use super::domain::{At, Domain, Law};
+use super::contact_loss::Loss;
+use super::domain::{At, Chord, Domain, Law};
 use super::drawn::{Drawing, Drawn, Laid};
 use super::element::Element;
 use crate::multibody::planar::Pose;
@@ -171,6 +172,46 @@ impl Domain for Member {
 
     fn contact_work(&self, at: At<'_>, dq: &[Pose]) -> f64 {
         each!(self, m => m.contact_work(at, dq))
+    }
+
+    fn loss(&self) -> Option<Loss> {
+        each!(self, m => m.loss())
+    }
+
+    fn set_loss(&mut self, loss: Loss) {
+        each!(self, m => m.set_loss(loss));
+    }
+
+    fn add_closing(&self, at: At<'_>, r: &mut [Pose]) -> f64 {
+        each!(self, m => m.add_closing(at, r))
+    }
+
+    #[inline]
+    fn add_loss(&self, at: At<'_>, rate: &impl Fn(usize) -> Pose, r: &mut [Pose]) {
+        each!(self, m => m.add_loss(at, rate, r));
+    }
+
+    #[inline]
+    fn add_loss_tangent(
+        &self,
+        at: At<'_>,
+        rate: &impl Fn(usize) -> Pose,
+        pattern: &Pattern,
+        stiffness: &mut BlockMatrix<f64, 3>,
+        damping: &mut BlockMatrix<f64, 3>,
+    ) -> bool {
+        each!(self, m => m.add_loss_tangent(at, rate, pattern, stiffness, damping))
+    }
+
+    fn add_quotient(
+        &self,
+        chord: &Chord<'_>,
+        given: f64,
+        pattern: &Pattern,
+        r: &mut [Pose],
+        tangent: &mut BlockMatrix<f64, 3>,
+    ) {
+        each!(self, m => m.add_quotient(chord, given, pattern, r, tangent));
     }
 
     fn law(&self) -> Option<(&Approach, Law)> {

@@ -14,6 +14,8 @@
 //! | [`beam_line`] | the centreline of a beam: how it bends in a motion, and how far its segments are turned |
 //! | [`capacitor`] | C(u) of a comb and of parallel plates |
 //! | [`contact`] | pressure between surfaces that touch |
+//! | [`contact_loss`] | what an impact loses |
+//! | [`contact_speed`] | at which speed, from statics |
 //! | [`domain`] | the trait of all that acts; [`member`]: which there are, and how each call finds its own |
 //! | [`dashpot`] | a damper to the ground |
 //! | [`drawn`], [`element`] | from a drawing to them; elements of their own |
@@ -31,6 +33,7 @@
 //! | [`energy`] | the potential of it all, and the energy that an undamped motion keeps |
 //! | `side` | the side to which a part buckles |
 //! | [`stop`] | how a stop bears |
+//! | [`quotient`] | discrete gradients of members over a step |
 //! | `reading` | what is read of gaps: capacitance, distance, pull, which of them touch |
 //! | [`system`] | a multibody model with its gaps, loads and network: what `solve` works on |
 
@@ -40,6 +43,8 @@ pub mod beam_line;
 pub mod capacitor;
 mod conduction;
 pub mod contact;
+pub mod contact_loss;
+pub mod contact_speed;
 pub mod dashpot;
 pub mod domain;
 pub mod drawn;
@@ -49,6 +54,8 @@ pub mod element;
 pub mod energy;
 pub mod facing;
 pub mod facing_beams;
+pub mod facing_local;
+mod facing_loss;
 mod facing_side;
 mod facing_stretches;
 mod input;
@@ -60,6 +67,7 @@ pub mod member;
 pub mod moving_frame;
 pub mod network;
 pub mod quadrature;
+pub mod quotient;
 mod reading;
 mod side;
 pub mod stop;

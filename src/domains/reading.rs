@@ -5,6 +5,9 @@ use super::member::Member;
 use super::system::System;
 use crate::multibody::planar::Pose;
 
+/// Penetration of a step that ran away, of the largest that the law of contact knows [1]. One that is pressed too hard gets there in smaller steps.
+const RUNAWAY: f64 = 10.0;
+
 impl System {
     /// Capacitance of a gap [F].
     pub fn capacitance(&self, gap: usize, q: &[Pose]) -> f64 {
@@ -88,5 +91,20 @@ impl System {
     /// Work of the contact forces at `q` over a small change `dq`, each gap's taken positive [J].
     pub fn contact_work(&self, q: &[Pose], dq: &[Pose]) -> f64 {
         self.members.iter().map(|gap| gap.contact_work(self.at(q), dq).abs()).sum()
+    }
+
+    /// The largest change of the distance of a contact with a change `dq` at `q`, over how far it is pressed, `least` [m] at least [1]; infinite where
+    /// one is pressed [`RUNAWAY`] times as far as it may.
+    pub fn contact_change(&self, q: &[Pose], dq: &[Pose], least: f64) -> f64 {
+        let change = |gap: &Member| {
+            let [touch, allowed] = gap.touching()?;
+            let pressed = touch - gap.distance(self.at(q));
+            if pressed > RUNAWAY * (touch - allowed) {
+                return Some(f64::INFINITY);
+            }
+            (pressed > 0.0).then(|| gap.distance_change(self.at(q), dq).abs() / pressed.max(least))
+        };
+        // a sum with what is not a number is none
+        self.members.iter().filter_map(change).fold(0.0, |most, one| if one <= most { most } else { one })
     }
 }

@@ -8,6 +8,7 @@
 //! which comes to k·(p − w): the start of the stiffness is spread over w, as a first touch is, so that paths have no corner.
 
 use super::contact::{Contact, TOUCH};
+use super::contact_loss::Loss;
 
 /// Penetration over which the stiffness of an elastic stop sets in [m].
 pub const SOFT: f64 = 1e-9;
@@ -73,6 +74,17 @@ impl Stop {
         let (ahead, back) = (side(ways[0], u), side(ways[1], -u));
         (ahead.0 - back.0, -ahead.1 - back.1)
     }
+}
+
+/// What rates add to the force against the approach `u` [m] that changes at `rate` [m/s], and its derivatives with both.
+pub(super) fn lost(stop: &Stop, loss: &Loss, ways: &[Option<f64>; 2], (u, rate): (f64, f64)) -> (f64, f64, f64) {
+    let side = |way: Option<f64>, u: f64, closing: f64| {
+        let (force, slope) = way.map_or((0.0, 0.0), |w| stop.force(w - u));
+        let (added, by_rate) = loss.fraction(closing);
+        (force * added, -slope * added, force * by_rate)
+    };
+    let (ahead, back) = (side(ways[0], u, rate), side(ways[1], -u, -rate));
+    (ahead.0 - back.0, ahead.1 + back.1, ahead.2 + back.2)
 }
 
 /// Way left to the nearer side of a stop at an approach `u` [m], and its derivative with the approach.

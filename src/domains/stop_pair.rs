@@ -2,9 +2,11 @@
 
 use super::approach::{Approach, Point};
 use super::contact::TOUCH;
-use super::domain::{At, Domain, Law};
+use super::contact_loss::Loss;
+use super::domain::{At, Chord, Domain, Law};
 use super::drawn::{Drawing, Drawn};
-use super::stop::{Stop, nearer};
+use super::quotient::{self, quotient};
+use super::stop::{Stop, lost, nearer};
 use crate::multibody::model::locate;
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, BodyId, Pattern};
@@ -20,6 +22,8 @@ pub struct StopPair {
     pub ways: [Option<f64>; 2],
     /// How it bears.
     pub stop: Stop,
+    /// What an impact loses.
+    pub loss: Loss,
 }
 
 impl Drawn for StopPair {
@@ -30,7 +34,8 @@ impl Drawn for StopPair {
             let axis = Vector2::new(stop.axis[0], stop.axis[1]);
             let approach = Approach { a: (drawing.point)(stop.a), b, axis };
             let law = stop.stiffness.map_or(Stop::Rigid(stop.area), Stop::Elastic);
-            put(&stop.name, None, Self { approach, ways: stop.ways, stop: law });
+            let loss = Loss::new(&stop.impact);
+            put(&stop.name, None, Self { approach, ways: stop.ways, stop: law, loss });
         }
     }
 
@@ -101,6 +106,73 @@ impl Domain for StopPair {
     fn contact_work(&self, at: At<'_>, dq: &[Pose]) -> f64 {
         let force = self.stop.force(self.distance(at)).0;
         if force == 0.0 { 0.0 } else { force * self.distance_change(at, dq) }
+    }
+
+    fn loss(&self) -> Option<Loss> {
+        Some(self.loss)
+    }
+
+    fn set_loss(&mut self, loss: Loss) {
+        self.loss = loss;
+    }
+
+    fn add_closing(&self, at: At<'_>, r: &mut [Pose]) -> f64 {
+        let m = self.approach.measure(at.q, at.linear);
+        self.approach.add_force(&m, 1.0, r);
+        nearer(&self.ways, m.value).0
+    }
+
+    fn add_loss(&self, at: At<'_>, rate: &impl Fn(usize) -> Pose, r: &mut [Pose]) {
+        if self.loss.acts() && self.distance(at) < 0.0 {
+            let m = self.approach.measure(at.q, at.linear);
+            let now = (m.value, self.approach.rate(&m, rate));
+            self.approach.add_force(&m, lost(&self.stop, &self.loss, &self.ways, now).0, r);
+        }
+    }
+
+    fn add_loss_tangent(
+        &self,
+        at: At<'_>,
+        rate: &impl Fn(usize) -> Pose,
+        pattern: &Pattern,
+        stiffness: &mut BlockMatrix<f64, 3>,
+        damping: &mut BlockMatrix<f64, 3>,
+    ) -> bool {
+        if !self.loss.acts() || self.distance(at) >= 0.0 {
+            return false;
+        }
+        let m = self.approach.measure(at.q, at.linear);
+        let lost = lost(&self.stop, &self.loss, &self.ways, (m.value, self.approach.rate(&m, rate)));
+        let [k, c] = self.approach.rate_tangent(&m, rate, lost);
+        let place = locate(pattern, self.approach.a.body, self.approach.b.body);
+        place.add(stiffness, &k);
+        place.add(damping, &c);
+        true
+    }
+
+    fn add_quotient(
+        &self,
+        chord: &Chord<'_>,
+        _: f64,
+        pattern: &Pattern,
+        r: &mut [Pose],
+        tangent: &mut BlockMatrix<f64, 3>,
+    ) {
+        let side = |way: Option<f64>, u0: f64, u1: f64| {
+            let Some(way) = way.filter(|way| u0.max(u1) > *way) else { return (0.0, 0.0) };
+            let pressed = |u: f64| {
+                let (force, slope) = self.stop.force(way - u);
+                (force, -slope)
+            };
+            let (mean, by_end) = quotient((u0, self.stop.energy(way - u0)), (u1, self.stop.energy(way - u1)), pressed);
+            let (added, by_rate) = self.loss.fraction((u1 - u0) / chord.h);
+            (mean * (1.0 + added), by_end * (1.0 + added) + mean * by_rate / chord.h)
+        };
+        let law = |u0: f64, u1: f64| {
+            let (ahead, back) = (side(self.ways[0], u0, u1), side(self.ways[1], -u0, -u1));
+            (ahead.0 - back.0, ahead.1 + back.1)
+        };
+        quotient::add(&self.approach, chord, law, pattern, r, tangent);
     }
 
     fn law(&self) -> Option<(&Approach, Law)> {

@@ -4,7 +4,7 @@
 
 use super::approach::Point;
 use super::beam_line::BeamLine;
-use super::domain::{At, Domain};
+use super::domain::{At, Chord, Domain};
 use super::drive::{Drive, Electrics};
 use super::load::Load;
 use super::member::Member;
@@ -54,8 +54,14 @@ impl System {
     /// `r += ∂Π/∂q − load`, held directions removed from the sum. Goes from the last joint to the first: between sweeps
     /// over the bodies from the first to the last it finds in the caches what the one before left there.
     pub fn add_residual(&self, q: &[Pose], drive: &Drive, r: &mut [Pose]) {
+        self.add_residual_and(q, drive, r, |_| ());
+    }
+
+    /// The same with what `more` adds before held directions are removed.
+    pub(crate) fn add_residual_and(&self, q: &[Pose], drive: &Drive, r: &mut [Pose], more: impl FnOnce(&mut [Pose])) {
         forces::add_elastic_backwards(&self.model, q, &drive.rest(), r);
         self.add_body_forces(q, drive, r);
+        more(r);
         self.model.project(r);
     }
 
@@ -98,6 +104,18 @@ impl System {
 
     /// [`System::tangent`] with the residual added to `r`, held directions removed from the sum.
     pub fn add_tangent(&self, q: &[Pose], drive: &Drive, tangent: &mut BlockMatrix<f64, 3>, r: &mut [Pose]) {
+        self.add_tangent_and(q, drive, tangent, r, |_| ());
+    }
+
+    /// The same with what `more` adds to `r` before held directions are removed.
+    pub(crate) fn add_tangent_and(
+        &self,
+        q: &[Pose],
+        drive: &Drive,
+        tangent: &mut BlockMatrix<f64, 3>,
+        r: &mut [Pose],
+        more: impl FnOnce(&mut [Pose]),
+    ) {
         tangent.clear();
         forces::add_tangent(&self.model, q, &drive.rest(), tangent, r);
         let (at, pattern) = (self.at(q), &self.model.pattern);
@@ -109,6 +127,7 @@ impl System {
         }
         self.add_input_forces(at, drive, r);
         self.add_input_tangent(at, drive, tangent);
+        more(r);
         self.model.project(r);
     }
 
@@ -191,6 +210,76 @@ impl System {
         for (gap, &volts) in self.members.iter().zip(&drive.volts) {
             gap.levers(at, volts, &mut lever);
         }
+    }
+
+    /// [`System::tangent`] without what members add.
+    pub fn tangent_without_members(
+        &self,
+        q: &[Pose],
+        drive: &Drive,
+        tangent: &mut BlockMatrix<f64, 3>,
+        r: &mut [Pose],
+    ) {
+        tangent.clear();
+        r.fill(Pose::zeros());
+        forces::add_tangent(&self.model, q, &drive.rest(), tangent, r);
+        let (at, pattern) = (self.at(q), &self.model.pattern);
+        for load in &self.loads {
+            load.add_force(at, drive.load, r);
+            load.add_tangent(at, drive.load, pattern, tangent);
+        }
+        self.add_input_forces(at, drive, r);
+        self.add_input_tangent(at, drive, tangent);
+        self.model.project(r);
+    }
+
+    /// Adds the discrete forces of members over a step of length `h` [s] with the configurations `q` at its start, middle and end, and the
+    /// symmetric part of their tangent with the end; held directions not removed.
+    pub fn add_quotients(
+        &self,
+        q: [&[Pose]; 3],
+        h: f64,
+        drive: &Drive,
+        r: &mut [Pose],
+        tangent: &mut BlockMatrix<f64, 3>,
+    ) {
+        let chord = Chord { at: q.map(|q| self.at(q)), h };
+        for (gap, &volts) in self.members.iter().zip(&drive.volts).filter(|(gap, volts)| gap.acts(**volts)) {
+            gap.add_quotient(&chord, volts, &self.model.pattern, r, tangent);
+        }
+    }
+
+    /// True where parts can touch.
+    pub fn can_touch(&self) -> bool {
+        self.members.iter().any(|member| member.touching().is_some())
+    }
+
+    /// `r +=` the forces that rates add where contact loses energy, `rate` the rate of each body; held directions not removed.
+    pub fn add_loss(&self, q: &[Pose], rate: impl Fn(usize) -> Pose, r: &mut [Pose]) {
+        let at = self.at(q);
+        self.members.iter().for_each(|member| member.add_loss(at, &rate, r));
+    }
+
+    /// Adds the derivatives of those forces with displacements to `stiffness` and with rates to `damping`. True where there are any.
+    pub fn add_loss_tangent(
+        &self,
+        q: &[Pose],
+        rate: impl Fn(usize) -> Pose,
+        stiffness: &mut BlockMatrix<f64, 3>,
+        damping: &mut BlockMatrix<f64, 3>,
+    ) -> bool {
+        let (at, pattern) = (self.at(q), &self.model.pattern);
+        let add = |any, member: &Member| member.add_loss_tangent(at, &rate, pattern, stiffness, damping) | any;
+        self.members.iter().fold(false, add)
+    }
+
+    /// Damping of contacts that are closed at displacements `q`, linearized at rest; none where nothing is lost.
+    pub fn loss_about(&self, q: &[Pose]) -> Option<BlockMatrix<f64, 3>> {
+        if !self.loses() {
+            return None;
+        }
+        let [mut by_q, mut by_rate] = [(); 2].map(|()| BlockMatrix::new(&self.model.pattern));
+        self.add_loss_tangent(q, |_| Pose::zeros(), &mut by_q, &mut by_rate).then_some(by_rate)
     }
 
     /// Bodies that gaps and dead loads act on, ascending.

@@ -3,7 +3,9 @@
 //! **How large an error is.** In the mass norm, ‖e‖² = eᵀMe, which has one unit for translations and rotations, √(‖e_q‖² + h²‖e_v‖²) must
 //! stay below tol·(‖q‖ + floor), with ‖q‖ the larger of both ends of a step and a floor of 1e-4 of the model's length scale. Where parts
 //! touch, the time of a bounce is nothing beside that of the motion, and a displacement beside its reach: there the error of the energy,
-//! |vᵀMe_v| + |work of the contact forces over e_q|, must also stay below tol·(kinetic energy + energy in the contacts).
+//! |vᵀMe_v| + |work of the contact forces over e_q|, must also stay below tol·(kinetic energy + energy in the contacts), three times that where contact loses
+//! energy, and the error of a penetration below a tenth of it. A step that ends far beyond the law of contact ran away, whatever its error is relative
+//! to where it ends.
 
 use super::{Equations, Motion, Place};
 use crate::domains::{Ramp, System};
@@ -107,7 +109,13 @@ impl Equations for Bodies<'_> {
     }
 }
 
-/// Error of the energy over a step that begins or ends in contact; 0 elsewhere.
+/// Fraction of the error of the energy that counts where contact loses energy: what is left of an error does not last.
+const OF_LOSS: f64 = 0.3;
+/// Error of a contact's penetration that is allowed, of the penetration [1], and the least one that it is measured by [m]: the force grows with its fourth
+/// power, and a point without inertia is in no norm of masses.
+const PRESSED: (f64, f64) = (0.1, 1e-10);
+
+/// Error of a step that begins or ends in contact: of the energy, and of the penetration; 0 elsewhere.
 pub(crate) fn contact_error(system: &System, (before, after): (&Motion, &Motion), error: &Motion, tol: f64) -> f64 {
     let stored = system.contact_energy(&before.q).max(system.contact_energy(&after.q));
     if stored == 0.0 {
@@ -116,7 +124,9 @@ pub(crate) fn contact_error(system: &System, (before, after): (&Motion, &Motion)
     let model = &system.model;
     let kinetic = 0.5 * model.mass_product(&after.v, &after.v).max(model.mass_product(&before.v, &before.v));
     let work = system.contact_work(&after.q, &error.q);
-    (model.mass_product(&after.v, &error.v).abs() + work) / (tol * (kinetic + stored))
+    let weight = if system.loses() { OF_LOSS } else { 1.0 };
+    let energy = weight * (model.mass_product(&after.v, &error.v).abs() + work) / (tol * (kinetic + stored));
+    energy.hypot(system.contact_change(&after.q, &error.q, PRESSED.1) / PRESSED.0)
 }
 
 /// Directions of bodies without mass that drag holds back, with the drag [N·s/m, N·m·s].

@@ -6,9 +6,9 @@
 //! bodies it moves. A time constant of heat much longer than the period of what moves makes this right.
 
 use crate::domains::{Drive, Ramp, System};
-use crate::multibody::forces;
 use crate::multibody::planar::Pose;
 use crate::multibody::rcr::{AddedInertia, Closure, Linkage, Reduction};
+use crate::multibody::{BlockMatrix, forces};
 
 /// What acts on a mechanism in joint coordinates.
 pub trait Loads {
@@ -38,6 +38,8 @@ pub struct JointLoads<'a> {
     v: Vec<Pose>,
     r: Vec<Pose>,
     prescribes: bool,
+    /// Derivatives of what contact loses with displacements and rates; none where it loses nothing.
+    loss: Option<[BlockMatrix<f64, 3>; 2]>,
 }
 
 impl<'a> JointLoads<'a> {
@@ -58,6 +60,7 @@ impl<'a> JointLoads<'a> {
             v: zeros.clone(),
             r: zeros,
             prescribes: heated,
+            loss: system.loses().then(|| [(); 2].map(|()| BlockMatrix::new(&system.model.pattern))),
         }
     }
 
@@ -90,6 +93,9 @@ impl Loads for JointLoads<'_> {
         self.r.fill(Pose::zeros());
         self.system.add_body_forces(&self.q, &self.drive, &mut self.r);
         forces::add_damping(&self.system.model, &self.v, &mut self.r);
+        if self.loss.is_some() {
+            self.system.add_loss(&self.q, |k| self.v[k], &mut self.r);
+        }
         for (force, r) in reduction.force.iter_mut().zip(&self.r) {
             for i in 0..3 {
                 force[i] -= r[i];
@@ -103,6 +109,14 @@ impl Loads for JointLoads<'_> {
         self.system.add_body_tangent(&self.q, &self.drive, bodies);
         bodies.diagonal.iter_mut().chain(&mut bodies.below).for_each(|block| *block *= beta);
         forces::add_inertia(&self.system.model, 0.0, gamma, bodies);
+        if let Some([by_q, by_rate]) = &mut self.loss {
+            by_q.clear();
+            by_rate.clear();
+            if self.system.add_loss_tangent(&self.q, |k| self.v[k], by_q, by_rate) {
+                by_q.add_to(beta, bodies);
+                by_rate.add_to(gamma, bodies);
+            }
+        }
         reduction.add_stiffness(self.linkage, beta, added);
     }
 }

@@ -40,14 +40,18 @@ pub(crate) struct Sample {
 pub(crate) struct Equation<'a> {
     /// Factor of M [1/s²].
     pub(crate) m: f64,
-    /// Factor of C [1/s].
+    /// Factor of C [1/s]: the rate is `rates` + c·x.
     pub(crate) c: f64,
+    /// Rates without x; their damping is in `constant`, and what contact loses is not.
+    pub(crate) rates: &'a [Pose],
     /// q₀.
     pub(crate) base: &'a [Pose],
     /// The part that does not depend on x.
     pub(crate) constant: &'a [Pose],
     /// Where the forces are taken.
     pub(crate) samples: &'a [Sample],
+    /// Length of a step over which members have their discrete forces instead [s].
+    pub(crate) quotient: Option<f64>,
 }
 
 /// Bodies with the storage of Newton's method, which is laid out when the first stage asks.
@@ -59,6 +63,8 @@ pub struct Newton<'a, S> {
     part: Option<BlockMatrix<f64, 3>>,
     /// 1/M, 0 where there is none.
     inverse: Vec<Pose>,
+    /// Derivatives of what contact loses with displacements and rates; none where it loses nothing.
+    loss: Option<[BlockMatrix<f64, 3>; 2]>,
     at: Vec<Pose>,
     x: Vec<Pose>,
     constant: Vec<Pose>,
@@ -77,6 +83,7 @@ impl<'a, S: LinearSolver> Newton<'a, S> {
         Self {
             inverse: (0..model.bodies.len()).map(|k| model.mass(k).map(inverse)).collect(),
             drive: bodies.system.electrics.drive(),
+            loss: bodies.system.loses().then(|| [(); 2].map(|()| BlockMatrix::new(&model.pattern))),
             bodies,
             solver,
             matrix: None,
@@ -153,13 +160,17 @@ impl<'a, S: LinearSolver> Newton<'a, S> {
             }
             self.work.forces += 1;
             let scale = sample.weight * sample.share;
+            let tangent = match equation.quotient {
+                Some(_) => System::tangent_without_members,
+                None => System::tangent,
+            };
             if number == 0 {
-                system.tangent(&self.at, &self.drive, matrix, &mut self.force);
+                tangent(system, &self.at, &self.drive, matrix, &mut self.force);
                 matrix.diagonal.iter_mut().for_each(|b| *b *= scale);
                 matrix.below.iter_mut().for_each(|b| *b *= scale);
             } else {
                 let part = self.part.get_or_insert_with(|| BlockMatrix::new(&model.pattern));
-                system.tangent(&self.at, &self.drive, part, &mut self.force);
+                tangent(system, &self.at, &self.drive, part, &mut self.force);
                 let sum = |a: &mut [_], b: &[_]| {
                     for (a, b) in a.iter_mut().zip(b) {
                         *a += *b * scale;
@@ -171,6 +182,27 @@ impl<'a, S: LinearSolver> Newton<'a, S> {
             for (r, f) in self.residual.iter_mut().zip(&self.force) {
                 *r += f * sample.weight;
             }
+            if let Some([by_q, by_rate]) = self.loss.as_mut().filter(|_| equation.quotient.is_none()) {
+                let rate = |k: usize| equation.rates[k] + x[k] * equation.c;
+                self.force.fill(Pose::zeros());
+                system.add_loss(&self.at, rate, &mut self.force);
+                self.residual.iter_mut().zip(&self.force).for_each(|(r, f)| *r += f * sample.weight);
+                by_q.clear();
+                by_rate.clear();
+                if system.add_loss_tangent(&self.at, rate, by_q, by_rate) {
+                    by_q.add_to(scale, matrix);
+                    by_rate.add_to(sample.weight * equation.c, matrix);
+                }
+            }
+        }
+        if let Some(h) = equation.quotient {
+            let middle: f64 = equation.samples.iter().map(|sample| sample.weight * sample.time).sum();
+            self.bodies.ramp.at(middle, &mut self.drive);
+            for (k, (middle, q)) in self.at.iter_mut().zip(equation.base).enumerate() {
+                *middle = q + x[k] * 0.5;
+                self.force[k] = q + x[k];
+            }
+            system.add_quotients([equation.base, &self.at, &self.force], h, &self.drive, &mut self.residual, matrix);
         }
         forces::add_inertia(model, equation.m, equation.c, matrix);
         model.project_matrix(matrix);
@@ -213,6 +245,9 @@ impl<S: LinearSolver> Staged for Newton<'_, S> {
         self.bodies.ramp.at(t, &mut self.drive);
         system.residual(q, &self.drive, a);
         forces::add_damping(model, v, a);
+        if self.loss.is_some() {
+            system.add_loss(q, |k| v[k], a);
+        }
         self.work.forces += 1;
         for (a, inverse) in a.iter_mut().zip(&self.inverse) {
             *a = -a.component_mul(inverse);
@@ -231,7 +266,9 @@ impl<S: LinearSolver> Staged for Newton<'_, S> {
         }
         let samples = [Sample { weight: 1.0, share: 1.0, time: stage.t }];
         let (m, c) = (1.0 / stage.beta, stage.gamma / stage.beta);
-        let found = self.root(&Equation { m, c, base: stage.q, constant: &constant, samples: &samples }, &mut x);
+        let (rates, base) = (stage.v, stage.q);
+        let equation = Equation { m, c, rates, base, constant: &constant, samples: &samples, quotient: None };
+        let found = self.root(&equation, &mut x);
         for (k, x) in x.iter().enumerate() {
             a[k] = x * m;
             (at.q[k], at.v[k]) = (stage.q[k] + x, stage.v[k] + x * c);
@@ -250,6 +287,9 @@ impl<S: LinearSolver> Staged for Newton<'_, S> {
             self.at[k] = q * c;
         }
         forces::add_damping(model, &self.at, &mut self.force);
+        if let Some([_, by_rate]) = &self.loss {
+            by_rate.multiply_add(&model.pattern, &self.at, &mut self.force);
+        }
         model.project(&mut self.force);
         if let Some(matrix) = &self.matrix {
             self.solver.solve(&model.pattern, matrix, &mut self.force);

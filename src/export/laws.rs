@@ -43,18 +43,23 @@ fn share(u: &str, overlap: f64, blend: f64) -> String {
     format!("min(max(({:e} + 1e-6 * {u}) / {:e}, 0), 1)", overlap + blend, 2.0 * blend)
 }
 
-/// What bears against the approach [N]; none where parts never touch.
-pub(super) fn bearing(law: &Law, u: &str) -> Option<String> {
+/// Contact force against the approach `u` at its `rate`, a text in m/s [N]; none where parts never touch.
+pub(super) fn bearing(law: &Law, loss: f64, u: &str, rate: &str) -> Option<String> {
     match law {
         Law::Field(_, None) => None,
         Law::Field(capacitor, Some(contact)) => {
             let sign = if matches!(capacitor, Capacitor::Comb { .. }) { "+" } else { "-" };
-            Some(pressed(contact, &format!("({:e} {sign} 1e-6 * {u})", capacitor.distance(0.0))))
+            Some(lossy(
+                pressed(contact, &format!("({:e} {sign} 1e-6 * {u})", capacitor.distance(0.0))),
+                loss,
+                "+",
+                rate,
+            ))
         }
         Law::Stop(ways, stop) => {
-            let side = |way: Option<f64>, sign: &str| {
+            let side = |way: Option<f64>, [sign, closing]: [&str; 2]| {
                 let left = format!("({:e} {sign} 1e-6 * {u})", way?);
-                Some(match stop {
+                let elastic = match stop {
                     Stop::Rigid(area) => {
                         pressed(&Contact { touch: TOUCH, area: *area }, &format!("({TOUCH:e} + {left})"))
                     }
@@ -62,9 +67,10 @@ pub(super) fn bearing(law: &Law, u: &str) -> Option<String> {
                         let p = format!("max(-{left}, 0)");
                         format!("({k:e} * {p} * {p} / ({p} + {SOFT:e}))")
                     }
-                })
+                };
+                Some(lossy(elastic, loss, closing, rate))
             };
-            match (side(ways[0], "-"), side(ways[1], "+")) {
+            match (side(ways[0], ["-", "+"]), side(ways[1], ["+", "-"])) {
                 (Some(ahead), Some(back)) => Some(format!("({ahead} - {back})")),
                 (Some(ahead), None) => Some(ahead),
                 (None, Some(back)) => Some(format!("(-{back})")),
@@ -72,6 +78,16 @@ pub(super) fn bearing(law: &Law, u: &str) -> Option<String> {
             }
         }
     }
+}
+
+/// True where the contact force depends on the rate.
+pub(super) fn loses(law: &Law, loss: f64) -> bool {
+    loss > 0.0 && !matches!(law, Law::Field(_, None))
+}
+
+/// A contact force with the loss of an impact ([`crate::domains::contact_loss`]); `closing` is the sign of the closing speed in the rate.
+fn lossy(force: String, loss: f64, closing: &str, rate: &str) -> String {
+    if loss > 0.0 { format!("({force} * max(1 {closing} {loss:e} * {rate}, 0))") } else { force }
 }
 
 /// The force of a contact at the distance `d`, a text in metres.

@@ -138,7 +138,8 @@ fn gaps(
         let (by_port, constant) = by_port(electrics, ports, &|s| electrics.gap_rows[(g, s)]);
         let name = compiled.parts.gap_names[g].clone();
         let along = along(coordinates, &approach.a, approach.axis) - along(coordinates, &approach.b, approach.axis);
-        Ok(LumpedGap { name, along, law, by_port, constant })
+        let loss = gap.loss().map_or(0.0, |loss| loss.coefficient());
+        Ok(LumpedGap { name, along, law, loss, by_port, constant })
     };
     system.members.iter().enumerate().filter(acts).map(gap).collect()
 }

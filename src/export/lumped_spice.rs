@@ -6,10 +6,11 @@
 //! | `v1` … | its rate, in micrometres times ω per second: a capacitor of 1/ω farads that forces charge |
 //! | `g1` … | approach of a gap in micrometres |
 //! | `e1` … | voltage of a gap |
+//! | `s1` … | rate of a gap in metres per second, where its contact loses energy |
 //! | `f1` … | its force in micronewtons |
 //! | `q1` … | its charge in femtocoulombs, through a capacitor of a femtofarad: that current is dQ/dt |
 
-use super::laws::{bearing, capacitance, slope};
+use super::laws::{bearing, capacitance, loses, slope};
 use super::lumped::{Law, Lumped, Reading};
 use super::names::Pins;
 use super::parts::Parts;
@@ -115,7 +116,15 @@ impl Deck<'_> {
             self.parts.line(&format!("Vq{n} q{n} r{n} 0"));
             self.parts.line(&format!("Cq{n} r{n} 0 1e-15"));
         }
-        force.extend(bearing(&gap.law, &approach).map(|bearing| format!("- {bearing}")));
+        let rate = format!("s{n}");
+        if loses(&gap.law, gap.loss) {
+            self.parts.sum(&rate);
+            for (j, c) in self.model.coordinates.iter().enumerate() {
+                self.parts.by_voltage(("0", &rate), &format!("v{}", j + 1), 1e-6 * c.omega * gap.along[j]);
+            }
+        }
+        let bearing = bearing(&gap.law, gap.loss, &approach, &format!("V({rate})"));
+        force.extend(bearing.map(|bearing| format!("- {bearing}")));
         if force.is_empty() {
             return;
         }

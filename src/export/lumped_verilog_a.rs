@@ -1,7 +1,7 @@
 //! The nonlinear lumped model as a Verilog-A module, by the rules of [`super::verilog_a`]: every state is a node, and nothing but
 //! `ddt` acts in time.
 
-use super::laws::{bearing, capacitance, slope};
+use super::laws::{bearing, capacitance, loses, slope};
 use super::lumped::{Law, Lumped, Reading};
 use super::names::Pins;
 use super::verilog_a::{Sum, head};
@@ -10,9 +10,10 @@ use nalgebra::DVector;
 /// The file: a header that tells what it is, and the module `name`.
 pub fn write(model: &Lumped, pins: &Pins, name: &str, about: &[String]) -> String {
     let coordinates = (1..=model.coordinates.len()).flat_map(|k| [format!("x{k}"), format!("v{k}")]);
-    let gaps = model.gaps.iter().enumerate().flat_map(|(g, gap)| match gap.law {
-        Law::Field(..) => vec![format!("g{}", g + 1), format!("e{}", g + 1)],
-        Law::Stop(..) => vec![format!("g{}", g + 1)],
+    let gaps = model.gaps.iter().enumerate().flat_map(|(g, gap)| {
+        let of = |name: &str| format!("{name}{}", g + 1);
+        let voltage = matches!(gap.law, Law::Field(..)).then(|| of("e"));
+        [Some(of("g")), voltage, loses(&gap.law, gap.loss).then(|| of("s"))].into_iter().flatten()
     });
     let inner: Vec<String> = coordinates.chain(gaps).collect();
     let mut text = head(name, pins, &inner, &model.ports, about);
@@ -20,6 +21,13 @@ pub fn write(model: &Lumped, pins: &Pins, name: &str, about: &[String]) -> Strin
         let mut sum = Sum::begin(&format!("I(g{0}) <+ V(g{0})", g + 1));
         add(&mut sum, "x", &gap.along, -1.0);
         sum.end(&mut text);
+        if loses(&gap.law, gap.loss) {
+            let mut sum = Sum::begin(&format!("I(s{0}) <+ V(s{0})", g + 1));
+            for (j, (share, c)) in gap.along.iter().zip(&model.coordinates).enumerate() {
+                sum.add(-1e-6 * share * c.omega, &format!("V(v{})", j + 1));
+            }
+            sum.end(&mut text);
+        }
         if matches!(gap.law, Law::Field(..)) {
             let mut sum = Sum::begin(&format!("I(e{0}) <+ V(e{0})", g + 1));
             add(&mut sum, "b", &gap.by_port, -1.0);
@@ -45,7 +53,7 @@ pub fn write(model: &Lumped, pins: &Pins, name: &str, about: &[String]) -> Strin
             if let Law::Field(capacitor, _) = &gap.law {
                 sum.add(-0.5 * share, &format!("{e} * {e} * {}", slope(capacitor, &u)));
             }
-            if let Some(bearing) = bearing(&gap.law, &u) {
+            if let Some(bearing) = bearing(&gap.law, gap.loss, &u, &format!("V(s{})", g + 1)) {
                 sum.add(share, &bearing);
             }
         }

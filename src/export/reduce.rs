@@ -69,10 +69,14 @@ impl Mechanism<'_> {
             change: DMatrix::zeros(r, p),
         };
         let mut drag = vec![Pose::zeros(); system.bodies()];
+        let loss = system.loss_about(&self.q);
         let still = (vec![0.0; self.drive.volts.len()], vec![0.0; self.rise.len()]);
         for k in 0..n {
             drag.fill(Pose::zeros());
             add_damping(&system.model, &shapes[k], &mut drag);
+            if let Some(loss) = &loss {
+                loss.multiply_add(&system.model.pattern, &shapes[k], &mut drag);
+            }
             for j in 0..n {
                 model.damping[(j, k)] = dot(&shapes[j], &drag) * (length[k] * omega[k]) / (length[j] * omega[j]);
             }

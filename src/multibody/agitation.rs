@@ -48,12 +48,17 @@ pub fn force(model: &Model, mut draw: impl FnMut() -> f64, out: &mut [Pose]) {
     model.project(out);
 }
 
-/// C·x̄ of a complex motion, x̄ its conjugate.
-pub fn damped(model: &Model, x: &[Vector3<Complex<f64>>]) -> Vec<Vector3<Complex<f64>>> {
+/// C·x̄ of a complex motion, x̄ its conjugate; `more` adds the force of other damping at rates to it.
+pub fn damped(
+    model: &Model,
+    x: &[Vector3<Complex<f64>>],
+    more: impl Fn(&[Pose], &mut [Pose]),
+) -> Vec<Vector3<Complex<f64>>> {
     let part = |of: fn(&Complex<f64>) -> f64| {
         let v: Vec<Pose> = x.iter().map(|x| x.map(|c| of(&c))).collect();
         let mut r = vec![Pose::zeros(); v.len()];
         forces::add_damping(model, &v, &mut r);
+        more(&v, &mut r);
         r
     };
     let (re, im) = (part(|c| c.re), part(|c| -c.im));

@@ -146,6 +146,12 @@ impl<T: Scalar, const N: usize> BlockMatrix<T, N> {
         Ok(inertia)
     }
 
+    /// `to += factor·A`.
+    pub fn add_to(&self, factor: T, to: &mut Self) {
+        to.diagonal.iter_mut().zip(&self.diagonal).for_each(|(to, from)| *to += from * factor);
+        to.below.iter_mut().zip(&self.below).for_each(|(to, from)| *to += from * factor);
+    }
+
     /// Solves in place with the factors: `b` becomes A⁻¹·b. Body vectors in elimination order.
     pub fn solve(&self, pattern: &Pattern, b: &mut [SVector<T, N>]) {
         // along a beam the row is the next body: its value is handed on without a trip through memory

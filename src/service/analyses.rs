@@ -147,6 +147,7 @@ impl Calls {
             }
         };
         let events = convert::pairs(request.events);
+        let until = request.until.map(convert::analysis::until).transpose().map_err(status::violation)?;
         let (signals, voltages) = (request.signals, voltages(request.voltages)?);
         let sending = self.sending()?;
         let place = self.0.work.place().await?;
@@ -175,6 +176,7 @@ impl Calls {
                     method,
                     step,
                     events,
+                    until,
                     keep: false,
                     ..TransientOptions::default()
                 };

@@ -12,6 +12,20 @@ pub enum GapVoltage {
     Nodes(NodeId, NodeId),
 }
 
+/// Least restitution of an impact [1].
+pub const LEAST_RESTITUTION: f64 = 0.01;
+
+/// How an impact of two surfaces ends, as far as a netlist says it.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct Impact {
+    /// Speed after an impact over that before, at the reference speed [1]; 1: elastic.
+    #[serde(default)]
+    pub restitution: Option<f64>,
+    /// Reference speed [m/s].
+    #[serde(default)]
+    pub speed: Option<f64>,
+}
+
 /// A comb drive: C = N·ε·h·o/g with overlap o = o₀ + u, u the approach of `a` towards `b` along `axis`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Comb {
@@ -64,6 +78,9 @@ pub struct PlateGap {
     /// Distance at which the plates touch [m]; none: that of nearly closed gaps of their size.
     #[serde(default)]
     pub touch: Option<f64>,
+    /// What an impact loses.
+    #[serde(default)]
+    pub impact: Impact,
     /// Where its voltage comes from.
     pub voltage: GapVoltage,
 }
@@ -92,6 +109,9 @@ pub struct BeamGap {
     /// Distance at which the beams touch [m]; none: that of nearly closed gaps of their size.
     #[serde(default)]
     pub touch: Option<f64>,
+    /// What an impact loses.
+    #[serde(default)]
+    pub impact: Impact,
     /// Where its voltage comes from.
     pub voltage: GapVoltage,
 }
@@ -113,4 +133,7 @@ pub struct Stop {
     pub stiffness: Option<f64>,
     /// Area on which a rigid stop bears [m²].
     pub area: f64,
+    /// What an impact loses.
+    #[serde(default)]
+    pub impact: Impact,
 }

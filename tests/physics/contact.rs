@@ -13,14 +13,14 @@ pub(crate) const EPS: f64 = 8.854e-12;
 pub(crate) const LEAST: f64 = TOUCH * (1.0 - 0.5 * DEEPEST);
 
 /// A plate of area A on a spring k in front of an electrode at a distance g.
-fn plate(k: f64, area: f64, gap: f64) -> Compiled {
+fn plate(k: f64, area: f64, gap: f64, impact: &str) -> Compiled {
     let text = format!(
         "anchor * [f] []
         mass2d * [m] [m=1e-10]
         guide2d * [m] []
         spring2d * [f m] [kx={k:e}]
         anchor * [e] []
-        plategap2d * [m e] [A={area:e} gap={gap:e}]
+        plategap2d * [m e] [A={area:e} gap={gap:e} {impact}]
         eground * [e] []
         drive port * [m e] []"
     );
@@ -49,10 +49,10 @@ fn nathanson(k: f64, area: f64, gap: f64) -> f64 {
 }
 
 /// Numbers between two bounds, evenly in their logarithm, the same in every run (Knuth's 64-bit congruence).
-struct Numbers(u64);
+pub(crate) struct Numbers(pub(crate) u64);
 
 impl Numbers {
-    fn between(&mut self, low: f64, high: f64) -> f64 {
+    pub(crate) fn between(&mut self, low: f64, high: f64) -> f64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         let share = (self.0 >> 11) as f64 / (1u64 << 53) as f64;
         low * (high / low).powf(share)
@@ -74,7 +74,7 @@ fn a_thousand_plates_rest_on_contact() {
         if pressure > 2e10 {
             continue; // silicon bears about 10 GPa
         }
-        let result = balance(&plate(k, area, gap), &[("drive", volts)]);
+        let result = balance(&plate(k, area, gap, ""), &[("drive", volts)]);
         let left = gap - node(&result, "m").x;
         assert!(
             result.pulled_in && (LEAST..=TOUCH).contains(&left),
@@ -111,10 +111,10 @@ fn beyond_the_law_there_is_no_number() {
 
 /// One gap of random size, in one of four layouts: a lumped plate, a cantilever that is the electrode, a wide electrode on a thin
 /// cantilever (SUGAR's demo beamgap2e), a clamped-clamped beam over four pieces of an electrode.
-fn random_part(case: usize, random: &mut Numbers) -> Compiled {
+pub(crate) fn random_part(case: usize, random: &mut Numbers) -> Compiled {
     let gap = random.between(1e-6, 4e-6);
     if case.is_multiple_of(4) {
-        return plate(random.between(0.1, 10.0), random.between(1e-9, 1e-7), gap);
+        return plate(random.between(0.1, 10.0), random.between(1e-9, 1e-7), gap, "");
     }
     let (l, w) = (random.between(60e-6, 200e-6), random.between(1e-6, 3e-6));
     let field = format!("gap={gap:e}] \n R * [a b] [R=1]\n R * [c d] [R=1]\n anchor p1 [c] []\n anchor p1 [d] []\n");
@@ -172,7 +172,7 @@ fn plates_pull_in_and_let_go() {
     let mut random = Numbers(5);
     for _ in 0..100 {
         let (k, area, gap) = (random.between(0.1, 10.0), random.between(1e-9, 1e-7), random.between(0.5e-6, 4e-6));
-        let found = pull_in(&plate(k, area, gap), None, 1000.0).unwrap();
+        let found = pull_in(&plate(k, area, gap, ""), None, 1000.0).unwrap();
         close(found.pull_in_v, nathanson(k, area, gap), 1e-6);
         let release = (2.0 * k * (gap - TOUCH) * TOUCH * TOUCH / (EPS * area)).sqrt();
         close(found.release_v.unwrap(), release, 5e-3);
@@ -197,7 +197,7 @@ fn plate_with_a_stop() {
 #[test]
 fn a_hundred_bounces_gain_no_energy() {
     let (mass, k, area, gap, volts) = (1e-10, 1.0, 1e-8, 2e-6, 8.0);
-    let compiled = plate(k, area, gap);
+    let compiled = plate(k, area, gap, "restitution=1");
     let energy = |x: f64, v: f64| 0.5 * (mass * v * v + k * x * x - EPS * area * volts * volts / (gap - x));
     let released = energy(0.0, 0.0) - energy(gap - TOUCH, 0.0);
     for (tol, share) in [(1e-3, 1e-3), (1e-2, 1e-2)] {

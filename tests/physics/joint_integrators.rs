@@ -6,7 +6,7 @@ use bimorph::analysis::AnalysisError;
 use bimorph::analysis::formulation::{Formulation, coordinate_scales};
 use bimorph::analysis::integrator::{Integrator, Run};
 use bimorph::analysis::joint_transient::{JointReport, joint_transient};
-use bimorph::analysis::transient::{TransientOptions, TransientResult, transient};
+use bimorph::analysis::transient::{TransientOptions, TransientResult, Until, transient};
 use bimorph::compile::{CompileOptions, Compiled};
 use bimorph::domains::Ramp;
 use bimorph::equations::constrained::Constrained;
@@ -147,6 +147,7 @@ fn pull_in_and_contact() {
     let options = |method| TransientOptions {
         voltages: vec![("drive".into(), 8.0)],
         events: vec![("m.x".into(), 1e-6)],
+        until: Some(Until::Contact),
         ..asked(1.5e-4, "m.x", method, 1e-4)
     };
     let bodies = transient(&compiled, &options(Integrator::Rodas4), &mut |_, _| {}, &mut |_| true).unwrap();

@@ -8,7 +8,7 @@ use bimorph::analysis::mesh::harmonic_fitted;
 use bimorph::analysis::mesh::in_circuit;
 use bimorph::analysis::mesh::{modes_fitted, pull_in_fitted, static_fitted};
 use bimorph::analysis::step_error::with_step_error;
-use bimorph::analysis::transient::{TransientOptions, transient};
+use bimorph::analysis::transient::{TransientOptions, Until, transient};
 use bimorph::compile::{CompileOptions, Compiled, compile};
 use bimorph::device::local::LocalDevice;
 use bimorph::device::{Device, Mode, OpenRequest, SmallSignal, Status, Token, Trial, TrialReply};
@@ -185,6 +185,13 @@ fn analyses_have_the_same_bits() {
         events: options.events.clone(),
         ..RemoteTransient::default()
     };
+    // the same until m.x first crosses its level
+    let until = Some(Until::Level("m.x".into(), 1e-8));
+    let ending = TransientOptions { until: until.clone(), ..options.clone() };
+    let ended = with_step_error(&ending, &moving, &mut run, &mut |_, _| {}, &mut |_| true).expect("runs").0;
+    assert!(ended.stopped_at.is_some());
+    let there = client.transient(&model, &RemoteTransient { until, ..remote.clone() }, &mut |_| true);
+    assert_eq!(there.expect("runs"), ended);
     let mut told = 0.0;
     let there = client.transient(&model, &remote, &mut |fraction| {
         assert!(fraction >= told);

@@ -104,16 +104,7 @@ pub fn frame_transient(
     let signals = (options.signals.iter().zip(&signals).zip(rows))
         .map(|((name, signal), row)| (name.clone(), signal.unit().to_owned(), row))
         .collect();
-    Ok(TransientResult {
-        t,
-        signals,
-        counters,
-        unknowns: frame.system.unknowns(),
-        estimated_error: None,
-        step_error: None,
-        events: Vec::new(),
-        warnings: Vec::new(),
-    })
+    Ok(TransientResult { t, signals, counters, unknowns: frame.system.unknowns(), ..TransientResult::default() })
 }
 
 /// Largest change of a signal between two runs, against its largest value.

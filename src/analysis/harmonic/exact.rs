@@ -75,9 +75,11 @@ impl<'a> Exact<'a> {
         let mut undriven = base.electrics.drive();
         base.electrics.apply(&point.sources[..base.electrics.sources()], &point.rise, &mut undriven);
         let refined = (!base.model.linear).then(|| Refined::new(base, &point.q, &undriven));
+        let mut harmonic = Harmonic::new(system);
+        harmonic.about(system, &point.q);
         Ok(Self {
             refined,
-            harmonic: Harmonic::new(system),
+            harmonic,
             compiled,
             point,
             still: vec![Pose::zeros(); bodies],

@@ -6,6 +6,7 @@ use super::super::modes::{higher, lowest};
 use super::equilibrium;
 use super::frequencies::for_modes;
 use super::meshed::{chosen, laid};
+use super::section_inertia::with_section_inertia;
 use super::warnings::{WARNING, beyond};
 use crate::budget::bounded;
 use crate::compile::Compiled;
@@ -30,6 +31,8 @@ const HELD: usize = 3;
 /// fine it is one that holds ten, a hundred or a thousand times the tolerance. A warning says where one of the two may be off by more than the
 /// tolerance. What voltages do is not known here.
 pub fn in_circuit(compiled: &Compiled) -> Compiled {
+    let turning = with_section_inertia(compiled);
+    let compiled = turning.as_deref().unwrap_or(compiled);
     let given = chosen(compiled) || compiled.options.band.is_some();
     let drawn = compiled.parts.system.model.unknowns();
     if compiled.order.segments.is_empty() {

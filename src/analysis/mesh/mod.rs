@@ -11,6 +11,7 @@
 //! | frequency response | the response itself and the modes within the band, compared with those of twice the segments | `in_band` |
 //! | transient | the states it starts from and goes to, and the modes that the difference of the two excites | `excited` |
 //! | transient whose stiffness changes on the way, or with a part in none of the modes | the run itself, compared with that of half the segments | `swung` |
+//! | transient that closes a gap | the run up to its first contact, compared with that of half the segments | `swung` |
 //!
 //! Who gives a number of segments gets them, and the estimate of their error. Who gives a band gets the mesh for that band at
 //! least. The estimate is in [`Compiled::order`]; where it is missing or beyond the tolerance, a warning is added.
@@ -28,6 +29,7 @@ mod mode_pairs;
 mod path;
 mod pull_in;
 mod refined;
+mod section_inertia;
 mod seen;
 mod softening;
 mod swung;
@@ -52,6 +54,7 @@ use meshed::on;
 pub use path::path_fitted;
 use pull_in::for_pull_in;
 pub use pull_in::pull_in_fitted;
+use section_inertia::with_section_inertia;
 use warnings::{of_fingers, of_heat, of_stress};
 
 pub(crate) use equilibrium::{told_moving, told_still};
@@ -116,8 +119,9 @@ pub fn fitted_in_time(
     for name in options.signals.iter().filter(|name| !name.contains('[')) {
         Signal::find(moving, name)?;
     }
+    let moving = &*with_section_inertia(moving)?;
     let order = order_in_time(moving, options)?;
-    let start = options.release.map(|start| on(start, order.clone())).transpose()?;
+    let start = options.release.map(|start| on(&*with_section_inertia(start)?, order.clone())).transpose()?;
     let mut moving = on(moving, order)?;
     let told = told_of_run(&moving, start.as_ref(), &options.voltages);
     moving.warnings.items.extend(told);
@@ -155,6 +159,10 @@ fn left_out_in_time(moving: &Compiled, start: Option<&Compiled>, voltages: &Port
 /// # Errors
 /// See [`fitted`].
 pub fn order_in_time(moving: &Compiled, options: &TransientOptions<'_>) -> Result<ModelOrder, AnalysisError> {
-    let (order, left) = excited::order(moving, options)?;
+    // the modes about a closed gap are those of parts that are pressed together, and say nothing of the way there
+    let (order, left) = match swung::closes(moving, options) {
+        true => (ModelOrder { estimated_error: Some(0.0), ..moving.order.clone() }, 0.0),
+        false => excited::order(moving, options)?,
+    };
     swung::order(moving, options, order, left)
 }

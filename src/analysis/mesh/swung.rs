@@ -8,6 +8,8 @@
 //! times that where it is 2. Where it is beyond the tolerance segments are doubled, until the tolerance holds. A coarser mesh on the way that should hold it as well is run and
 //! compared; if it does, it is taken. What is told of a mesh is always of one that was run.
 //!
+//! A run to a state in which parts touch is compared up to its first contact: impacts on two meshes have nothing else in common than their means.
+//!
 //! Where stiffness stays, but more of the run than the tolerance is in none of the modes that its mesh was laid out for, a bound would be all
 //! that could be told: that run is made twice, too, and what the two differ by is told instead.
 
@@ -17,7 +19,7 @@ use super::super::integrator::Integrator;
 use super::super::signal::Signal;
 use super::super::statics::{OperatingPoint, operating_point};
 use super::super::step_error;
-use super::super::transient::{TransientOptions, TransientResult, transient};
+use super::super::transient::{TransientOptions, TransientResult, Until, transient};
 use super::excited;
 use super::meshed::{chosen, meshed};
 use crate::compile::Compiled;
@@ -33,6 +35,8 @@ const LOOSER: f64 = 10.0;
 const LOOSEST: f64 = 0.1;
 /// Output times that are compared, at least and at most, whatever is printed.
 const POINTS: (usize, usize) = (201, 1001);
+/// Times as many of a run that ends at an event.
+const SOONER: usize = 5;
 /// Unknowns times steps of one run, at most.
 const MOST_WORK: f64 = 3e6;
 /// Output times that a run must have reached to say something.
@@ -63,7 +67,10 @@ pub(super) fn order(
         return Ok(at_least(left));
     }
     let goal = SAFETY * moving.options.tol;
-    if !bends(moving, options, &order)? {
+    let closes = closes(moving, options);
+    let until = if closes { options.until.clone().or(Some(Until::Contact)) } else { options.until.clone() };
+    let options = &TransientOptions { until, ..options.clone() };
+    if !closes && !bends(moving, options, &order)? {
         let found = (left > moving.options.tol).then(|| compared(moving, options, &order.segments)).flatten();
         return Ok(match found {
             // both runs have what the modes are off by, too
@@ -111,6 +118,15 @@ pub(super) fn order(
         segments = next.unwrap_or_default();
     }
     Ok(last)
+}
+
+/// True where the run goes from rest to a state in which parts touch, on a mesh that is to be found.
+pub(super) fn closes(moving: &Compiled, options: &TransientOptions<'_>) -> bool {
+    let system = &moving.parts.system;
+    let free = !chosen(moving) && moving.options.band.is_none();
+    let asked = free && options.release.is_none() && !options.signals.is_empty();
+    let touches = |point: OperatingPoint| (0..system.members.len()).any(|g| system.touches(g, &point.q));
+    asked && system.can_touch() && operating_point(moving, &options.voltages).is_ok_and(touches)
 }
 
 /// A mesh, and the one beside it that tells what a run on it is off by: half its segments; of an odd number there is no half, then twice as
@@ -191,7 +207,11 @@ fn swing(moving: &Compiled, options: &TransientOptions<'_>, segments: &[usize]) 
 }
 
 fn points(options: &TransientOptions<'_>) -> usize {
-    options.points.clamp(POINTS.0, POINTS.1)
+    // one that ends at an event may be over soon
+    match options.until {
+        Some(_) => options.points.max(SOONER * POINTS.1),
+        None => options.points.clamp(POINTS.0, POINTS.1),
+    }
 }
 
 /// How far two runs are apart, of the amplitude.
@@ -207,6 +227,8 @@ fn apart(moving: &Compiled, options: &TransientOptions<'_>, coarse: &[Vec<f64>],
     };
     let (coarse, fine) = (named(coarse)?, named(fine)?);
     let error = largest_error(&fine, &coarse, &|unit| step_error::least(unit, options, moving));
-    let share = (both - 1) as f64 / (points(options) - 1) as f64;
+    // a run that ends at an event is whole
+    let whole = options.until.is_some();
+    let share = if whole { 1.0 } else { (both - 1) as f64 / (points(options) - 1) as f64 };
     Some(error / share.min(1.0))
 }

@@ -10,6 +10,7 @@
 //! A companion has a third to a half of the steps. One that would take long is given up after 3e6 unknowns times steps, and its difference
 //! is continued in proportion to time, as phases go.
 
+use super::super::after_contact::{Pair, first_contact, judge};
 use super::super::chart::error::largest_error;
 use super::super::integrator::Integrator;
 use super::super::transient::error_log::least;
@@ -92,8 +93,8 @@ fn once<T>(
     sample: &mut dyn FnMut(f64, &[f64]),
     watch: Watch<'_>,
 ) -> Result<Made<T>, AnalysisError> {
-    let reached = companion.as_ref().map_or(0, |c| c.signals.first().map_or(0, |s| s.2.len()));
-    let mut picked = Picked::new(options, reached);
+    let reached = companion.as_ref().map_or(0, sampled);
+    let mut picked = Picked::new(options);
     let mut both = |t: f64, values: &[f64]| {
         picked.add(values);
         sample(t, values);
@@ -105,14 +106,28 @@ fn once<T>(
     let picked = TransientResult { signals, counters: result.counters, ..TransientResult::default() };
     // one that took the same steps proves nothing
     let other = |c: &TransientResult| c.counters.steps != result.counters.steps;
-    match companion.filter(|c| (whole || reached >= FEWEST) && other(c) && resolved) {
+    let least = |unit: &str| least(unit, options, model);
+    let contact = first_contact(&result);
+    match companion.as_ref().filter(|c| (whole || reached >= FEWEST) && other(c) && resolved) {
         Some(companion) => {
-            let apart = largest_error(&picked, &companion, &|unit| least(unit, options, model));
-            let share = ((reached - 1) * stride(options)) as f64 / (options.points - 1) as f64;
+            // single values after a contact are judged on their own
+            let last = contact.map_or(usize::MAX, |t| (t / spacing(options)) as usize + 1);
+            let count = reached.min(sampled(&picked)).min(last);
+            let apart = largest_error(&cut(&picked, count), &cut(companion, count), &least);
+            let share = match options.until.is_some() || contact.is_some() {
+                true => 1.0,
+                false => ((reached - 1) * stride(options)) as f64 / (options.points - 1) as f64,
+            };
             let (_, method) = Formulation::of_run(model, options);
             result.step_error = Some(reported_fraction(options, method) * apart / share.min(1.0));
         }
         None => result.warnings.extend((!options.signals.is_empty()).then(|| unknown(options))),
+    }
+    if contact.is_some() {
+        let columns = |run: &TransientResult| run.signals.iter().map(|(_, _, c)| c.clone()).collect::<Vec<_>>();
+        let (run, companion) = (columns(&picked), companion.as_ref().map(columns));
+        let pair = Pair { spacing: spacing(options), run: &run, companion: companion.as_deref() };
+        judge(&pair, options, &least, &mut result);
     }
     Ok(Made { result, more, picked })
 }
@@ -125,6 +140,23 @@ fn reported_fraction(options: &TransientOptions<'_>, method: Integrator) -> f64 
         Some(_) => SHARE,
         None => share.max(RESERVE / (loose(options) / options.tol - 1.0)),
     }
+}
+
+/// Distance of the output times that are compared [s].
+fn spacing(options: &TransientOptions<'_>) -> f64 {
+    stride(options) as f64 * options.stop / (options.points - 1) as f64
+}
+
+/// Number of samples of a run.
+fn sampled(run: &TransientResult) -> usize {
+    run.signals.first().map_or(0, |(_, _, column)| column.len())
+}
+
+/// The first samples of a run.
+fn cut(run: &TransientResult, count: usize) -> TransientResult {
+    let cut =
+        |(name, unit, column): &(String, String, Vec<f64>)| (name.clone(), unit.clone(), column[..count].to_vec());
+    TransientResult { signals: run.signals.iter().map(cut).collect(), ..TransientResult::default() }
 }
 
 /// Of a method whose error falls fast with the length of its steps.
@@ -154,7 +186,7 @@ pub(super) fn companion<T>(
         keep: false,
         ..options.clone()
     };
-    let mut picked = Picked::new(options, usize::MAX);
+    let mut picked = Picked::new(options);
     let mut keep = |_: f64, values: &[f64]| picked.add(values);
     let (mut steps, mut stopped) = (0.0, false);
     let mut few = |_: f64| {

@@ -55,19 +55,17 @@ pub(super) fn stride(options: &TransientOptions<'_>) -> usize {
 pub(super) struct Picked {
     stride: usize,
     count: usize,
-    max: usize,
     pub(super) columns: Vec<Vec<f64>>,
 }
 
 impl Picked {
-    /// At most `max` of them.
-    pub(super) fn new(options: &TransientOptions<'_>, max: usize) -> Self {
-        Self { stride: stride(options), count: 0, max, columns: vec![Vec::new(); options.signals.len()] }
+    /// None yet.
+    pub(super) fn new(options: &TransientOptions<'_>) -> Self {
+        Self { stride: stride(options), count: 0, columns: vec![Vec::new(); options.signals.len()] }
     }
 
     pub(super) fn add(&mut self, values: &[f64]) {
-        let wanted = self.count.is_multiple_of(self.stride);
-        if wanted && self.columns.first().is_some_and(|column| column.len() < self.max) {
+        if self.count.is_multiple_of(self.stride) {
             crate::budget::lay_out(size_of_val(values));
             self.columns.iter_mut().zip(values).for_each(|(column, value)| column.push(*value));
         }

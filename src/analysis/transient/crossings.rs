@@ -2,12 +2,12 @@
 
 use super::super::AnalysisError;
 use super::super::signal::{Signal, View};
-use super::options::TransientOptions;
+use super::options::{TransientOptions, Until};
 use super::result::Event;
 use crate::compile::Compiled;
 use crate::domains::Ramp;
 use crate::solve::dense::interpolate;
-use crate::solve::time::event::Detector;
+use crate::solve::time::event::{Detector, Direction};
 use crate::solve::time::method::Motion;
 
 /// A signal whose crossings of a level are found.
@@ -28,12 +28,27 @@ fn watched(compiled: &Compiled, options: &TransientOptions<'_>) -> Result<Vec<Wa
         .iter()
         .map(|(name, level)| Signal::find(compiled, name).map(|signal| watch(name.clone(), signal, *level, false)));
     let system = &compiled.parts.system;
+    let ending = match &options.until {
+        Some(Until::Level(name, level)) if !options.events.contains(&(name.clone(), *level)) => {
+            Some(Signal::find(compiled, name).map(|signal| watch(name.clone(), signal, *level, false)))
+        }
+        _ => None,
+    };
     let touching =
         (0..system.members.len()).filter_map(|g| system.touching(g).map(|[touch, _]| (g, touch))).map(|(g, touch)| {
             let name = format!("{}.gap", compiled.parts.gap_names[g]);
             Ok(watch(name, Signal::Distance(g), touch, true))
         });
-    asked.chain(touching).collect()
+    asked.chain(ending).chain(touching).collect()
+}
+
+/// True for the event that a run goes on until.
+fn ends(until: &Until, event: &Event) -> bool {
+    match until {
+        Until::Contact => event.contact && event.direction == Direction::Down,
+        Until::Release => event.contact && event.direction == Direction::Up,
+        Until::Level(name, level) => !event.contact && event.signal == *name && event.level == *level,
+    }
 }
 
 /// Finds the crossings of a run.
@@ -44,6 +59,7 @@ pub(super) struct Crossings<'a> {
     watched: Vec<Watched>,
     within: Motion,
     rise: Vec<f64>,
+    until: Option<Until>,
     /// What was found, in order of time.
     pub(super) events: Vec<Event>,
 }
@@ -64,11 +80,12 @@ impl<'a> Crossings<'a> {
             w.detector = Detector::new(w.signal.value(compiled, &view) - w.level);
         }
         let within = Motion::zeros(compiled.parts.system.bodies());
-        Ok(Self { compiled, ramp, volts, watched, within, rise: rise.to_vec(), events: Vec::new() })
+        let until = options.until.clone();
+        Ok(Self { compiled, ramp, volts, watched, within, rise: rise.to_vec(), until, events: Vec::new() })
     }
 
-    /// Finds the crossings in a step of length `h` from time `s`.
-    pub(super) fn step(&mut self, s: f64, h: f64, before: &Motion, after: &Motion) {
+    /// Finds the crossings in a step of length `h` from time `s`, up to one that ends the run. Returns the time of that [s].
+    pub(super) fn step(&mut self, s: f64, h: f64, before: &Motion, after: &Motion) -> Option<f64> {
         let (compiled, ramp, volts) = (self.compiled, self.ramp, self.volts);
         let first = self.events.len();
         for w in &mut self.watched {
@@ -92,5 +109,9 @@ impl<'a> Crossings<'a> {
             });
         }
         self.events[first..].sort_by(|a, b| a.t.total_cmp(&b.t));
+        let until = self.until.as_ref()?;
+        let last = first + self.events[first..].iter().position(|event| ends(until, event))?;
+        self.events.truncate(last + 1);
+        Some(self.events[last].t)
     }
 }

@@ -7,6 +7,27 @@ use crate::options::analysis::TRAN_POINTS;
 use crate::solve::baseline::SolverKind;
 use crate::solve::time::adaptive::Control;
 
+/// What ends a run before its time is up.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Until {
+    /// The contact force of a gap or stop begins to act.
+    Contact,
+    /// A contact force ends.
+    Release,
+    /// A signal crosses a level, in the signal's unit.
+    Level(String, f64),
+}
+
+impl std::fmt::Display for Until {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Contact => f.write_str("contact"),
+            Self::Release => f.write_str("release"),
+            Self::Level(name, level) => write!(f, "{name}={level}"),
+        }
+    }
+}
+
 /// What a transient may be told.
 #[derive(Debug, Clone)]
 pub struct TransientOptions<'a> {
@@ -28,6 +49,8 @@ pub struct TransientOptions<'a> {
     pub step: Option<f64>,
     /// Crossings to find: (signal name, level in the signal's unit).
     pub events: Vec<(String, f64)>,
+    /// What ends the run before `stop`.
+    pub until: Option<Until>,
     /// What solves the linear systems of the method. The result is the same to rounding; all but the recursion are
     /// baselines, and Radau5 and rk45 have none.
     pub solver: SolverKind,
@@ -51,6 +74,7 @@ impl Default for TransientOptions<'_> {
             method: Integrator::default(),
             step: None,
             events: Vec::new(),
+            until: None,
             solver: SolverKind::default(),
             estimate: false,
             keep: true,

@@ -71,14 +71,20 @@ pub(in crate::analysis) fn record(
     let mut log = options.estimate.then(|| ErrorLog::start((compiled, options.stop), held, &signals, &motion));
     let mut stability = Stability::new(system);
     let mut looks = 0;
-    let mut beyond = None;
+    let (mut beyond, mut stopped_at) = (None, None);
+    refuse_in_contact(compiled, options, 0.0, &motion)?;
     let mut observe = |s: f64, h: f64, before: &Motion, after: &Motion| {
-        if let Err(error) = within_contact_range(compiled, &after.q) {
+        stopped_at = crossings.step(s, h, before, after);
+        let suits = refuse_in_contact(compiled, options, s + h, after);
+        let within = |()| within_contact_range(compiled, &after.q);
+        if let Err(error) = suits.and_then(within).or_else(|error| stopped_at.map(|_| ()).ok_or(error)) {
             beyond = Some(error);
             return false;
         }
-        samples.step(s, h, before, after);
-        crossings.step(s, h, before, after);
+        samples.step(s, h, before, after, stopped_at.unwrap_or(f64::INFINITY));
+        if stopped_at.is_some() {
+            return false;
+        }
         let done = ((s + h) / options.stop * LOOKS as f64 * (1.0 + 1e-12)) as usize;
         if done > looks {
             looks = done;
@@ -95,10 +101,13 @@ pub(in crate::analysis) fn record(
         }
         other => other,
     })?;
-    if end == Advance::Stopped {
+    if end == Advance::Stopped && stopped_at.is_none() {
         return Err(beyond.unwrap_or(AnalysisError::Cancelled));
     }
     let estimate = log.and_then(|log| log.estimate(options));
+    let unreached = options.until.as_ref().filter(|_| stopped_at.is_none()).map(|until| {
+        format!("the run does not reach what it goes on until ({until}) by {:e} s; take a longer --stop", options.stop)
+    });
     let named = options.signals.iter().zip(&signals).zip(samples.columns);
     Ok(TransientResult {
         t: samples.t,
@@ -114,8 +123,39 @@ pub(in crate::analysis) fn record(
         unknowns: compiled.unknowns(),
         estimated_error: compiled.order.estimated_error,
         step_error: estimate.as_ref().map(|estimate| estimate.error),
+        stopped_at,
+        reliable_until: None,
+        after_contact: Vec::new(),
         events: crossings.events,
-        warnings: begun.into_iter().chain(stability.told()).chain(estimate.and_then(|e| e.lost).map(lost)).collect(),
+        warnings: begun
+            .into_iter()
+            .chain(stability.told())
+            .chain(estimate.and_then(|e| e.lost).map(lost))
+            .chain(unreached)
+            .collect(),
+    })
+}
+
+/// Refuses the motion at time `t` [s] where parts touch and the method gains energy in contact.
+fn refuse_in_contact(
+    compiled: &Compiled,
+    options: &TransientOptions<'_>,
+    t: f64,
+    motion: &Motion,
+) -> Result<(), AnalysisError> {
+    if !options.method.gains_in_contact() {
+        return Ok(());
+    }
+    let system = &compiled.parts.system;
+    let Some(gap) = (0..system.members.len()).find(|&g| system.touches(g, &motion.q)) else { return Ok(()) };
+    let name = &compiled.parts.gap_names[gap];
+    let method = options.method.name();
+    Err(AnalysisError::BadRequest {
+        what: format!("method {method}"),
+        detail: format!(
+            "the gap \"{name}\" touches at {t:.6e} s, and {method} gains energy without bound in contact; expected a method that does not: \
+             rodas4 (default), radau5, sdirk4, tr-bdf2, avf, or generalized-alpha with --rho 0"
+        ),
     })
 }
 

@@ -35,6 +35,27 @@ pub struct Event {
     pub contact: bool,
 }
 
+/// Statistics of a signal over the part of a run whose single values do not hold, by windows of equal length.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Statistics {
+    /// Name of the signal.
+    pub signal: String,
+    /// From when [s].
+    pub from: f64,
+    /// To when [s].
+    pub to: f64,
+    /// Mean over that time, in the signal's unit.
+    pub mean: f64,
+    /// Half of its 95 % confidence interval.
+    pub mean_error: f64,
+    /// Root mean square about the mean.
+    pub rms: f64,
+    /// Lowest sample.
+    pub low: f64,
+    /// Highest sample.
+    pub high: f64,
+}
+
 /// Sampled signals.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct TransientResult {
@@ -51,6 +72,12 @@ pub struct TransientResult {
     /// Estimated root mean square error of the worst signal by the steps in time, of its amplitude [1]; none without an estimate, see
     /// [`super::step_error`].
     pub step_error: Option<f64>,
+    /// When [`super::TransientOptions::until`] ended the run [s].
+    pub stopped_at: Option<f64>,
+    /// Time up to which the tolerance holds [s]; none: to the end. See [`super::super::after_contact`].
+    pub reliable_until: Option<f64>,
+    /// Statistics of each signal after that.
+    pub after_contact: Vec<Statistics>,
     /// Crossings asked for and contacts of gaps, in order of time.
     pub events: Vec<Event>,
     /// What the numbers do not say by themselves.

@@ -57,13 +57,13 @@ impl<'a> Samples<'a> {
         samples
     }
 
-    /// Takes the samples that fall into a step of length `h` from time `s`.
-    pub(super) fn step(&mut self, s: f64, h: f64, before: &Motion, after: &Motion) {
+    /// Takes the samples that fall into a step of length `h` from time `s`, those after `end` [s] not.
+    pub(super) fn step(&mut self, s: f64, h: f64, before: &Motion, after: &Motion, end: f64) {
         let mut now = std::mem::take(&mut self.now);
         while self.next < self.options.points {
             let last = self.next + 1 == self.options.points;
             let t = if last { self.options.stop } else { self.next as f64 * self.spacing };
-            if t > s + h && !last || t > (s + h) * (1.0 + 1e-12) {
+            if t > end || t > s + h && !last || t > (s + h) * (1.0 + 1e-12) {
                 break;
             }
             crate::budget::check();

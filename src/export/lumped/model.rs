@@ -28,6 +28,8 @@ pub struct LumpedGap {
     pub along: DVector<f64>,
     /// What it does.
     pub law: Law,
+    /// χ of its contact [s/m]; 0: elastic, or none.
+    pub loss: f64,
     /// Voltage per voltage of each port [1].
     pub by_port: DVector<f64>,
     /// Voltage by the netlist's own sources [V].

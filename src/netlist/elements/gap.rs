@@ -4,7 +4,7 @@ use super::super::drawing::Fact;
 use super::super::sink::Reported;
 use super::super::value::short;
 use super::arguments::Site;
-use crate::structure::{BeamGap, GapVoltage, NodeId, PlateGap, Resistor};
+use crate::structure::{BeamGap, GapVoltage, Impact, LEAST_RESTITUTION, NodeId, PlateGap, Resistor};
 
 /// SUGAR's factor on the fringe field: α = 1 + 1.12·gap/h.
 const FRINGE: f64 = 1.12;
@@ -36,6 +36,19 @@ impl Site<'_, '_> {
         Ok(touch)
     }
 
+    /// What an impact loses, as far as it is given.
+    pub(super) fn impact(&mut self) -> Result<Impact, Reported> {
+        let (restitution, speed) = (self.positive_if_any("restitution")?, self.positive_if_any("speed")?);
+        if let Some(e) = restitution
+            && !(LEAST_RESTITUTION..=1.0).contains(&e)
+        {
+            let message = format!("`restitution` is {}, expected {LEAST_RESTITUTION} to 1", short(e));
+            let help = "1 is elastic contact; the default is 0.5 at the speed `speed` [m/s]";
+            return Err(self.sink.error("E060", self.span_of("restitution"), message, help));
+        }
+        Ok(Impact { restitution, speed })
+    }
+
     /// The field between two facing beams. Node c lies at local y = −(gap + (w1+w2)/2) under a, d under b.
     fn facing(&mut self, voltage: GapVoltage) -> Result<(), Reported> {
         let angle = self.direction(self.instance.rotation)?;
@@ -44,6 +57,7 @@ impl Site<'_, '_> {
         let (length, gap, height) = (self.positive("l")?, self.positive("gap")?, self.positive("h")?);
         let permittivity = self.permittivity()?;
         let touch = self.touch(gap)?;
+        let impact = self.impact()?;
         let below = -(gap + (w1 + w2) / 2.0);
         let nodes: [NodeId; 4] = std::array::from_fn(|i| self.node(i));
         let offsets = [[0.0; 2], [length, 0.0], [0.0, below], [length, below]].map(|v| self.global(v));
@@ -59,6 +73,7 @@ impl Site<'_, '_> {
             permittivity,
             fringe: 1.0 + FRINGE * gap / height,
             touch,
+            impact,
             voltage,
         });
         Ok(())
@@ -154,11 +169,13 @@ pub(super) fn plategap2d(site: &mut Site<'_, '_>) -> Result<(), Reported> {
     let (area, gap) = (site.positive("A")?, site.positive("gap")?);
     let permittivity = site.permittivity()?;
     let touch = site.touch(gap)?;
+    let impact = site.impact()?;
     let axis = [angle.cos(), angle.sin()];
     let (a, b) = (site.node(0), site.node(1));
     let voltage = site.across(0, 1);
     site.drawing.place(site.instance.span, &[a, b], &[[0.0; 2], [gap * axis[0], gap * axis[1]]]);
     let name = site.name();
-    site.drawing.structure.plate_gaps.push(PlateGap { name, a, b, axis, area, gap, permittivity, touch, voltage });
+    let plate = PlateGap { name, a, b, axis, area, gap, permittivity, touch, impact, voltage };
+    site.drawing.structure.plate_gaps.push(plate);
     Ok(())
 }

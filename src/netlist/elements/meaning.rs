@@ -14,6 +14,8 @@ pub(super) fn meaning(name: &str) -> &'static str {
         "back" => "way against local x [m]",
         "k" => "stiffness [N/m]",
         "touch" => "distance at which the parts touch [m]",
+        "restitution" => "speed after an impact over that before [1]",
+        "speed" => "reference speed of impacts [m/s]",
         "N" => "number of gaps [1]",
         "A" => "gain [1], or area [m²]",
         "I" => "current [A]",

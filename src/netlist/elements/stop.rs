@@ -17,6 +17,7 @@ pub(super) fn stop2d(site: &mut Site<'_, '_>) -> Result<(), Reported> {
     }
     let stiffness = site.positive_if_any("k")?;
     let area = site.positive_if_any("A")?.unwrap_or(AREA);
+    let impact = site.impact()?;
     let nodes = site.instance.nodes.clone();
     site.drawing.mechanical(&nodes);
     let name = site.name();
@@ -29,6 +30,7 @@ pub(super) fn stop2d(site: &mut Site<'_, '_>) -> Result<(), Reported> {
         ways,
         stiffness,
         area,
+        impact,
     });
     Ok(())
 }

@@ -109,10 +109,29 @@ const WIRED: &[usize] = &[2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16];
 /// Nodes that one anchor may hold.
 const PADS: &[usize] = &[1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16];
 const SIZE: &[&str] = &["l", "w", "h"];
-const GAP: &[&str] = &["l", "w", "w1", "w2", "gap", "h", "V", "permittivity", "touch"];
-const GAP_E: &[&str] =
-    &["l", "w", "w1", "w2", "gap", "h", "R", "R1", "R2", "G", "G1", "G2", "resistivity", "permittivity", "touch"];
-const GAP_SHEET: &[&str] = &["l", "w", "w1", "w2", "gap", "h", "Rs", "permittivity", "touch"];
+const GAP: &[&str] = &["l", "w", "w1", "w2", "gap", "h", "V", "permittivity", "touch", "restitution", "speed"];
+const GAP_E: &[&str] = &[
+    "l",
+    "w",
+    "w1",
+    "w2",
+    "gap",
+    "h",
+    "R",
+    "R1",
+    "R2",
+    "G",
+    "G1",
+    "G2",
+    "resistivity",
+    "permittivity",
+    "touch",
+    "restitution",
+    "speed",
+];
+const GAP_SHEET: &[&str] = &["l", "w", "w1", "w2", "gap", "h", "Rs", "permittivity", "touch", "restitution", "speed"];
+const PLATES: &[&str] = &["A", "gap", "permittivity", "touch", "restitution", "speed"];
+const STOP: &[&str] = &["gap", "back", "k", "A", "restitution", "speed"];
 const LOAD: &[&str] = &["F", "M"];
 
 const fn sugar(
@@ -241,9 +260,9 @@ const MODELS: &[Model] = &[
     own("spring2d", &[2], "[a b]", &["kx", "ky", "krz", "l"], lumped::spring2d),
     own("damper2d", &[2], "[a b]", &["bx", "by", "brz", "l"], lumped::damper2d),
     own("guide2d", &[1], "[n]", &[], support::guide2d),
-    own("plategap2d", &[2], "[a b]", &["A", "gap", "permittivity", "touch"], gap::plategap2d),
+    own("plategap2d", &[2], "[a b]", PLATES, gap::plategap2d),
     own("wire", WIRED, "[a b …]", &[], circuit::wire),
-    own("stop2d", &[1, 2], "[a] or [a b]", &["gap", "back", "k", "A"], stop::stop2d),
+    own("stop2d", &[1, 2], "[a] or [a b]", STOP, stop::stop2d),
     own("comb2de", &[2], "[a b]", &["N", "gap", "l", "L", "w", "h", "Cp", "permittivity"], comb::comb2de),
     own(
         "beam2det",

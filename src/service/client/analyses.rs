@@ -7,7 +7,7 @@ use crate::analysis::integrator::Integrator;
 use crate::analysis::modes::ModesResult;
 use crate::analysis::pull_in::PullInResult;
 use crate::analysis::statics::StaticResult;
-use crate::analysis::transient::TransientResult;
+use crate::analysis::transient::{TransientResult, Until};
 use crate::analysis::{PortVoltages, Watch};
 use crate::compile::CompileOptions;
 use crate::netlist::Bundle;
@@ -62,6 +62,8 @@ pub struct RemoteTransient {
     pub step: Option<f64>,
     /// Crossings to find: (signal name, level in the signal's unit).
     pub events: Vec<(String, f64)>,
+    /// What ends the run before its time is up.
+    pub until: Option<Until>,
 }
 
 impl Client {
@@ -185,6 +187,7 @@ impl Client {
             },
             step_s: options.step.unwrap_or_default(),
             events: named(&options.events),
+            until: options.until.as_ref().map(results::until_to_wire),
         };
         let mut rpc = self.link.rpc.clone();
         let mut events = self.call(rpc.transient(request))?;

@@ -1,10 +1,10 @@
 //! Results of analyses.
 
-use super::{named, pairs};
+use super::{Violation, named, number, pairs};
 use crate::analysis::modes::ModesResult;
 use crate::analysis::pull_in::PullInResult;
 use crate::analysis::statics::{NodeMotion, StaticResult};
-use crate::analysis::transient::{Counters, Event, TransientResult};
+use crate::analysis::transient::{Counters, Event, Statistics, TransientResult, Until};
 use crate::service::proto;
 use crate::solve::equilibrium::{LossKind, Passed};
 use crate::solve::event::Direction;
@@ -174,7 +174,47 @@ pub fn summary_to_wire(result: &TransientResult) -> proto::TransientSummary {
         estimated_error: result.estimated_error,
         warnings: result.warnings.clone(),
         step_error: result.step_error,
+        stopped_at: result.stopped_at,
+        reliable_until: result.reliable_until,
+        after_contact: result.after_contact.iter().map(statistics_to_wire).collect(),
     }
+}
+
+fn statistics_to_wire(of: &Statistics) -> proto::Statistics {
+    let Statistics { signal, from, to, mean, mean_error, rms, low, high } = of.clone();
+    proto::Statistics { signal, from_s: from, to_s: to, mean, mean_error, rms, low, high }
+}
+
+fn statistics_from_wire(of: proto::Statistics) -> Statistics {
+    let proto::Statistics { signal, from_s, to_s, mean, mean_error, rms, low, high } = of;
+    Statistics { signal, from: from_s, to: to_s, mean, mean_error, rms, low, high }
+}
+
+/// The event that ends a run.
+///
+/// # Errors
+/// [`Violation`] where none is named.
+pub fn until(wire: proto::Until) -> Result<Until, Violation> {
+    use proto::until::Event::{Contact, Crossing, Release};
+    match wire.event {
+        Some(Contact(true)) => Ok(Until::Contact),
+        Some(Release(true)) => Ok(Until::Release),
+        Some(Crossing(crossing)) => {
+            Ok(Until::Level(crossing.name, number("until.crossing.value", crossing.value, false)?))
+        }
+        _ => Err(Violation::new("until", "expected `contact` or `release` true, or `crossing`".to_owned())),
+    }
+}
+
+/// The same as it travels.
+pub fn until_to_wire(until: &Until) -> proto::Until {
+    use proto::until::Event::{Contact, Crossing, Release};
+    let event = match until {
+        Until::Contact => Contact(true),
+        Until::Release => Release(true),
+        Until::Level(name, value) => Crossing(proto::Named { name: name.clone(), value: *value }),
+    };
+    proto::Until { event: Some(event) }
 }
 
 /// A transient put together from its samples and its end.
@@ -197,6 +237,9 @@ pub fn transient_from_wire(
         estimated_error,
         warnings,
         step_error,
+        stopped_at,
+        reliable_until,
+        after_contact,
     } = summary;
     let event = |e: proto::Crossing| Event {
         signal: e.signal,
@@ -213,6 +256,9 @@ pub fn transient_from_wire(
         unknowns: size(unknowns),
         estimated_error,
         step_error,
+        stopped_at,
+        reliable_until,
+        after_contact: after_contact.into_iter().map(statistics_from_wire).collect(),
         events: events.into_iter().map(event).collect(),
         warnings,
     }

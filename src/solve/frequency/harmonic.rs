@@ -22,6 +22,8 @@ pub struct Harmonic {
     pub(super) matrix: BlockMatrix<Complex<f64>, 3>,
     factor: BlockMatrix<Complex<f64>, 3>,
     pub(super) damping: BlockMatrix<f64, 3>,
+    /// What contact loses about the state, linearized at rest; none where nothing does.
+    loss: Option<BlockMatrix<f64, 3>>,
     rest: Vec<ComplexPose>,
 }
 
@@ -33,7 +35,28 @@ impl Harmonic {
         let factor = matrix.clone();
         let mut damping = BlockMatrix::new(pattern);
         crate::multibody::forces::add_inertia(&system.model, 0.0, 1.0, &mut damping);
-        Self { matrix, factor, damping, rest: vec![ComplexPose::zeros(); system.bodies()] }
+        Self { matrix, factor, damping, loss: None, rest: vec![ComplexPose::zeros(); system.bodies()] }
+    }
+
+    /// Takes the damping of contacts that are closed at displacements `q`, linearized at rest.
+    pub fn about(&mut self, system: &System, q: &[Pose]) {
+        if !system.loses() {
+            return;
+        }
+        let model = &system.model;
+        self.damping.clear();
+        crate::multibody::forces::add_inertia(model, 0.0, 1.0, &mut self.damping);
+        self.loss = system.loss_about(q);
+        if let Some(loss) = &self.loss {
+            loss.add_to(1.0, &mut self.damping);
+        }
+    }
+
+    /// `y +=` the force of that damping at rates `x`.
+    pub fn add_loss(&self, system: &System, x: &[Pose], y: &mut [Pose]) {
+        if let Some(loss) = &self.loss {
+            loss.multiply_add(&system.model.pattern, x, y);
+        }
     }
 
     /// Factors K − ω²M + iωC for a tangent K (held directions not yet projected).

@@ -93,6 +93,48 @@ impl<M, X: Unknown> Adaptive<M, X> {
         end
     }
 
+    /// Advances `motion` in steps that end at the given times [s], the last of them the end of the equations, with what the method carries.
+    /// False: a step made more than `most` times the error that `tol` allows, or failed; then `motion` is where that step began.
+    pub fn along<E: Equations<Unknown = X>>(
+        &mut self,
+        equations: &mut E,
+        motion: &mut Motion<X>,
+        ends: &[f64],
+        (tol, most): (f64, f64),
+    ) -> bool
+    where
+        M: Method<E>,
+    {
+        if self.carried_before.is_empty() {
+            self.carried_before = self.method.carried().to_vec();
+        }
+        equations.begin(Control::Tolerance(tol));
+        let mut holds = self.method.start(equations, motion).is_ok();
+        let mut t = 0.0;
+        for &end in ends {
+            if !holds {
+                break;
+            }
+            crate::budget::check();
+            let h = end - t;
+            self.keep(motion);
+            holds = self.method.step(equations, t, h, motion, &mut self.error).is_ok()
+                && equations.share([&self.before, motion], &self.error, h, tol) <= most
+                && equations.close(end, &self.before.q, motion, tol) <= most;
+            if holds {
+                self.steps += 1;
+                self.method.accepted(equations, (t, h), [&self.before, &*motion], &self.carried_before);
+                t = end;
+            } else {
+                self.put_back(motion);
+                self.rejected += 1;
+            }
+        }
+        self.spent = self.spent.and(equations.work());
+        self.done = self.method.work();
+        holds
+    }
+
     fn controlled<E: Equations<Unknown = X>>(
         &mut self,
         equations: &mut E,

@@ -5,7 +5,8 @@
 //! The integral of a gradient along a chord, times the chord, is the difference of its potential (a discrete gradient):
 //! multiplied by x the equation says that kinetic and potential energy change by what the damping takes, whatever
 //! the step. Two Gauss points stand for the integral; they are exact where r is cubic along the chord, and what they miss
-//! falls with the fourth power of the step. With v₁ = 2x/h − v₀ the only unknown is x. There is no error estimate of its own; see
+//! falls with the fourth power of the step. A contact that begins inside the step is no cubic: where parts can touch, the forces of gaps and
+//! stops are the quotients of their potentials ([`crate::domains::quotient`]), so that no contact gives energy. With v₁ = 2x/h − v₀ the only unknown is x. There is no error estimate of its own; see
 //! [`super::doubling`].
 //!
 //! Reference: G. R. W. Quispel, D. I. McLaren, "A new class of energy-preserving numerical integration methods", J. Phys. A
@@ -26,12 +27,14 @@ const POINTS: [f64; 2] = [0.5 - HALF, 0.5 + HALF];
 pub struct AverageField {
     constant: Vec<Pose>,
     x: Vec<Pose>,
+    still: Vec<Pose>,
 }
 
 impl AverageField {
     /// Storage for some number of bodies.
     pub fn new(bodies: usize) -> Self {
-        Self { constant: vec![Pose::zeros(); bodies], x: vec![Pose::zeros(); bodies] }
+        let zeros = vec![Pose::zeros(); bodies];
+        Self { constant: zeros.clone(), x: zeros.clone(), still: zeros }
     }
 }
 
@@ -57,7 +60,9 @@ impl<S: LinearSolver> Method<Newton<'_, S>> for AverageField {
         }
         let samples = POINTS.map(|share| Sample { weight: 0.5, share, time: t + share * h });
         let (base, constant) = (&motion.q, &self.constant);
-        let equation = Equation { m: 2.0 / (h * h), c: 1.0 / h, base, constant, samples: &samples };
+        let (m, c, rates) = (2.0 / (h * h), 1.0 / h, &self.still);
+        let quotient = equations.system().can_touch().then_some(h);
+        let equation = Equation { m, c, rates, base, constant, samples: &samples, quotient };
         equations.root(&equation, &mut self.x)?;
         for (k, x) in self.x.iter().enumerate() {
             let (mass, v) = (model.mass(k), motion.v[k]);

@@ -51,6 +51,8 @@ const MAX_ITERATIONS: usize = 15;
 pub struct Radau5 {
     tangent: BlockMatrix<f64, 3>,
     damping: BlockMatrix<f64, 3>,
+    /// Derivatives of what contact loses with displacements and rates at the start of the step; none where it loses nothing.
+    loss: Option<[BlockMatrix<f64, 3>; 2]>,
     real: BlockMatrix<f64, 3>,
     complex: BlockMatrix<Complex<f64>, 3>,
     /// Z and W.
@@ -77,6 +79,7 @@ impl Radau5 {
         Self {
             tangent: BlockMatrix::new(pattern),
             damping,
+            loss: system.loses().then(|| [(); 2].map(|()| BlockMatrix::new(pattern))),
             real: BlockMatrix::new(pattern),
             complex: BlockMatrix::new(pattern),
             stages: three(),
@@ -98,6 +101,9 @@ impl Radau5 {
         self.real.diagonal.copy_from_slice(&self.tangent.diagonal);
         self.real.below.copy_from_slice(&self.tangent.below);
         forces::add_inertia(model, lambda * lambda, lambda, &mut self.real);
+        if let Some([_, by_rate]) = &self.loss {
+            by_rate.add_to(lambda, &mut self.real);
+        }
         model.project_matrix(&mut self.real);
         self.real.factor(&model.pattern)?;
         let mu = Complex::new(ALPHA, BETA) / h;
@@ -108,6 +114,11 @@ impl Radau5 {
         }
         for (out, (k, c)) in complex.below.iter_mut().zip(tangent.below.iter().zip(&damping.below)) {
             *out = blend(k, c);
+        }
+        if let Some([_, by_rate]) = &self.loss {
+            let scaled = |c: &Matrix3<f64>| c.map(|c| mu * c);
+            complex.diagonal.iter_mut().zip(&by_rate.diagonal).for_each(|(out, c)| *out += scaled(c));
+            complex.below.iter_mut().zip(&by_rate.below).for_each(|(out, c)| *out += scaled(c));
         }
         for (j, block) in complex.diagonal.iter_mut().enumerate() {
             let mass = model.mass(j);
@@ -129,6 +140,9 @@ impl Radau5 {
             *out = x.v[k] + model.mass(k).component_mul(&x.q[k]) * lambda;
         }
         forces::add_damping(model, &x.q, rhs);
+        if let Some([_, by_rate]) = &self.loss {
+            by_rate.multiply_add(&model.pattern, &x.q, rhs);
+        }
         model.project(rhs);
         self.real.solve(&model.pattern, rhs);
         for (k, q) in rhs.iter().enumerate() {
@@ -146,6 +160,10 @@ impl Radau5 {
         self.at.clear();
         forces::add_damping(model, &re.q, &mut self.at.q);
         forces::add_damping(model, &im.q, &mut self.at.v);
+        if let Some([_, by_rate]) = &self.loss {
+            by_rate.multiply_add(&model.pattern, &re.q, &mut self.at.q);
+            by_rate.multiply_add(&model.pattern, &im.q, &mut self.at.v);
+        }
         for (k, out) in self.pair.iter_mut().enumerate() {
             let mass = model.mass(k);
             *out = Vector3::from_fn(|i, _| {
@@ -188,6 +206,10 @@ impl Radau5 {
             ramp.at(s + node * h, &mut self.drive);
             system.residual(&self.at.q, &self.drive, &mut f.v);
             forces::add_damping(model, &self.at.v, &mut f.v);
+            if self.loss.is_some() {
+                system.add_loss(&self.at.q, |k| self.at.v[k], &mut f.v);
+                model.project(&mut f.v);
+            }
             f.v.iter_mut().for_each(|x| *x = -*x);
             f.q.copy_from_slice(&self.at.v);
         }
@@ -257,6 +279,16 @@ impl Method<Bodies<'_>> for Radau5 {
         ramp.at(s, &mut self.drive);
         system.tangent(&motion.q, &self.drive, &mut self.tangent, &mut self.start_force);
         forces::add_damping(model, &motion.v, &mut self.start_force);
+        if let Some([by_q, by_rate]) = &mut self.loss {
+            by_q.clear();
+            by_rate.clear();
+            let rate = |k: usize| motion.v[k];
+            if system.add_loss_tangent(&motion.q, rate, by_q, by_rate) {
+                by_q.add_to(1.0, &mut self.tangent);
+                system.add_loss(&motion.q, rate, &mut self.start_force);
+                model.project(&mut self.start_force);
+            }
+        }
         self.work.forces += 1;
         self.factor(system, h)?;
         for (z, node) in self.stages.iter_mut().zip(NODES) {

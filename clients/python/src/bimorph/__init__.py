@@ -36,6 +36,7 @@ from .results import (
     PullInResult,
     Root,
     StaticResult,
+    Statistics,
     TransientResult,
     TrialReply,
 )
@@ -79,6 +80,7 @@ __all__ = [
     "Snapshot",
     "Static",
     "StaticResult",
+    "Statistics",
     "StepFailed",
     "Sweep",
     "SweepStatus",

@@ -11,6 +11,7 @@ import numpy as np
 from .aloud import of_mesh, said
 from .channel import Channel
 from .errors import Diagnostic, InvalidRequest, NotFound, Unavailable
+from .events import Until, statistics, until_to_wire
 from .messages import Voltages, at_least, by_name, diagnostic, estimate_of, listed, named, setting_value
 from .results import FrequencyResponse, ModesResult, NodeMotion, PullInResult, Root, StaticResult, TransientResult
 from .session import Session, opened_just_now
@@ -203,14 +204,15 @@ class Model:
         inputs: Mapping[str, Waveform] | None = None,
         estimate: bool = True,
         release: Model | None = None,
+        until: Until | None = None,
         progress: Callable[[float], object] | None = None,
     ) -> TransientResult:
         """Motion from 0 to ``stop`` [s] with port voltages held [V], at ``points`` equally spaced times.
 
         ``release`` is a variant of the same netlist whose static equilibrium is the initial state; without it the part
         starts at rest as drawn. ``tol`` is the relative error of a step [1], 0: the model's; the mesh holds the
-        smaller of the two. ``progress`` is told the
-        fraction done.
+        smaller of the two. ``until`` ends the run at an event: ``"contact"`` where parts begin to touch, ``"release"`` where they part,
+        ``("yoke.y", -1e-6)`` where a signal crosses a level in its unit. ``progress`` is told the fraction done.
 
         ``inputs`` are waveforms of ports, ``{"heat": (times, volts)}``: straight lines between corners, constant before and after. The
         run then begins in the static equilibrium at 0, and its steps end at every corner. How far mesh and steps may be off is seen from
@@ -221,8 +223,8 @@ class Model:
         if release is not None and not isinstance(release, Model):
             raise InvalidRequest(f"release: expected a model, as compile() gives it of the netlist with its load, got {release!r}")
         if inputs is not None:
-            if release is not None or tol:
-                raise ValueError("a run along inputs begins in their equilibrium, with the model's own tolerance: no release, no tol")
+            if release is not None or tol or until is not None:
+                raise ValueError("a run along inputs begins in their equilibrium, with the model's own tolerance: no release, tol or until")
             held: dict[str, Waveform] = {port: ([0.0], [volts]) for port, volts in (voltages or {}).items()}
             waves = {**held, **inputs}
             with self._session(signals) as session:
@@ -243,6 +245,7 @@ class Model:
             tol=tol,
             voltages=named(voltages),
             release_model=release.id if release else "",
+            until=until_to_wire(until),
         )
         for model in (self, release):
             if model is not None:
@@ -264,7 +267,11 @@ class Model:
                 units = dict(zip(signals, end.units))
                 work = (end.steps, end.rejected, end.unknowns)
                 step_error = end.step_error if end.HasField("step_error") else None
-                return TransientResult(np.array(t), curves, units, *work, estimate_of(end), said(end.warnings), step_error)
+                stopped = end.stopped_at if end.HasField("stopped_at") else None
+                reliable = end.reliable_until if end.HasField("reliable_until") else None
+                after = tuple(statistics(one) for one in end.after_contact)
+                found = (estimate_of(end), said(end.warnings), step_error, stopped, reliable, after)
+                return TransientResult(np.array(t), curves, units, *work, *found)
         raise Unavailable(f"server {self._channel.address}: the stream ended before the run did")
 
     def session(

@@ -204,6 +204,28 @@ class PullInResult:
     """What the numbers do not say by themselves."""
 
 
+@dataclass(frozen=True)
+class Statistics:
+    """Statistics of a signal over the part of a run whose single values do not hold."""
+
+    signal: str
+    """Name of the signal."""
+    start: float
+    """From when [s]."""
+    stop: float
+    """To when [s]."""
+    mean: float
+    """Mean, in the signal's unit."""
+    mean_error: float
+    """Half of its 95 % confidence interval."""
+    rms: float
+    """Root mean square about the mean."""
+    low: float
+    """Lowest sample."""
+    high: float
+    """Highest sample."""
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class TransientResult:
     """Sampled signals."""
@@ -226,6 +248,12 @@ class TransientResult:
     """What may surprise about the run."""
     step_error: float | None = None
     """Estimated root mean square error of the worst signal by the steps in time, of its amplitude [1]; None without an estimate."""
+    stopped_at: float | None = None
+    """When ``until`` ended the run [s]; None where it did not."""
+    reliable_until: float | None = None
+    """Time up to which the tolerance holds [s], in a run whose parts touch; None: to the end."""
+    after_contact: tuple[Statistics, ...] = ()
+    """Statistics of each signal after that."""
 
     def __repr__(self) -> str:
         names = ", ".join(f"{name} [{unit}]" for name, unit in self.units.items())

@@ -2,8 +2,14 @@
 
 use super::{OfStructure, unmirrored};
 use crate::domains::elements;
-use crate::structure::{Beam, GapVoltage, NodeId};
+use crate::structure::{Beam, GapVoltage, Impact, NodeId};
 use std::collections::{BTreeMap, HashMap, HashSet};
+
+/// What an impact loses, as far as the netlist said it.
+fn impact(impact: &Impact) -> impl Iterator<Item = (&'static str, f64)> {
+    let given = [("restitution", impact.restitution), ("speed", impact.speed)];
+    given.into_iter().filter_map(|(name, value)| Some((name, value?)))
+}
 
 impl OfStructure<'_> {
     /// `gap2d` at a fixed voltage brings its two beams with it; gives their names.
@@ -22,7 +28,7 @@ impl OfStructure<'_> {
             let mut parameters = vec![("l", gap.length), ("w1", upper.width), ("w2", lower.width), ("gap", gap.gap)];
             let (nodes, angle) = unmirrored(gap);
             parameters.extend([("oz", angle), ("V", voltage), ("permittivity", gap.permittivity)]);
-            parameters.extend(gap.touch.map(|t| ("touch", t)));
+            parameters.extend(gap.touch.map(|t| ("touch", t)).into_iter().chain(impact(&gap.impact)));
             self.push(&gap.name, "gap2d", &process, &nodes, &parameters);
             inside.extend(parts);
         }
@@ -66,7 +72,7 @@ impl OfStructure<'_> {
             let mut parameters = vec![("l", gap.length), ("w1", w1), ("w2", w2), ("gap", gap.gap), ("h", gap.height)];
             let (nodes, angle) = unmirrored(gap);
             parameters.extend([("oz", angle), ("permittivity", gap.permittivity)]);
-            parameters.extend(gap.touch.map(|t| ("touch", t)));
+            parameters.extend(gap.touch.map(|t| ("touch", t)).into_iter().chain(impact(&gap.impact)));
             self.push(&gap.name, "gap2dforce", "*", &nodes, &parameters);
         }
         for gap in &structure.plate_gaps {
@@ -75,13 +81,13 @@ impl OfStructure<'_> {
             }
             let mut parameters =
                 vec![("A", gap.area), ("gap", gap.gap), turned(gap.axis), ("permittivity", gap.permittivity)];
-            parameters.extend(gap.touch.map(|t| ("touch", t)));
+            parameters.extend(gap.touch.map(|t| ("touch", t)).into_iter().chain(impact(&gap.impact)));
             self.push(&gap.name, "plategap2d", "*", &[gap.a, gap.b], &parameters);
         }
         for stop in &structure.stops {
             let mut parameters = vec![("A", stop.area), turned(stop.axis)];
             let optional = [("gap", stop.ways[0]), ("back", stop.ways[1]), ("k", stop.stiffness)];
-            parameters.extend(optional.into_iter().filter_map(|(n, v)| Some((n, v?))));
+            parameters.extend(optional.into_iter().filter_map(|(n, v)| Some((n, v?))).chain(impact(&stop.impact)));
             let nodes: Vec<NodeId> = [Some(stop.a), stop.b].into_iter().flatten().collect();
             self.push(&stop.name, "stop2d", "*", &nodes, &parameters);
         }

@@ -3,6 +3,7 @@
 //! Where the bodies are is a function of the coordinates that curves; its change comes from the same kinematics run over
 //! values with their derivatives, so that partials are those of the numbers that the step returns.
 
+use super::lossy::Lossy;
 use super::stages::Stages;
 use crate::domains::{Drive, Ramp};
 use crate::equations::Joints;
@@ -94,7 +95,7 @@ impl Ports {
         ramp: &Ramp<'_>,
         (i, s, h, rate): (usize, f64, f64, f64),
         (at, poses, drive): (&Stages, &[Pose], &Drive),
-        w: &JointMatrix,
+        (w, lossy): (&JointMatrix, Option<&Lossy>),
         start: &[Motion],
     ) -> u64 {
         let Joints { tree, closures, .. } = joints;
@@ -117,6 +118,9 @@ impl Ports {
             if !model.dampers.is_empty() {
                 forces::add_dampers(model, |k| self.changes.of(k)[1], &mut self.wrench);
             }
+            if let Some(lossy) = lossy {
+                lossy.add_change(model, |k| self.changes.of(k)[1], &mut self.wrench);
+            }
             self.tangent.multiply_add(&model.pattern, &self.share, &mut self.wrench);
             ramp.sensitivity(s, source, &mut self.change);
             closures.add_drive_force(poses, drive, &self.change, &mut self.wrench);
@@ -138,6 +142,9 @@ impl Ports {
             }
             if !model.dampers.is_empty() {
                 forces::add_dampers(model, |k| stages.drift(k), &mut self.wrench);
+            }
+            if let Some(lossy) = lossy {
+                lossy.add_drift(model, |k| stages.drift(k), &mut self.wrench);
             }
             for (to, from) in self.right.iter_mut().zip(&self.share).chain(self.moved.iter_mut().zip(&self.wrench)) {
                 *to = Four::from(*from);

@@ -1,5 +1,6 @@
 //! Sensitivities with respect to final source voltages: the same stages with the exact tangent of each.
 
+use super::lossy::Lossy;
 use super::stages::Stages;
 use super::tableau::GAMMA;
 use crate::domains::{Drive, Ramp, System};
@@ -109,7 +110,7 @@ impl Ports {
         (i, s, h): (usize, f64, f64),
         (q, drive): (&[Pose], &Drive),
         (solver, w): (&S, &BlockMatrix<f64, 3>),
-        turning: Option<(&Stages, Turning)>,
+        (turning, lossy): (Option<(&Stages, Turning)>, Option<&Lossy>),
         start: &mut [Motion],
     ) -> u64 {
         let model = &system.model;
@@ -118,6 +119,11 @@ impl Ports {
             stages.begin(model, i, h, start);
             if let Some((_, turning)) = turning {
                 stages.add_gyration(model, (i, h), turning.now, turning.start);
+            }
+            if let Some(lossy) = lossy {
+                let mut force = std::mem::take(&mut stages.force);
+                lossy.add_change(model, (i, h), stages, &mut force, &mut self.scratch);
+                stages.force = force;
             }
             let (at, force) = stages.place(i, start);
             self.tangent.multiply_add(&model.pattern, at, force);

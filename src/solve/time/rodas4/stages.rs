@@ -129,6 +129,11 @@ impl Stages {
         }
     }
 
+    /// r₁ of the stage at hand.
+    pub(super) fn r1(&self) -> &[Pose] {
+        &self.r1
+    }
+
     /// Rate of body `k` where stage `i` of a step of length `h` [s] takes the forces, which has begun.
     pub(super) fn speed(&self, i: usize, h: f64, k: usize) -> Pose {
         let tile = &self.tiles[k / TILE];

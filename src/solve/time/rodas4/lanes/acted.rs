@@ -1,5 +1,6 @@
 //! What acts on few bodies of a variant and has branches of its own: gaps and dead loads, variant by variant.
 
+use super::super::tableau::{C, GAMMA};
 use super::storage::{IN_PLACE, Lane, LaneRodas4};
 use crate::multibody::lanes::Real;
 use crate::multibody::lanes::{LANES, LanePose};
@@ -8,7 +9,8 @@ use crate::multibody::planar::Pose;
 impl LaneRodas4 {
     /// What gaps and dead loads add to the forces of stage `i`, and in the first stage to the tangent.
     pub(super) fn act(&mut self, lanes: &[Option<Lane<'_>>; LANES], i: usize) {
-        let Self { motion, at, force, w, acted, acted_blocks, drives, q, r, tangent, .. } = self;
+        let Self { motion, at, force, w, acted, acted_blocks, drives, q, r, tangent, losses, rates, .. } = self;
+        let ([r1_of, rate_of], r1, increments, h) = (rates, &self.r1, &self.increments, &self.h);
         if acted.is_empty() {
             return;
         }
@@ -23,6 +25,19 @@ impl LaneRodas4 {
                 (q[b], r[b]) = (pose(&from[b], k), pose(&force[b], k));
             }
             lane.system.add_body_forces(q, drive, r);
+            let loses = !losses.is_empty() && lane.system.loses();
+            if loses {
+                for &b in acted.iter() {
+                    r1_of[b] = pose(&r1[b], k);
+                    rate_of[b] =
+                        (0..i).fold(r1_of[b], |rate, j| rate - pose(&increments[b][j].q, k) * (C[i][j] / h.0[k]));
+                }
+                if i == 0 {
+                    losses[k].at(lane.system, q, |b| rate_of[b]);
+                }
+                lane.system.add_loss(q, |b| rate_of[b], r);
+                losses[k].subtract_damping(&lane.system.model, r1_of, r);
+            }
             for &b in acted.iter() {
                 (0..3).for_each(|i| force[b][i].set_lane(k, r[b][i]));
             }
@@ -36,6 +51,9 @@ impl LaneRodas4 {
                     }
                 }
                 lane.system.add_body_tangent(q, drive, tangent);
+                if loses {
+                    losses[k].add_matrix(GAMMA * h.0[k], tangent);
+                }
                 for (blocks, own, which) in
                     [(&mut w.diagonal, &tangent.diagonal, &*acted), (&mut w.below, &tangent.below, &*acted_blocks)]
                 {

@@ -1,5 +1,6 @@
 //! What a step of variants side by side works on.
 
+use super::super::lossy::Derivatives;
 use super::heat::LaneHeat;
 use super::motion::{LaneMotion, Norms};
 use crate::domains::{Drive, Ramp, System};
@@ -67,6 +68,10 @@ pub struct LaneRodas4 {
     pub(super) q: Vec<Pose>,
     pub(super) r: Vec<Pose>,
     pub(super) tangent: BlockMatrix<f64, 3>,
+    /// What contact loses, lane by lane; empty where parts cannot touch.
+    pub(super) losses: Vec<Derivatives>,
+    /// r₁ and rates of one lane.
+    pub(super) rates: [Vec<Pose>; 2],
 }
 
 fn block(pattern: &Pattern, row: usize, column: usize) -> Option<usize> {
@@ -107,6 +112,8 @@ impl LaneRodas4 {
             q: vec![Pose::zeros(); n],
             r: vec![Pose::zeros(); n],
             tangent: BlockMatrix::new(pattern),
+            losses: vec![Derivatives::new(&system.model); if system.can_touch() { LANES } else { 0 }],
+            rates: [(); 2].map(|()| vec![Pose::zeros(); n]),
             model,
         })
     }

@@ -1,0 +1,31 @@
+"""Events of a run in time, and what follows a contact."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from .errors import InvalidRequest
+from .results import Statistics
+from .v1 import analysis_pb2
+
+Until = str | tuple[str, float]
+"""``"contact"``, ``"release"``, or a signal with the level that it crosses, in its unit."""
+
+
+def until_to_wire(until: Until | None) -> Any:
+    """The event that ends a run; None: none does."""
+    match until:
+        case None:
+            return None
+        case "contact":
+            return analysis_pb2.Until(contact=True)
+        case "release":
+            return analysis_pb2.Until(release=True)
+        case (str(name), float(level) | int(level)):
+            return analysis_pb2.Until(crossing=analysis_pb2.Named(name=name, value=level))
+    raise InvalidRequest(f'until: expected "contact", "release" or (signal, level), got {until!r}')
+
+
+def statistics(one: Any) -> Statistics:
+    """Statistics of a signal, as they come from the server."""
+    return Statistics(one.signal, one.from_s, one.to_s, one.mean, one.mean_error, one.rms, one.low, one.high)
