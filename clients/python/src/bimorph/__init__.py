@@ -99,5 +99,5 @@ __all__ = [
     "sweep_on",
 ]
 
-__version__ = importlib.metadata.version("bimorph")
+__version__ = importlib.metadata.version("bimorph-mems")
 """Of this package; :meth:`Client.version` is that of a server."""

@@ -103,7 +103,7 @@ def _connect(address: str, access: Access) -> _Connection:
         return connection
 
 
-OWN = importlib.metadata.version("bimorph")
+OWN = importlib.metadata.version("bimorph-mems")
 """The version of this package."""
 
 _told: set[tuple[str, str]] = set()

@@ -21,7 +21,7 @@ def until_to_wire(until: Until | None) -> Any:
             return analysis_pb2.Until(contact=True)
         case "release":
             return analysis_pb2.Until(release=True)
-        case (str(name), float(level) | int(level)):
+        case (str(name), float() | int() as level):
             return analysis_pb2.Until(crossing=analysis_pb2.Named(name=name, value=level))
     raise InvalidRequest(f'until: expected "contact", "release" or (signal, level), got {until!r}')
 

@@ -266,12 +266,18 @@ class Model:
                 curves = {name: np.array(column) for name, column in zip(signals, columns)}
                 units = dict(zip(signals, end.units))
                 work = (end.steps, end.rejected, end.unknowns)
-                step_error = end.step_error if end.HasField("step_error") else None
-                stopped = end.stopped_at if end.HasField("stopped_at") else None
-                reliable = end.reliable_until if end.HasField("reliable_until") else None
-                after = tuple(statistics(one) for one in end.after_contact)
-                found = (estimate_of(end), said(end.warnings), step_error, stopped, reliable, after)
-                return TransientResult(np.array(t), curves, units, *work, *found)
+                return TransientResult(
+                    np.array(t),
+                    curves,
+                    units,
+                    *work,
+                    estimated_error=estimate_of(end),
+                    warnings=said(end.warnings),
+                    step_error=end.step_error if end.HasField("step_error") else None,
+                    stopped_at=end.stopped_at if end.HasField("stopped_at") else None,
+                    reliable_until=end.reliable_until if end.HasField("reliable_until") else None,
+                    after_contact=tuple(statistics(one) for one in end.after_contact),
+                )
         raise Unavailable(f"server {self._channel.address}: the stream ended before the run did")
 
     def session(

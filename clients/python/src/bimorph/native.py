@@ -16,22 +16,30 @@ _made: dict[tuple[int, str], Any] = {}
 
 
 @functools.cache
-def found() -> Any:
-    """The module; None where the package was installed without it."""
+def _loaded() -> tuple[Any, ImportError | None]:
+    """The module, or why it cannot be loaded."""
     try:
-        return importlib.import_module("bimorph._native")
-    except ImportError:
-        return None
+        return importlib.import_module("bimorph._native"), None
+    except ImportError as error:
+        return None, error
+
+
+def found() -> Any:
+    """The module; None where the package was installed without it, or it cannot be loaded."""
+    return _loaded()[0]
 
 
 def module() -> Any:
     """The module.
 
-    Raises :class:`BimorphError` where the package was installed without it.
+    Raises :class:`BimorphError` where the package was installed without it, or it cannot be loaded.
     """
-    if found() is None:
+    loaded, error = _loaded()
+    if loaded is not None:
+        return loaded
+    if isinstance(error, ModuleNotFoundError):
         raise BimorphError("this package has no models in process: install one that `make wheel` made, or use bimorph.serve()")
-    return found()
+    raise BimorphError(f"the models in process of this package cannot be loaded ({error}); use bimorph.serve()") from error
 
 
 def of_process(kind: str) -> Any:
