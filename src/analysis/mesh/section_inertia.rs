@@ -22,7 +22,6 @@ pub(super) fn with_section_inertia(compiled: &Compiled) -> Result<Cow<'_, Compil
     let mut model = compiled.clone();
     model.options.rotary_inertia = true;
     let refused = |error: DiscretizeError| AnalysisError::NotConverged { detail: error.to_string() };
-    let lowest = compiled.lowest.clone();
     let model = model.with_order(compiled.order.clone()).map_err(refused)?;
-    Ok(Cow::Owned(Compiled { lowest, ..model }))
+    Ok(Cow::Owned(Compiled { lowest: compiled.lowest, ..model }))
 }

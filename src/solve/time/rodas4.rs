@@ -264,7 +264,7 @@ mod tests {
         let system = &compiled.parts.system;
         assert!(system.loses());
         let mut rodas = Rodas4::new(system, &[0]);
-        let (mut motion, mut error) = (Motion::zeros(1), Motion::zeros(1));
+        let (mut motion, mut error) = (Motion::<Pose>::zeros(1), Motion::zeros(1));
         (motion.q[0].x, motion.v[0].x) = (1.905e-6, 0.1);
         let (from, to) = ([2.0], [end]);
         let ramp = Ramp::new(&system.electrics, &from, &to, &[], dt);
