@@ -194,7 +194,7 @@ fn analyses_do_not_block_circuits() {
         let request = proto::TransientRequest { model: model.clone(), stop_s, step_s, points: 2, ..Default::default() };
         let _running = client.transient(request.clone()).await.expect("starts");
         let late = client.transient(request).await;
-        assert_eq!(late.err().expect("waits in vain").code(), Code::DeadlineExceeded);
+        assert_eq!(late.expect_err("waits in vain").code(), Code::DeadlineExceeded);
         client.r#static(proto::StaticRequest { model: model.clone(), voltages: vec![] }).await.expect("is short");
         let options = Some(proto::CompileOptions { tol: Some(1e-4), ..Default::default() });
         client.compile(proto::CompileRequest { bundle: wire_bundle(), options }).await.expect("compiles");
