@@ -94,7 +94,7 @@ impl System {
     }
 
     /// The largest change of the distance of a contact with a change `dq` at `q`, over how far it is pressed, `least` [m] at least [1]; infinite where
-    /// one is pressed [`RUNAWAY`] times as far as it may.
+    /// one is pressed ten times as far as it may.
     pub fn contact_change(&self, q: &[Pose], dq: &[Pose], least: f64) -> f64 {
         let change = |gap: &Member| {
             let [touch, allowed] = gap.touching()?;
