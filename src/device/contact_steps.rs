@@ -10,9 +10,9 @@ use super::Token;
 use crate::domains::System;
 use crate::multibody::planar::Pose;
 
-/// Error of a step of the list in another trial, of the allowed one, beyond which the trial takes steps of its own [1].
+/// Largest error of a kept step, relative to the allowed one [1]. Beyond it a trial chooses steps of its own.
 pub(super) const MAX_ERROR: f64 = 3.0;
-/// Ways at the present closing speed within which a point may touch.
+/// Parts may touch within a point where they would at so many times their closing speed [1].
 const NEAR: f64 = 3.0;
 
 /// The steps of one point.

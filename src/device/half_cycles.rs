@@ -1,4 +1,4 @@
-//! Half cycles of a mode in a quantity, told by its turning points, and the phase that adds up with them.
+//! Half cycles of a mode in a quantity, counted by its turning points, and the phase error that adds up over them.
 
 use std::f64::consts::PI;
 

@@ -5,7 +5,7 @@
 //! ```text
 //! η̇ = φᵀ·M·v,   φᵀ·M·φ = 1,   current of a port (∂Q/∂q·φ)·η̇
 //! ```
-//! Half cycles of η̇ are told as those of signals are ([`super::half_cycles`]). The frequency of a mode is off by the mesh and by the steps of the
+//! Half cycles of η̇ are counted as those of signals are ([`super::half_cycles`]). The frequency of a mode is off by the mesh and by the steps of the
 //! integrator, and the phase that adds up until the mode has died away makes an error of at most twice its amplitude.
 
 use super::half_cycles::{Course, Phase};

@@ -85,8 +85,7 @@ impl Session {
         let own = self.ports.system.clone();
         let system = Self::system(&own, compiled);
         self.fill_sources(&system.electrics, request.voltages);
-        let rest = vec![0.0; self.sources.len()];
-        let from = parent.map_or(rest, |p| p.sources.clone());
+        let from = parent.map_or_else(|| vec![0.0; self.sources.len()], |p| p.sources.clone());
         let electrics = &system.electrics;
         if let Some(shaken) = &mut self.shaken {
             let start = parent.map_or(0.0, |p| p.elapsed);

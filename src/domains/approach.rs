@@ -1,7 +1,8 @@
 //! The scalar that a gap measures: how far a point of one body has come along a fixed direction towards another's.
 
+use crate::multibody::model::locate;
 use crate::multibody::planar::{self, Pose};
-use crate::multibody::{BodyId, Model};
+use crate::multibody::{BlockMatrix, BodyId, Model, Pattern};
 use nalgebra::{Matrix6, Vector2, Vector6};
 
 /// A material point of a body.
@@ -113,24 +114,31 @@ impl Approach {
         m.gradient.fixed_rows::<3>(0).dot(&of(self.a.body)) + m.gradient.fixed_rows::<3>(3).dot(&of(self.b.body))
     }
 
-    /// Derivatives over the pair of a force l(u, u̇) along u: with displacements its symmetric part, and with rates.
-    pub(super) fn rate_tangent(
+    /// Adds the derivatives over the pair of a force along u, of `law`: its value at u and u̇, and its derivatives with both. That with
+    /// displacements is the symmetric part.
+    pub(super) fn add_rate_tangent(
         &self,
-        m: &Measured,
+        (q, linear): (&[Pose], bool),
         rate: &impl Fn(usize) -> Pose,
-        (value, by_u, by_rate): (f64, f64, f64),
-    ) -> [Matrix6<f64>; 2] {
+        law: impl Fn((f64, f64)) -> (f64, f64, f64),
+        pattern: &Pattern,
+        [stiffness, damping]: [&mut BlockMatrix<f64, 3>; 2],
+    ) {
+        let m = self.measure(q, linear);
+        let (value, by_u, by_rate) = law((m.value, self.rate(&m, rate)));
         let turn = |id: BodyId| if let BodyId::Free(k) = id { rate(k).z } else { 0.0 };
-        let mut stiffness = m.hessian(value, by_u);
+        let mut k = m.hessian(value, by_u);
         // ∂u̇/∂q has the two rotations alone
         for (i, turned) in [(2, m.bend[0] * turn(self.a.body)), (5, m.bend[1] * turn(self.b.body))] {
             let half = m.gradient * (0.5 * by_rate * turned);
-            for k in 0..6 {
-                stiffness[(k, i)] += half[k];
-                stiffness[(i, k)] += half[k];
+            for j in 0..6 {
+                k[(j, i)] += half[j];
+                k[(i, j)] += half[j];
             }
         }
-        [stiffness, m.gradient * m.gradient.transpose() * by_rate]
+        let place = locate(pattern, self.a.body, self.b.body);
+        place.add(stiffness, &k);
+        place.add(damping, &(m.gradient * m.gradient.transpose() * by_rate));
     }
 
     /// The forces of that potential on its points: −φ′·n on a, φ′·n on b.

@@ -201,12 +201,7 @@ impl Domain for Electrodes {
         if !self.loses(at) {
             return false;
         }
-        let m = self.approach.measure(at.q, at.linear);
-        let lost = self.lost((m.value, self.approach.rate(&m, rate)));
-        let [k, c] = self.approach.rate_tangent(&m, rate, lost);
-        let place = locate(pattern, self.approach.a.body, self.approach.b.body);
-        place.add(stiffness, &k);
-        place.add(damping, &c);
+        self.approach.add_rate_tangent((at.q, at.linear), rate, |now| self.lost(now), pattern, [stiffness, damping]);
         true
     }
 

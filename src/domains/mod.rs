@@ -16,6 +16,7 @@
 //! | [`contact`] | pressure between surfaces that touch |
 //! | [`contact_loss`] | what an impact loses |
 //! | [`contact_speed`] | at which speed, from statics |
+//! | [`loss_derivatives`] | derivatives of the forces of that over the bodies |
 //! | [`domain`] | the trait of all that acts; [`member`]: which there are, and how each call finds its own |
 //! | [`dashpot`] | a damper to the ground |
 //! | [`drawn`], [`element`] | from a drawing to them; elements of their own |
@@ -63,6 +64,7 @@ pub mod inputs;
 pub mod lag;
 mod laplacian;
 pub mod load;
+pub mod loss_derivatives;
 pub mod member;
 pub mod moving_frame;
 pub mod network;

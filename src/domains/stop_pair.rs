@@ -141,12 +141,13 @@ impl Domain for StopPair {
         if !self.loss.acts() || self.distance(at) >= 0.0 {
             return false;
         }
-        let m = self.approach.measure(at.q, at.linear);
-        let lost = lost(&self.stop, &self.loss, &self.ways, (m.value, self.approach.rate(&m, rate)));
-        let [k, c] = self.approach.rate_tangent(&m, rate, lost);
-        let place = locate(pattern, self.approach.a.body, self.approach.b.body);
-        place.add(stiffness, &k);
-        place.add(damping, &c);
+        self.approach.add_rate_tangent(
+            (at.q, at.linear),
+            rate,
+            |now| lost(&self.stop, &self.loss, &self.ways, now),
+            pattern,
+            [stiffness, damping],
+        );
         true
     }
 

@@ -273,15 +273,6 @@ impl System {
         self.members.iter().fold(false, add)
     }
 
-    /// Damping of contacts that are closed at displacements `q`, linearized at rest; none where nothing is lost.
-    pub fn loss_about(&self, q: &[Pose]) -> Option<BlockMatrix<f64, 3>> {
-        if !self.loses() {
-            return None;
-        }
-        let [mut by_q, mut by_rate] = [(); 2].map(|()| BlockMatrix::new(&self.model.pattern));
-        self.add_loss_tangent(q, |_| Pose::zeros(), &mut by_q, &mut by_rate).then_some(by_rate)
-    }
-
     /// Bodies that gaps and dead loads act on, ascending.
     pub fn acted_on(&self) -> Vec<usize> {
         let mut bodies = Vec::new();

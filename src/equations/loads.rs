@@ -5,10 +5,11 @@
 //! one: the rate of that prescribed length is taken as zero, so that inertia feels its slow change only through the
 //! bodies it moves. A time constant of heat much longer than the period of what moves makes this right.
 
+use crate::domains::loss_derivatives::LossDerivatives;
 use crate::domains::{Drive, Ramp, System};
+use crate::multibody::forces;
 use crate::multibody::planar::Pose;
 use crate::multibody::rcr::{AddedInertia, Closure, Linkage, Reduction};
-use crate::multibody::{BlockMatrix, forces};
 
 /// What acts on a mechanism in joint coordinates.
 pub trait Loads {
@@ -39,7 +40,7 @@ pub struct JointLoads<'a> {
     r: Vec<Pose>,
     prescribes: bool,
     /// Derivatives of what contact loses with displacements and rates; none where it loses nothing.
-    loss: Option<[BlockMatrix<f64, 3>; 2]>,
+    loss: Option<LossDerivatives>,
 }
 
 impl<'a> JointLoads<'a> {
@@ -60,7 +61,7 @@ impl<'a> JointLoads<'a> {
             v: zeros.clone(),
             r: zeros,
             prescribes: heated,
-            loss: system.loses().then(|| [(); 2].map(|()| BlockMatrix::new(&system.model.pattern))),
+            loss: LossDerivatives::of(system),
         }
     }
 
@@ -109,13 +110,9 @@ impl Loads for JointLoads<'_> {
         self.system.add_body_tangent(&self.q, &self.drive, bodies);
         bodies.diagonal.iter_mut().chain(&mut bodies.below).for_each(|block| *block *= beta);
         forces::add_inertia(&self.system.model, 0.0, gamma, bodies);
-        if let Some([by_q, by_rate]) = &mut self.loss {
-            by_q.clear();
-            by_rate.clear();
-            if self.system.add_loss_tangent(&self.q, |k| self.v[k], by_q, by_rate) {
-                by_q.add_to(beta, bodies);
-                by_rate.add_to(gamma, bodies);
-            }
+        if let Some(loss) = &mut self.loss {
+            loss.at(self.system, &self.q, |k| self.v[k]);
+            loss.add_to([beta, gamma], bodies);
         }
         reduction.add_stiffness(self.linkage, beta, added);
     }

@@ -11,6 +11,7 @@
 
 use super::linear::LinearSolver;
 use super::{Bodies, Equations, Motion, Place, Stage, Staged, StepFailure, Work};
+use crate::domains::loss_derivatives::LossDerivatives;
 use crate::domains::{Drive, System};
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, forces};
@@ -64,7 +65,7 @@ pub struct Newton<'a, S> {
     /// 1/M, 0 where there is none.
     inverse: Vec<Pose>,
     /// Derivatives of what contact loses with displacements and rates; none where it loses nothing.
-    loss: Option<[BlockMatrix<f64, 3>; 2]>,
+    loss: Option<LossDerivatives>,
     at: Vec<Pose>,
     x: Vec<Pose>,
     constant: Vec<Pose>,
@@ -83,7 +84,7 @@ impl<'a, S: LinearSolver> Newton<'a, S> {
         Self {
             inverse: (0..model.bodies.len()).map(|k| model.mass(k).map(inverse)).collect(),
             drive: bodies.system.electrics.drive(),
-            loss: bodies.system.loses().then(|| [(); 2].map(|()| BlockMatrix::new(&model.pattern))),
+            loss: LossDerivatives::of(bodies.system),
             bodies,
             solver,
             matrix: None,
@@ -182,17 +183,13 @@ impl<'a, S: LinearSolver> Newton<'a, S> {
             for (r, f) in self.residual.iter_mut().zip(&self.force) {
                 *r += f * sample.weight;
             }
-            if let Some([by_q, by_rate]) = self.loss.as_mut().filter(|_| equation.quotient.is_none()) {
+            if let Some(loss) = self.loss.as_mut().filter(|_| equation.quotient.is_none()) {
                 let rate = |k: usize| equation.rates[k] + x[k] * equation.c;
                 self.force.fill(Pose::zeros());
                 system.add_loss(&self.at, rate, &mut self.force);
                 self.residual.iter_mut().zip(&self.force).for_each(|(r, f)| *r += f * sample.weight);
-                by_q.clear();
-                by_rate.clear();
-                if system.add_loss_tangent(&self.at, rate, by_q, by_rate) {
-                    by_q.add_to(scale, matrix);
-                    by_rate.add_to(sample.weight * equation.c, matrix);
-                }
+                loss.at(system, &self.at, rate);
+                loss.add_to([scale, sample.weight * equation.c], matrix);
             }
         }
         if let Some(h) = equation.quotient {
@@ -287,8 +284,8 @@ impl<S: LinearSolver> Staged for Newton<'_, S> {
             self.at[k] = q * c;
         }
         forces::add_damping(model, &self.at, &mut self.force);
-        if let Some([_, by_rate]) = &self.loss {
-            by_rate.multiply_add(&model.pattern, &self.at, &mut self.force);
+        if let Some(loss) = &self.loss {
+            loss.add_damping(model, |k| self.at[k], &mut self.force);
         }
         model.project(&mut self.force);
         if let Some(matrix) = &self.matrix {

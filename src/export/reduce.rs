@@ -16,6 +16,7 @@ use crate::analysis::signal::{Signal, View};
 use crate::device::PortKind;
 use crate::device::ports::Answer;
 use crate::device::scale::Scale;
+use crate::domains::loss_derivatives::LossDerivatives;
 use crate::multibody::forces::add_damping;
 use crate::multibody::planar::Pose;
 use nalgebra::{DMatrix, DVector};
@@ -69,13 +70,16 @@ impl Mechanism<'_> {
             change: DMatrix::zeros(r, p),
         };
         let mut drag = vec![Pose::zeros(); system.bodies()];
-        let loss = system.loss_about(&self.q);
+        let mut loss = LossDerivatives::of(system);
+        if let Some(loss) = &mut loss {
+            loss.at(system, &self.q, |_| Pose::zeros());
+        }
         let still = (vec![0.0; self.drive.volts.len()], vec![0.0; self.rise.len()]);
         for k in 0..n {
             drag.fill(Pose::zeros());
             add_damping(&system.model, &shapes[k], &mut drag);
             if let Some(loss) = &loss {
-                loss.multiply_add(&system.model.pattern, &shapes[k], &mut drag);
+                loss.add_damping(&system.model, |j| shapes[k][j], &mut drag);
             }
             for j in 0..n {
                 model.damping[(j, k)] = dot(&shapes[j], &drag) * (length[k] * omega[k]) / (length[j] * omega[j]);

@@ -185,12 +185,19 @@ impl<T: Scalar, const N: usize> BlockMatrix<T, N> {
 
     /// `y += A·x` with the unfactored matrix.
     pub fn multiply_add(&self, pattern: &Pattern, x: &[SVector<T, N>], y: &mut [SVector<T, N>]) {
+        self.multiply_add_of(pattern, |j| x[j], y);
+    }
+
+    /// The same with the part of each body of x as a function.
+    #[inline]
+    pub fn multiply_add_of(&self, pattern: &Pattern, x: impl Fn(usize) -> SVector<T, N>, y: &mut [SVector<T, N>]) {
         for j in 0..pattern.bodies() {
-            let mut sum = self.diagonal[j] * x[j];
+            let own = x(j);
+            let mut sum = self.diagonal[j] * own;
             for k in pattern.column(j) {
                 let row = pattern.row(k);
-                sum += self.below[k].tr_mul(&x[row]);
-                y[row] += self.below[k] * x[j];
+                sum += self.below[k].tr_mul(&x(row));
+                y[row] += self.below[k] * own;
             }
             y[j] += sum;
         }

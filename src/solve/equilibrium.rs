@@ -5,7 +5,7 @@
 //! wandered to another branch corrects more. Nor may it change the distance of electrodes under voltage by more than half. Otherwise the
 //! step is halved. Where steps vanish beside the present load the branch loses its stability: at a limit point (pull-in, release,
 //! snap-through) or at a bifurcation (`loss`). A little beyond, at 1.02 of that load, the system falls to the next stable
-//! equilibrium (`fall`, and where that does not end, `viscous`), and the path goes on from there with steps of a quarter of the present load. Falling at once under a
+//! equilibrium (`fall`), and the path goes on from there with steps of a quarter of the present load. Falling at once under a
 //! load far beyond leads to states that a slowly growing load does not reach.
 //!
 //! Reference: E. Riks, "An incremental approach to the solution of snapping and buckling problems", Int. J. Solids
@@ -16,7 +16,6 @@ mod loss;
 pub mod path;
 mod refusal;
 pub mod side_by_side;
-mod viscous;
 
 pub use loss::{LossKind, Passed};
 

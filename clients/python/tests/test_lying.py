@@ -122,7 +122,7 @@ def run(address: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("lie", "told"),
+    ("lie", "message"),
     [
         ("compile ports", "ports: expected a name"),
         ("static", r"n\[0\]: expected a finite number, got nan"),
@@ -143,15 +143,15 @@ def run(address: str) -> None:
         ("need more", "need_dt: expected less than the step"),
         ("kind", "expected one of kind trial, got linearized"),
         ("empty", "expected one of kind trial, got none"),
-        ("extra", "nobody asked for|names the state of an earlier trial"),
+        ("extra", "no request is open|names the state of an earlier trial"),
     ],
 )
-def test_lies_are_named(lying: tuple[Liar, str], lie: str, told: str) -> None:
+def test_lies_are_named(lying: tuple[Liar, str], lie: str, message: str) -> None:
     """Each lie raises UnexpectedReply with the server and what was expected, long before anything hangs."""
     liar, address = lying
     liar.lie = lie
     start = time.monotonic()
-    with pytest.raises(bimorph.UnexpectedReply, match=told) as caught:
+    with pytest.raises(bimorph.UnexpectedReply, match=message) as caught:
         run(address)
     assert "server " in str(caught.value)
     assert "\x1b" not in str(caught.value)

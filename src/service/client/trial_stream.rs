@@ -47,10 +47,10 @@ impl Stream {
     /// One request and its reply.
     pub(super) async fn ask(&mut self, request: RequestKind) -> Result<ReplyKind, Status> {
         let replies = &mut self.replies;
-        // a reply that nobody asked for would be taken for that to this request, and all after it for those before
+        // a reply without a request would be taken for that to this request, and all after it for those before
         match poll_fn(|cx| Poll::Ready(pin!(replies.message()).poll(cx))).await {
             Poll::Pending => {}
-            Poll::Ready(Ok(Some(_))) => return Err(unexpected("one that nobody asked for")),
+            Poll::Ready(Ok(Some(_))) => return Err(unexpected("no request is open")),
             Poll::Ready(Ok(None)) => return Err(ended()),
             Poll::Ready(Err(status)) => return Err(status),
         }

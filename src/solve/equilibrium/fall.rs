@@ -22,9 +22,9 @@ const RADIUS: [f64; 2] = [0.05, 0.3];
 /// Smallest radius: below it the energy no longer falls.
 const LEAST_RADIUS: f64 = 1e-11;
 /// Steps below this are not tested for energy: rounding.
-pub(super) const UNTESTED: f64 = 1e-6;
+const UNTESTED: f64 = 1e-6;
 /// A step without μ below this ends the fall.
-pub(super) const SETTLED: f64 = 1e-9;
+const SETTLED: f64 = 1e-9;
 /// First μ and the μ that counts as none, as fractions of the median stiffness.
 const LEAST_SHIFT: [f64; 2] = [1e-14, 1e-15];
 /// A μ that rounding of the stiffness may ask for next to a loss of stability, in first μ.
@@ -34,7 +34,7 @@ pub(super) const MOST_SHIFT: f64 = 1e20;
 /// Fractions of the predicted decrease of energy: below the first a step is rejected, below the second the region shrinks, above the third it grows.
 const RATIO: [f64; 3] = [0.05, 0.25, 0.75];
 /// Rounding of the energy, as a fraction of it.
-pub(super) const ROUNDING: f64 = 1e-12;
+const ROUNDING: f64 = 1e-12;
 /// Rotation between the ends of a segment beyond which a step is rejected [rad].
 const OVERTURNED: f64 = 1.5;
 /// Largest change of the distance of a gap in one step, as a fraction of the larger distance.
@@ -69,7 +69,7 @@ impl Units {
     }
 
     /// xᵀWx.
-    pub(super) fn weigh(self, x: &[Pose]) -> f64 {
+    fn weigh(self, x: &[Pose]) -> f64 {
         let square = self.length * self.length;
         x.iter().map(|p| (p.x * p.x + p.y * p.y) / square + TURN_WEIGHT * p.z * p.z).sum()
     }
@@ -249,7 +249,7 @@ impl Equilibrium {
 
     /// True where the step to `trial` turns the ends of a segment so far against each other, and further than at `from`, that its law has a
     /// valley of its own there: it stretches without strain.
-    pub(super) fn overturns(&self, system: &System, from: &[Pose]) -> bool {
+    fn overturns(&self, system: &System, from: &[Pose]) -> bool {
         let turned =
             |beam: &BeamLine, k: usize, q: &[Pose]| (beam.points[k + 1].rotation(q) - beam.points[k].rotation(q)).abs();
         let over = |beam: &BeamLine, k: usize| {
@@ -260,7 +260,7 @@ impl Equilibrium {
     }
 
     /// True where the step to `trial` changes the distance of a gap by so much that it may lead across.
-    pub(super) fn closes_too_far(&self, system: &System, from: &[Pose]) -> bool {
+    fn closes_too_far(&self, system: &System, from: &[Pose]) -> bool {
         let far = |gap: usize| {
             let (before, after) = (system.room(gap, from), system.room(gap, &self.trial));
             (after - before).abs() > CLOSING * before.abs().max(after.abs())

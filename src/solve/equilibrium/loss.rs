@@ -53,15 +53,6 @@ pub struct Passed {
     pub direction: String,
 }
 
-/// How a system falls.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Way {
-    /// By the trust region of [`super::fall`].
-    Straight,
-    /// In the viscous steps of [`super::viscous`].
-    Curved,
-}
-
 /// Where a part goes at a loss of stability.
 #[derive(Debug, Clone)]
 pub(super) struct Towards {
@@ -93,22 +84,13 @@ impl Equilibrium {
         self.before.copy_from_slice(q);
         path.at(s, &mut self.drive);
         let known = self.softest(system, q).is_some();
-        let (mut why, mut settled) = (Unsettled::Stuck, false);
-        for (factor, way) in [(BEYOND[0], Way::Straight), (BEYOND[0], Way::Curved), (BEYOND[1], Way::Straight)] {
-            // a fall that ended where segments are too long needs shorter ones
-            if way == Way::Curved && (settled || !Self::coarse_beams(system, &self.stopped).is_empty()) {
-                continue;
-            }
+        let mut why = Unsettled::Stuck;
+        for factor in BEYOND {
             let to = beyond(factor);
             path.at(to, &mut self.drive);
             let towards = known.then(|| self.judge(system, q));
             self.lean(q, towards.as_ref().map_or(0.0, |towards| towards.sign));
-            let fallen = match way {
-                Way::Straight => self.fall(system, path, to, q, done),
-                Way::Curved => self.creep(system, path, to, q, done),
-            };
-            settled = fallen.is_ok();
-            match fallen {
+            match self.fall(system, path, to, q, done) {
                 // a segment far from its chord stretches without strain: its energy is none of a beam
                 Ok(()) if Self::beyond_beams(system, q).is_none() => {
                     let Towards { kind, direction, .. } = towards.unwrap_or_else(Towards::unknown);

@@ -5,6 +5,7 @@
 
 use super::refined::Refined;
 use crate::domains::System;
+use crate::domains::loss_derivatives::LossDerivatives;
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
 use crate::solve::SolveError;
@@ -23,7 +24,7 @@ pub struct Harmonic {
     factor: BlockMatrix<Complex<f64>, 3>,
     pub(super) damping: BlockMatrix<f64, 3>,
     /// What contact loses about the state, linearized at rest; none where nothing does.
-    loss: Option<BlockMatrix<f64, 3>>,
+    loss: Option<LossDerivatives>,
     rest: Vec<ComplexPose>,
 }
 
@@ -35,27 +36,30 @@ impl Harmonic {
         let factor = matrix.clone();
         let mut damping = BlockMatrix::new(pattern);
         crate::multibody::forces::add_inertia(&system.model, 0.0, 1.0, &mut damping);
-        Self { matrix, factor, damping, loss: None, rest: vec![ComplexPose::zeros(); system.bodies()] }
+        Self {
+            matrix,
+            factor,
+            damping,
+            loss: LossDerivatives::of(system),
+            rest: vec![ComplexPose::zeros(); system.bodies()],
+        }
     }
 
     /// Takes the damping of contacts that are closed at displacements `q`, linearized at rest.
     pub fn about(&mut self, system: &System, q: &[Pose]) {
-        if !system.loses() {
-            return;
-        }
-        let model = &system.model;
+        let Some(loss) = &mut self.loss else { return };
+        loss.at(system, q, |_| Pose::zeros());
         self.damping.clear();
-        crate::multibody::forces::add_inertia(model, 0.0, 1.0, &mut self.damping);
-        self.loss = system.loss_about(q);
-        if let Some(loss) = &self.loss {
-            loss.add_to(1.0, &mut self.damping);
+        crate::multibody::forces::add_inertia(&system.model, 0.0, 1.0, &mut self.damping);
+        if let Some(by_rate) = loss.damping() {
+            by_rate.add_to(1.0, &mut self.damping);
         }
     }
 
     /// `y +=` the force of that damping at rates `x`.
     pub fn add_loss(&self, system: &System, x: &[Pose], y: &mut [Pose]) {
         if let Some(loss) = &self.loss {
-            loss.multiply_add(&system.model.pattern, x, y);
+            loss.add_damping(&system.model, |k| x[k], y);
         }
     }
 

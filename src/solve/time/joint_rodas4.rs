@@ -19,13 +19,13 @@
 
 mod defect;
 mod error;
-mod lossy;
 mod ports;
 mod stages;
 mod tableau;
 
 use super::method::{Method, Motion, StepFailure, Work};
 use super::rodas4::tableau::{ALPHA, GAMMA, GAMMA_I, moves_on};
+use super::stage_loss::StageLoss;
 use crate::domains::Drive;
 use crate::equations::{Bodies, Joints};
 use crate::multibody::forces;
@@ -36,7 +36,6 @@ use crate::multibody::relative::dynamics::Stresses;
 use crate::multibody::relative::geometric::{self, Geometric};
 use crate::multibody::relative::placed::{Placed, place_of};
 use error::Defect;
-use lossy::Lossy;
 use ports::Ports;
 use stages::Stages;
 use std::sync::Arc;
@@ -69,7 +68,7 @@ pub struct JointRodas4 {
     /// The bodies have been placed at the argument of the stages.
     is_placed: bool,
     /// Derivatives of what contact loses, at the start of the step and in the stage at hand; none where it loses nothing.
-    lossy: Option<Box<Lossy>>,
+    loss: Option<Box<StageLoss>>,
     /// Accelerations are those of the motion to come.
     resumed: bool,
     /// The error of the motion, where it is wanted.
@@ -103,7 +102,7 @@ impl JointRodas4 {
             drive: electrics.drive(),
             rate: electrics.drive(),
             is_placed: false,
-            lossy: Lossy::new(closures, !sources.is_empty()).map(Box::new),
+            loss: StageLoss::new(closures, !sources.is_empty()).map(Box::new),
             resumed: false,
             defect: None,
             shortest,
@@ -133,7 +132,7 @@ impl JointRodas4 {
     /// Places the bodies at the argument of the stage at hand, unless that is where they are, and puts −R into `right`. The
     /// first stage also begins W.
     fn residual(&mut self, first: bool, stays: bool) {
-        let Self { joints, w, placed, stresses, is_placed, stages, ports, force, right, drive, lossy, .. } = self;
+        let Self { joints, w, placed, stresses, is_placed, stages, ports, force, right, drive, loss, .. } = self;
         let Joints { tree, closures, loops, inertias, .. } = &**joints;
         let model = &closures.model;
         if !(stays && *is_placed) {
@@ -148,8 +147,8 @@ impl JointRodas4 {
             forces::add_dampers(model, |k| placed.rate[k], force);
         }
         let poses = placed.at.as_slice();
-        if let Some(lossy) = lossy {
-            lossy.add_forces(closures, first, placed, force);
+        if let Some(loss) = loss {
+            loss.add_forces(closures, first, poses, |k| placed.rate[k], force);
         }
         if first {
             closures.add_tangent(poses, drive, &mut w.bodies, force);
@@ -166,8 +165,8 @@ impl JointRodas4 {
             closures.add_tangent(poses, drive, &mut ports.tangent, force);
         }
         if !ports.is_empty() {
-            if let Some(lossy) = lossy {
-                lossy.add_tangent(&mut ports.tangent);
+            if let Some(loss) = loss {
+                loss.add_tangent(&mut ports.tangent);
             }
             ports.force.copy_from_slice(force);
         }
@@ -177,10 +176,10 @@ impl JointRodas4 {
     }
 
     fn factor(&mut self, gh: f64) -> Result<(), StepFailure> {
-        let Self { joints, w, placed, geometric, stages, force, lossy, .. } = self;
+        let Self { joints, w, placed, geometric, stages, force, loss, .. } = self;
         forces::add_inertia(&joints.closures.model, 1.0 / (gh * gh), 1.0 / gh, &mut w.bodies);
-        if let Some(lossy) = lossy {
-            lossy.add_matrix(gh, &mut w.bodies);
+        if let Some(loss) = loss {
+            loss.add_matrix(gh, &mut w.bodies);
         }
         let at = |j: usize| {
             let (tile, lane) = place_of(j);
@@ -195,9 +194,9 @@ impl JointRodas4 {
     /// Completes the right side of stage `i` of a step of length `h` [s]: `right` holds −R.
     fn inertia(&mut self, i: usize, h: f64) {
         let rate = GAMMA_I[i] * h;
-        let Self { joints, stages, right, wrench, forcing, force, lossy, .. } = self;
+        let Self { joints, stages, right, wrench, forcing, force, loss, .. } = self;
         let Joints { tree, closures, inertias, drags, .. } = &**joints;
-        let loses = lossy.as_ref().is_some_and(|lossy| lossy.acts());
+        let loses = loss.as_ref().is_some_and(|loss| loss.start.acts());
         stages.move_bodies(i, h, *drags || loses);
         for ((j, inertia), (wrench, forcing)) in inertias.iter().enumerate().zip(wrench.iter_mut().zip(forcing)) {
             *wrench = Four::from(inertia.force(&stages.push(j), &stages.drift(j)) - *forcing * rate);
@@ -209,9 +208,9 @@ impl JointRodas4 {
                 *wrench = Four::from(wrench.pose() + *force);
             }
         }
-        if let Some(lossy) = lossy.as_ref().filter(|_| loses) {
+        if let Some(loss) = loss.as_ref().filter(|_| loses) {
             force.fill(Pose::zeros());
-            lossy.add_drift(&closures.model, |k| stages.drift(k), force);
+            loss.start.add_damping(&closures.model, |k| stages.drift(k), force);
             for (wrench, force) in wrench.iter_mut().zip(force) {
                 *wrench = Four::from(wrench.pose() + *force);
             }
@@ -283,7 +282,7 @@ impl Method<Bodies<'_>> for JointRodas4 {
             self.inertia(i, h);
             self.w.solve(&mut self.wrench, &mut self.right);
             let stage = (&self.stages, self.placed.at.as_slice(), &self.drive);
-            let matrices = (&self.w, self.lossy.as_deref());
+            let matrices = (&self.w, self.loss.as_deref());
             let solves = self.ports.stage(&self.joints, ramp, (i, at, h, rate), stage, matrices, &self.carried[2..]);
             self.stages.keep(i, &self.right, &self.wrench);
             self.work.solves += 1 + solves;

@@ -30,6 +30,7 @@
 //! | [`radau5`] | Radau IIA of order 5: one real and one complex block factorization a step |
 //! | [`average_field`] | average vector field, which keeps the energy |
 //! | [`defect`] | the error of a run with Rodas4, by its defect |
+//! | `stage_loss` | forces of contact that loses energy in the stages of both |
 //! | [`gyration`] | Coriolis' force in a frame that turns |
 //! | [`side_by_side`] | runs of many variants in lanes |
 
@@ -52,4 +53,5 @@ mod pace;
 pub mod radau5;
 pub mod rodas4;
 pub mod side_by_side;
+mod stage_loss;
 pub mod tableau;

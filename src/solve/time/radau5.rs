@@ -11,6 +11,7 @@
 //! Reference: E. Hairer, G. Wanner, "Solving Ordinary Differential Equations II" (1996), §IV.8; coefficients of its RADAU5.
 
 use super::method::{Method, Motion, StepFailure, Work};
+use crate::domains::loss_derivatives::LossDerivatives;
 use crate::domains::{Drive, Ramp, System};
 use crate::equations::Bodies;
 use crate::equations::newton::largest;
@@ -52,7 +53,7 @@ pub struct Radau5 {
     tangent: BlockMatrix<f64, 3>,
     damping: BlockMatrix<f64, 3>,
     /// Derivatives of what contact loses with displacements and rates at the start of the step; none where it loses nothing.
-    loss: Option<[BlockMatrix<f64, 3>; 2]>,
+    loss: Option<LossDerivatives>,
     real: BlockMatrix<f64, 3>,
     complex: BlockMatrix<Complex<f64>, 3>,
     /// Z and W.
@@ -79,7 +80,7 @@ impl Radau5 {
         Self {
             tangent: BlockMatrix::new(pattern),
             damping,
-            loss: system.loses().then(|| [(); 2].map(|()| BlockMatrix::new(pattern))),
+            loss: LossDerivatives::of(system),
             real: BlockMatrix::new(pattern),
             complex: BlockMatrix::new(pattern),
             stages: three(),
@@ -101,7 +102,7 @@ impl Radau5 {
         self.real.diagonal.copy_from_slice(&self.tangent.diagonal);
         self.real.below.copy_from_slice(&self.tangent.below);
         forces::add_inertia(model, lambda * lambda, lambda, &mut self.real);
-        if let Some([_, by_rate]) = &self.loss {
+        if let Some(by_rate) = self.loss.as_ref().and_then(LossDerivatives::damping) {
             by_rate.add_to(lambda, &mut self.real);
         }
         model.project_matrix(&mut self.real);
@@ -115,7 +116,7 @@ impl Radau5 {
         for (out, (k, c)) in complex.below.iter_mut().zip(tangent.below.iter().zip(&damping.below)) {
             *out = blend(k, c);
         }
-        if let Some([_, by_rate]) = &self.loss {
+        if let Some(by_rate) = self.loss.as_ref().and_then(LossDerivatives::damping) {
             let scaled = |c: &Matrix3<f64>| c.map(|c| mu * c);
             complex.diagonal.iter_mut().zip(&by_rate.diagonal).for_each(|(out, c)| *out += scaled(c));
             complex.below.iter_mut().zip(&by_rate.below).for_each(|(out, c)| *out += scaled(c));
@@ -140,8 +141,8 @@ impl Radau5 {
             *out = x.v[k] + model.mass(k).component_mul(&x.q[k]) * lambda;
         }
         forces::add_damping(model, &x.q, rhs);
-        if let Some([_, by_rate]) = &self.loss {
-            by_rate.multiply_add(&model.pattern, &x.q, rhs);
+        if let Some(loss) = &self.loss {
+            loss.add_damping(model, |k| x.q[k], rhs);
         }
         model.project(rhs);
         self.real.solve(&model.pattern, rhs);
@@ -160,9 +161,9 @@ impl Radau5 {
         self.at.clear();
         forces::add_damping(model, &re.q, &mut self.at.q);
         forces::add_damping(model, &im.q, &mut self.at.v);
-        if let Some([_, by_rate]) = &self.loss {
-            by_rate.multiply_add(&model.pattern, &re.q, &mut self.at.q);
-            by_rate.multiply_add(&model.pattern, &im.q, &mut self.at.v);
+        if let Some(loss) = &self.loss {
+            loss.add_damping(model, |k| re.q[k], &mut self.at.q);
+            loss.add_damping(model, |k| im.q[k], &mut self.at.v);
         }
         for (k, out) in self.pair.iter_mut().enumerate() {
             let mass = model.mass(k);
@@ -279,12 +280,11 @@ impl Method<Bodies<'_>> for Radau5 {
         ramp.at(s, &mut self.drive);
         system.tangent(&motion.q, &self.drive, &mut self.tangent, &mut self.start_force);
         forces::add_damping(model, &motion.v, &mut self.start_force);
-        if let Some([by_q, by_rate]) = &mut self.loss {
-            by_q.clear();
-            by_rate.clear();
+        if let Some(loss) = &mut self.loss {
             let rate = |k: usize| motion.v[k];
-            if system.add_loss_tangent(&motion.q, rate, by_q, by_rate) {
-                by_q.add_to(1.0, &mut self.tangent);
+            loss.at(system, &motion.q, rate);
+            if loss.acts() {
+                loss.add_stiffness(1.0, &mut self.tangent);
                 system.add_loss(&motion.q, rate, &mut self.start_force);
                 model.project(&mut self.start_force);
             }

@@ -20,7 +20,6 @@
 
 mod defect;
 pub mod lanes;
-mod lossy;
 mod ports;
 mod stages;
 pub(in crate::solve) mod tableau;
@@ -34,8 +33,8 @@ use crate::equations::linear::{LinearSolver, Recursion};
 use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, forces};
 use crate::solve::time::gyration::{Gyration, held_out, skew};
+use crate::solve::time::stage_loss::StageLoss;
 use defect::Defect;
-use lossy::Lossy;
 use ports::{Ports, Turning};
 use stages::Stages;
 use tableau::{ALPHA, GAMMA, moves_on};
@@ -49,7 +48,7 @@ pub struct Rodas4<S = Recursion> {
     drive: Drive,
     rate: Drive,
     ports: Ports,
-    lossy: Option<Box<Lossy>>,
+    loss: Option<Box<StageLoss>>,
     /// Terms of the series in a frame that turns; empty where no input turns it.
     scratch: Vec<Pose>,
     /// ∂motion/∂(final voltage of a source), one for each source given to [`Rodas4::new`]; advanced with the motion.
@@ -76,7 +75,7 @@ impl<S: LinearSolver> Rodas4<S> {
             drive: system.electrics.drive(),
             rate: system.electrics.drive(),
             ports: Ports::new(system, sources),
-            lossy: Lossy::new(system, !sources.is_empty()).map(Box::new),
+            loss: StageLoss::new(system, !sources.is_empty()).map(Box::new),
             scratch: vec![Pose::zeros(); if system.turns() { system.bodies() } else { 0 }],
             sensitivity: vec![Motion::zeros(system.bodies()); sources.len()],
             defect: None,
@@ -127,10 +126,11 @@ impl<S: LinearSolver> Method<Bodies<'_>> for Rodas4<S> {
             }
             // what contact loses needs the stages beside their force
             let mut force = std::mem::take(&mut self.stages.force);
-            let (stages, lossy, from) = (&self.stages, &mut self.lossy, &*motion);
+            let (stages, loss, from) = (&self.stages, &mut self.loss, &*motion);
             let lose = |force: &mut [Pose]| {
-                if let Some(lossy) = lossy {
-                    lossy.add_forces(system, (i, h), (stages, from), force);
+                if let Some(loss) = loss {
+                    loss.add_forces(system, i == 0, stages.at(i, from), |k| stages.speed(i, h, k), force);
+                    loss.start.add_damping(model, |k| -stages.r1()[k], force);
                 }
             };
             let q = stages.at(i, from);
@@ -146,8 +146,8 @@ impl<S: LinearSolver> Method<Bodies<'_>> for Rodas4<S> {
             self.stages.force = force;
             if i == 0 {
                 self.ports.keep_tangent(&self.w);
-                if let Some(lossy) = &self.lossy {
-                    lossy.add_matrix(gh, &mut self.w);
+                if let Some(loss) = &self.loss {
+                    loss.add_matrix(gh, &mut self.w);
                 }
                 forces::add_inertia(model, 1.0 / (gh * gh), 1.0 / gh, &mut self.w);
                 model.project_matrix(&mut self.w);
@@ -155,8 +155,8 @@ impl<S: LinearSolver> Method<Bodies<'_>> for Rodas4<S> {
                 self.work.factorizations += 1;
                 self.work.forces += 6;
             }
-            if let (Some(lossy), Some(tangent)) = (&self.lossy, self.ports.tangent()) {
-                lossy.add_tangent(tangent);
+            if let (Some(loss), Some(tangent)) = (&self.loss, self.ports.tangent()) {
+                loss.add_tangent(tangent);
             }
             let force = &mut self.stages.force;
             self.solver.solve(&model.pattern, &self.w, force);
@@ -169,7 +169,7 @@ impl<S: LinearSolver> Method<Bodies<'_>> for Rodas4<S> {
             }
             let q = self.stages.at(i, motion);
             let matrix = (&self.solver, &self.w);
-            let beside = (turning.map(|turning| (&self.stages, turning)), self.lossy.as_deref());
+            let beside = (turning.map(|turning| (&self.stages, turning)), self.loss.as_deref());
             solves +=
                 self.ports.stage(system, ramp, (i, at, h), (q, &self.drive), matrix, beside, &mut self.sensitivity);
             self.work.solves += solves;

@@ -95,7 +95,7 @@ class Line:
             for reply in call:
                 if not self._sent:
                     self.over = self.over or UnexpectedReply(
-                        f"server {self._address}: unexpected reply: one that nobody asked for"
+                        f"server {self._address}: unexpected reply: no request is open"
                     )
                     call.cancel()
                     return

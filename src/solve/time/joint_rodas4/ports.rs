@@ -3,7 +3,6 @@
 //! Where the bodies are is a function of the coordinates that curves; its change comes from the same kinematics run over
 //! values with their derivatives, so that partials are those of the numbers that the step returns.
 
-use super::lossy::Lossy;
 use super::stages::Stages;
 use crate::domains::{Drive, Ramp};
 use crate::equations::Joints;
@@ -14,6 +13,7 @@ use crate::multibody::relative::placed::place_of;
 use crate::multibody::relative::{JointMatrix, Tree};
 use crate::multibody::{BlockMatrix, Pattern, forces};
 use crate::solve::time::method::Motion;
+use crate::solve::time::stage_loss::StageLoss;
 
 /// Sources whose final voltages the motion is differentiated by.
 #[derive(Debug, Clone)]
@@ -95,7 +95,7 @@ impl Ports {
         ramp: &Ramp<'_>,
         (i, s, h, rate): (usize, f64, f64, f64),
         (at, poses, drive): (&Stages, &[Pose], &Drive),
-        (w, lossy): (&JointMatrix, Option<&Lossy>),
+        (w, loss): (&JointMatrix, Option<&StageLoss>),
         start: &[Motion],
     ) -> u64 {
         let Joints { tree, closures, .. } = joints;
@@ -118,8 +118,8 @@ impl Ports {
             if !model.dampers.is_empty() {
                 forces::add_dampers(model, |k| self.changes.of(k)[1], &mut self.wrench);
             }
-            if let Some(lossy) = lossy {
-                lossy.add_change(model, |k| self.changes.of(k)[1], &mut self.wrench);
+            if let Some(loss) = loss {
+                loss.add_change(model, |k| self.changes.of(k)[1], &mut self.wrench);
             }
             self.tangent.multiply_add(&model.pattern, &self.share, &mut self.wrench);
             ramp.sensitivity(s, source, &mut self.change);
@@ -143,8 +143,8 @@ impl Ports {
             if !model.dampers.is_empty() {
                 forces::add_dampers(model, |k| stages.drift(k), &mut self.wrench);
             }
-            if let Some(lossy) = lossy {
-                lossy.add_drift(model, |k| stages.drift(k), &mut self.wrench);
+            if let Some(loss) = loss {
+                loss.start.add_damping(model, |k| stages.drift(k), &mut self.wrench);
             }
             for (to, from) in self.right.iter_mut().zip(&self.share).chain(self.moved.iter_mut().zip(&self.wrench)) {
                 *to = Four::from(*from);

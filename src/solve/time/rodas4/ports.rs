@@ -1,6 +1,5 @@
 //! Sensitivities with respect to final source voltages: the same stages with the exact tangent of each.
 
-use super::lossy::Lossy;
 use super::stages::Stages;
 use super::tableau::GAMMA;
 use crate::domains::{Drive, Ramp, System};
@@ -9,6 +8,7 @@ use crate::multibody::planar::Pose;
 use crate::multibody::{BlockMatrix, Model, Pattern};
 use crate::solve::method::Motion;
 use crate::solve::time::gyration::{Gyration, held_out, skew};
+use crate::solve::time::stage_loss::StageLoss;
 
 /// How the frame turns: at the start of a step, and in the stage at hand.
 #[derive(Debug, Clone, Copy)]
@@ -110,7 +110,7 @@ impl Ports {
         (i, s, h): (usize, f64, f64),
         (q, drive): (&[Pose], &Drive),
         (solver, w): (&S, &BlockMatrix<f64, 3>),
-        (turning, lossy): (Option<(&Stages, Turning)>, Option<&Lossy>),
+        (turning, loss): (Option<(&Stages, Turning)>, Option<&StageLoss>),
         start: &mut [Motion],
     ) -> u64 {
         let model = &system.model;
@@ -120,9 +120,10 @@ impl Ports {
             if let Some((_, turning)) = turning {
                 stages.add_gyration(model, (i, h), turning.now, turning.start);
             }
-            if let Some(lossy) = lossy {
+            if let Some(loss) = loss {
                 let mut force = std::mem::take(&mut stages.force);
-                lossy.add_change(model, (i, h), stages, &mut force, &mut self.scratch);
+                loss.add_change(model, |k| stages.speed(i, h, k), &mut force);
+                loss.start.add_damping(model, |k| -stages.r1()[k], &mut force);
                 stages.force = force;
             }
             let (at, force) = stages.place(i, start);

@@ -36,7 +36,7 @@ impl LaneRodas4 {
                     losses[k].at(lane.system, q, |b| rate_of[b]);
                 }
                 lane.system.add_loss(q, |b| rate_of[b], r);
-                losses[k].subtract_damping(&lane.system.model, r1_of, r);
+                losses[k].add_damping(&lane.system.model, |b| -r1_of[b], r);
             }
             for &b in acted.iter() {
                 (0..3).for_each(|i| force[b][i].set_lane(k, r[b][i]));
@@ -52,7 +52,7 @@ impl LaneRodas4 {
                 }
                 lane.system.add_body_tangent(q, drive, tangent);
                 if loses {
-                    losses[k].add_matrix(GAMMA * h.0[k], tangent);
+                    losses[k].add_to([1.0, 1.0 / (GAMMA * h.0[k])], tangent);
                 }
                 for (blocks, own, which) in
                     [(&mut w.diagonal, &tangent.diagonal, &*acted), (&mut w.below, &tangent.below, &*acted_blocks)]

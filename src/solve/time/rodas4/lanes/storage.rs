@@ -1,8 +1,8 @@
 //! What a step of variants side by side works on.
 
-use super::super::lossy::Derivatives;
 use super::heat::LaneHeat;
 use super::motion::{LaneMotion, Norms};
+use crate::domains::loss_derivatives::LossDerivatives;
 use crate::domains::{Drive, Ramp, System};
 use crate::multibody::lanes::joint::LanePlaced;
 use crate::multibody::lanes::{Eight, LANES, LaneMatrix, LaneModel, LanePose, STILL, Wide, load};
@@ -69,7 +69,7 @@ pub struct LaneRodas4 {
     pub(super) r: Vec<Pose>,
     pub(super) tangent: BlockMatrix<f64, 3>,
     /// What contact loses, lane by lane; empty where parts cannot touch.
-    pub(super) losses: Vec<Derivatives>,
+    pub(super) losses: Vec<LossDerivatives>,
     /// r₁ and rates of one lane.
     pub(super) rates: [Vec<Pose>; 2],
 }
@@ -112,7 +112,7 @@ impl LaneRodas4 {
             q: vec![Pose::zeros(); n],
             r: vec![Pose::zeros(); n],
             tangent: BlockMatrix::new(pattern),
-            losses: vec![Derivatives::new(&system.model); if system.can_touch() { LANES } else { 0 }],
+            losses: vec![LossDerivatives::new(&system.model); if system.can_touch() { LANES } else { 0 }],
             rates: [(); 2].map(|()| vec![Pose::zeros(); n]),
             model,
         })
