@@ -347,3 +347,24 @@ fn resistances_without_a_conductance_are_refused() {
     let heated = "anchor p1 [a] []\nhot beam2det p1 [a b] [l=10u w=1u R=1e-310]\nanchor p1 [b] []\n";
     assert!(all(&format!("{PROCESS}{heated}")).items.iter().any(|d| d.code == "E060"), "{}", all(heated));
 }
+
+/// What an impact loses is bounded: a restitution from 0.01 to 1 and a speed from 1e-9 to 1e6 m/s, and a value next to a bound is printed in full.
+#[test]
+fn impacts_are_bounded() {
+    let stop = |value: &str| format!("anchor p1 [a] []\nbeam2d p1 [a b] [l=10u w=1u]\nstop2d * [b] [gap=1u {value}]\n");
+    for (value, message) in [
+        ("restitution=0", "`restitution` is 0e0, expected 1e-2 to 1e0"),
+        ("restitution=-1", "`restitution` is -1e0, expected 1e-2 to 1e0"),
+        ("restitution=1.0000001", "`restitution` is 1.0000001e0, expected 1e-2 to 1e0"),
+        ("speed=1e-300", "`speed` is 1e-300, expected 1e-9 to 1e6"),
+        ("speed=0", "`speed` is 0e0, expected 1e-9 to 1e6"),
+        ("speed=1e300", "`speed` is 1e300, expected 1e-9 to 1e6"),
+    ] {
+        let item = only(&stop(value));
+        assert_eq!((item.code.as_str(), item.message.as_str(), item.line), ("E060", message, 3), "{item:?}");
+        assert!(!item.help.is_empty());
+    }
+    for value in ["restitution=0.01", "restitution=1", "speed=1e-9", "speed=1e6"] {
+        assert!(all(&format!("{PROCESS}{}", stop(value))).items.is_empty(), "{value}");
+    }
+}

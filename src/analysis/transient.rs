@@ -1,5 +1,6 @@
 //! Motion in time, in the formulation of the model.
 
+mod contact_energy;
 mod crossings;
 pub(super) mod error_log;
 pub(super) mod first_step;

@@ -48,10 +48,10 @@ Examples:\n  \
     bimorph tran bank.net --stop 300u --port heat=2.2 --signals yoke.y,b1.hot.T --out heat.svg\n  \
     bimorph tran stage.net --set F=100u --release F --stop 30u --undamped --signals c.x --json\n      \
     starts from the equilibrium under F = 100 µN and lets go at t = 0\n  \
-    bimorph tran stage.net --set F=100u --release F --stop 1m --undamped --method avf --step 0.5u --event c.x=0\n      \
+    bimorph tran stage.net --set F=100u --release F --stop 100u --undamped --method avf --step 0.1u --event c.x=0\n      \
     keeps the energy over many swings and tells each passage through the middle\n  \
     bimorph tran stage.net --set F=100u --release F --stop 30u --draw motion.html\n  \
-    bimorph tran stage.net --set F=100u --release F --stop 30u --undamped --formulation rcr --method rk45 --signals c.x --json\n      \
+    bimorph tran stage.net --set F=100u --release F --stop 1u --undamped --formulation rcr --method rk45 --signals c.x --json\n      \
     the model of the paper: joints that only turn, in joint coordinates; \"joint_coordinates\" tells n, m and the gaps\n  \
     bimorph tran stage.net --set F=100u --release F --stop 10u --formulation rcr-elastic --rotary-inertia --method tr-bdf2\n      \
     every elastic direction a coordinate, in implicit steps by the same recursion")]

@@ -5,8 +5,9 @@ use super::member::Member;
 use super::system::System;
 use crate::multibody::planar::Pose;
 
-/// Penetration of a step that ran away, of the largest that the law of contact knows [1]. One that is pressed too hard gets there in smaller steps.
-const RUNAWAY: f64 = 10.0;
+/// Largest penetration at the start of a step that may end beyond the law of contact, of the largest that the law knows [1]. What is really pressed
+/// too hard gets there in smaller steps.
+const PRESSED_BEFORE: f64 = 0.5;
 
 impl System {
     /// Capacitance of a gap [F].
@@ -93,13 +94,14 @@ impl System {
         self.members.iter().map(|gap| gap.contact_work(self.at(q), dq).abs()).sum()
     }
 
-    /// The largest change of the distance of a contact with a change `dq` at `q`, over how far it is pressed, `least` [m] at least [1]; infinite where
-    /// one is pressed ten times as far as it may.
-    pub fn contact_change(&self, q: &[Pose], dq: &[Pose], least: f64) -> f64 {
+    /// The largest change of the distance of a contact with a change `dq` at the end of a step from `before` to `q`, over how far it is pressed,
+    /// `least` [m] at least [1]; infinite where the step leaps beyond the law of contact.
+    pub fn contact_change(&self, [before, q]: [&[Pose]; 2], dq: &[Pose], least: f64) -> f64 {
         let change = |gap: &Member| {
             let [touch, allowed] = gap.touching()?;
             let pressed = touch - gap.distance(self.at(q));
-            if pressed > RUNAWAY * (touch - allowed) {
+            let most = touch - allowed;
+            if pressed > most && touch - gap.distance(self.at(before)) < PRESSED_BEFORE * most {
                 return Some(f64::INFINITY);
             }
             (pressed > 0.0).then(|| gap.distance_change(self.at(q), dq).abs() / pressed.max(least))

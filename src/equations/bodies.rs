@@ -4,7 +4,7 @@
 //! stay below tol·(‖q‖ + floor), with ‖q‖ the larger of both ends of a step and a floor of 1e-4 of the model's length scale. Where parts
 //! touch, the time of a bounce is nothing beside that of the motion, and a displacement beside its reach: there the error of the energy,
 //! |vᵀMe_v| + |work of the contact forces over e_q|, must also stay below tol·(kinetic energy + energy in the contacts), three times that where contact loses
-//! energy, and the error of a penetration below a tenth of it. A step that ends far beyond the law of contact ran away, whatever its error is relative
+//! energy, and the error of a penetration below a tenth of it. A step that leaps beyond the law of contact is rejected, whatever its error is relative
 //! to where it ends.
 
 use super::{Equations, Motion, Place};
@@ -126,7 +126,7 @@ pub(crate) fn contact_error(system: &System, (before, after): (&Motion, &Motion)
     let work = system.contact_work(&after.q, &error.q);
     let weight = if system.loses() { OF_LOSS } else { 1.0 };
     let energy = weight * (model.mass_product(&after.v, &error.v).abs() + work) / (tol * (kinetic + stored));
-    energy.hypot(system.contact_change(&after.q, &error.q, PRESSED.1) / PRESSED.0)
+    energy.hypot(system.contact_change([&before.q, &after.q], &error.q, PRESSED.1) / PRESSED.0)
 }
 
 /// Directions of bodies without mass that drag holds back, with the drag [N·s/m, N·m·s].

@@ -3,10 +3,11 @@
 //! The models of the product have a diagonal mass matrix and nonlinear forces; this is what a linear frame of finite elements
 //! is assembled into.
 
+use super::model::projected;
 use super::order::elimination_order;
 use super::planar::{Block, Pose};
 use super::{BlockMatrix, BodyId, Pattern};
-use nalgebra::{Matrix3, Matrix6};
+use nalgebra::Matrix6;
 
 /// Mass, damping and stiffness of bodies in elimination order.
 #[derive(Debug, Clone)]
@@ -73,7 +74,7 @@ impl LinearSystem {
         }
         for (j, free) in self.free.iter().enumerate() {
             if let Some(p) = free {
-                sum.diagonal[j] = p * sum.diagonal[j] * p + (Matrix3::identity() - p);
+                sum.diagonal[j] = projected(p, &sum.diagonal[j]);
                 for block in self.pattern.column(j) {
                     sum.below[block] *= p;
                 }

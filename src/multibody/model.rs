@@ -227,15 +227,15 @@ impl Model {
         }
     }
 
-    /// Removes the held directions from a matrix and gives them the pivot 1, so that solutions have no share in them.
+    /// Removes the held directions from a matrix and gives them pivots, so that solutions have no share in them.
     pub fn project_matrix<T: super::Scalar>(&self, matrix: &mut BlockMatrix<T, 3>) {
         if self.held.is_empty() {
             return;
         }
         for (j, body) in self.bodies.iter().enumerate() {
             if let Some(p) = &body.free {
+                matrix.diagonal[j] = projected(p, &matrix.diagonal[j]);
                 let p: Matrix3<T> = p.map(T::from_real);
-                matrix.diagonal[j] = p * matrix.diagonal[j] * p + (Matrix3::identity() - p);
                 for k in self.pattern.column(j) {
                     matrix.below[k] *= p;
                 }
@@ -256,6 +256,20 @@ impl Model {
             BodyId::Free(k) => q[k],
         }
     }
+}
+
+/// Pivot of a translation that is held, where nothing is left of the other one [N/m].
+pub(super) const LEAST_HELD: f64 = 1e-100;
+
+/// P·A·P with pivots in what the projector P takes away: 1 for a rotation. A translation that is held at an angle mixes with the one that is free, so its
+/// pivot is of the size of that one: beside a contact of 10¹³ N/m a pivot of 1 would be rounding.
+pub(super) fn projected<T: super::Scalar>(p: &Matrix3<f64>, a: &Matrix3<T>) -> Matrix3<T> {
+    let lifted: Matrix3<T> = p.map(T::from_real);
+    let block = lifted * a * lifted;
+    let size = block[(0, 0)].modulus() + block[(1, 1)].modulus() + LEAST_HELD;
+    let mut held = Matrix3::identity() - p;
+    held.fixed_view_mut::<2, 2>(0, 0).apply(|x| *x *= size);
+    block + held.map(T::from_real)
 }
 
 /// See [`Model::loose_parts`].

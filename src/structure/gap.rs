@@ -15,6 +15,9 @@ pub enum GapVoltage {
 /// Least restitution of an impact [1].
 pub const LEAST_RESTITUTION: f64 = 0.01;
 
+/// Reference speeds of impacts that a netlist may give [m/s].
+pub const IMPACT_SPEEDS: [f64; 2] = [1e-9, 1e6];
+
 /// How an impact of two surfaces ends, as far as a netlist says it.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Impact {

@@ -16,7 +16,7 @@ mod placed;
 mod without_circuit;
 
 pub use circuit::{CircuitElement, CircuitKind};
-pub use gap::{BeamGap, Comb, GapVoltage, Impact, LEAST_RESTITUTION, PlateGap, Stop};
+pub use gap::{BeamGap, Comb, GapVoltage, IMPACT_SPEEDS, Impact, LEAST_RESTITUTION, PlateGap, Stop};
 pub use index::NodeIndex;
 pub use mechanical::{Beam, Heater, Link, Load, MOLTEN, Mass, Material, Pad, SpringDamper, Support, Yield};
 pub use network::{Port, Resistor, VoltageSource, Wire};

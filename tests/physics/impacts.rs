@@ -312,3 +312,73 @@ fn a_point_without_mass_meets_a_stop() {
         assert!((last / rest - 1.0).abs() < 1e-3 && result.counters.steps < 5000, "{method:?}: {last:e} for {rest:e}");
     }
 }
+
+/// A guided plate that closes at any angle closes when it does along x, and rests as far from its drawn place. Beside a contact, the pivot of what a guide
+/// at an angle holds was rounding: steps fell to 1e-21 s.
+#[test]
+fn a_plate_closes_at_any_angle() {
+    let closed = |angle: f64| {
+        let text = format!(
+            "anchor * [f] []
+            mass2d * [m] [m=1e-10 J=1e-20 b=2e-6]
+            guide2d * [m] [oz={angle}]
+            spring2d * [f m] [kx=1 oz={angle}]
+            anchor * [e] []
+            plategap2d * [m e] [A=1e-8 gap=2u oz={angle}]
+            eground * [e] []
+            drive port * [m e] []"
+        );
+        let options = TransientOptions {
+            stop: 60e-6,
+            points: 601,
+            signals: vec!["m.x".into(), "m.y".into()],
+            voltages: vec![("drive".into(), 16.0)],
+            ..TransientOptions::default()
+        };
+        let compiled = model(&text, &CompileOptions::default());
+        let result = run(&compiled, &options).unwrap_or_else(|e| panic!("{angle}: {e}"));
+        let last = |k: usize| *result.signals[k].2.last().unwrap();
+        (result.events[0].t, last(0).hypot(last(1)))
+    };
+    let (t, x) = closed(0.0);
+    for k in 1..24 {
+        let angle = std::f64::consts::TAU * f64::from(k) / 24.0 + 0.01;
+        let (found, way) = closed(angle);
+        assert!(
+            (found / t - 1.0).abs() < 1e-4 && (way / x - 1.0).abs() < 1e-4,
+            "{angle}: {found:e} {way:e} for {t:e} {x:e}"
+        );
+    }
+}
+
+/// Equal steps that are too long for an impact give energy by any method but avf: the run ends with an error that names what helps. A mass that is let go 2 µm away from
+/// rest came back 3 µm high, at a restitution of 0.5.
+#[test]
+fn energy_from_long_steps_is_refused() {
+    let text = |load: &str| {
+        format!(
+            "anchor * [f] []
+            mass2d * [m] [m=1e-10 J=1e-20]
+            guide2d * [m] []
+            spring2d * [f m] [kx=1]
+            stop2d * [m] [gap=1u speed=0.1732]
+            f2d * [m] [F={load}]"
+        )
+    };
+    let [drawn, loaded] = ["0", "-2u"].map(|load| model(&text(load), &CompileOptions::default()));
+    let options = |method, step| TransientOptions {
+        stop: 100e-6,
+        signals: vec!["m.x".into()],
+        release: Some(&loaded),
+        method,
+        step: Some(step),
+        ..TransientOptions::default()
+    };
+    let error = run(&drawn, &options(Integrator::Sdirk4, 50e-9)).unwrap_err().to_string();
+    assert!(error.contains("in contact") && error.contains("--method avf"), "{error}");
+    for (method, step) in [(Integrator::AverageField, 50e-9), (Integrator::Sdirk4, 1e-9)] {
+        let result = run(&drawn, &options(method, step)).unwrap_or_else(|e| panic!("{method:?}: {e}"));
+        let highest = result.signals[0].2.iter().fold(0.0, |a: f64, x| a.min(*x));
+        assert!((-2.001e-6..-1.999e-6).contains(&highest), "{method:?}: {highest:e}");
+    }
+}

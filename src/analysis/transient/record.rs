@@ -5,6 +5,7 @@ use super::super::signal::Signal;
 use super::super::stability::Stability;
 use super::super::statics::{operating_point, source_vector, told_at};
 use super::super::{AnalysisError, Watch};
+use super::contact_energy::ContactEnergy;
 use super::crossings::Crossings;
 use super::error_log::{ErrorLog, Lost};
 use super::folded;
@@ -70,6 +71,7 @@ pub(in crate::analysis) fn record(
     let mut samples = Samples::start(asked, held, &signals, sample, &motion);
     let mut log = options.estimate.then(|| ErrorLog::start((compiled, options.stop), held, &signals, &motion));
     let mut stability = Stability::new(system);
+    let mut energy = ContactEnergy::start(compiled, &motion, &drive);
     let mut looks = 0;
     let (mut beyond, mut stopped_at) = (None, None);
     refuse_in_contact(compiled, options, 0.0, &motion)?;
@@ -77,7 +79,10 @@ pub(in crate::analysis) fn record(
         stopped_at = crossings.step(s, h, before, after);
         let suits = refuse_in_contact(compiled, options, s + h, after);
         let within = |()| within_contact_range(compiled, &after.q);
-        if let Err(error) = suits.and_then(within).or_else(|error| stopped_at.map(|_| ()).ok_or(error)) {
+        let done = ((s + h) / options.stop * LOOKS as f64 * (1.0 + 1e-12)) as usize;
+        let look = options.step.is_some() || done > looks;
+        let kept = |()| energy.as_mut().map_or(Ok(()), |energy| energy.step(options, s + h, after, look));
+        if let Err(error) = suits.and_then(within).and_then(kept).or_else(|error| stopped_at.map(|_| ()).ok_or(error)) {
             beyond = Some(error);
             return false;
         }
@@ -85,7 +90,6 @@ pub(in crate::analysis) fn record(
         if stopped_at.is_some() {
             return false;
         }
-        let done = ((s + h) / options.stop * LOOKS as f64 * (1.0 + 1e-12)) as usize;
         if done > looks {
             looks = done;
             ramp.at(s + h, &mut drive);
@@ -154,7 +158,7 @@ fn refuse_in_contact(
         what: format!("method {method}"),
         detail: format!(
             "the gap \"{name}\" touches at {t:.6e} s, and {method} gains energy without bound in contact; expected a method that does not: \
-             rodas4 (default), radau5, sdirk4, tr-bdf2, avf, or generalized-alpha with --rho 0"
+             rodas4 (default), radau5, sdirk4, tr-bdf2, or generalized-alpha with --rho 0, in steps that follow --tol; or avf"
         ),
     })
 }

@@ -7,6 +7,7 @@ use super::{
 };
 use crate::multibody::Pattern;
 use crate::multibody::factor::LOST;
+use crate::multibody::model::LEAST_HELD;
 
 /// A symmetric matrix of blocks on a pattern in each variant; after [`LaneMatrix::factor`], its factors.
 #[derive(Debug, Clone)]
@@ -124,7 +125,7 @@ impl LaneMatrix {
         }
     }
 
-    /// P·A·P with a pivot of 1 in what the projectors `held` (body, projector, what it leaves out) take away.
+    /// P·A·P with pivots in what the projectors `held` (body, projector, what it leaves out) take away, as `projected` of one model has them.
     #[inline(always)]
     pub fn project<W: Wide>(&mut self, simd: W::Simd, pattern: &Pattern, held: &[Option<(LaneBlock, LaneBlock)>]) {
         let block = |from: &LaneBlock| load_block::<W>(simd, from);
@@ -133,7 +134,12 @@ impl LaneMatrix {
                 let p = block(p);
                 let own = product(&product(&p, &block(&self.diagonal[j])), &p);
                 store_block(own, &mut self.diagonal[j]);
-                for (column, rest) in self.diagonal[j].iter_mut().zip(&block(rest)) {
+                let size = own[0][0].abs() + own[1][1].abs() + W::splat(simd, LEAST_HELD);
+                let mut rest = block(rest);
+                for column in &mut rest[..2] {
+                    column[..2].iter_mut().for_each(|x| *x = *x * size);
+                }
+                for (column, rest) in self.diagonal[j].iter_mut().zip(&rest) {
                     super::add(simd, column, rest);
                 }
                 for k in pattern.column(j) {

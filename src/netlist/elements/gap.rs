@@ -4,7 +4,7 @@ use super::super::drawing::Fact;
 use super::super::sink::Reported;
 use super::super::value::short;
 use super::arguments::Site;
-use crate::structure::{BeamGap, GapVoltage, Impact, LEAST_RESTITUTION, NodeId, PlateGap, Resistor};
+use crate::structure::{BeamGap, GapVoltage, IMPACT_SPEEDS, Impact, LEAST_RESTITUTION, NodeId, PlateGap, Resistor};
 
 /// SUGAR's factor on the fringe field: α = 1 + 1.12·gap/h.
 const FRINGE: f64 = 1.12;
@@ -38,14 +38,17 @@ impl Site<'_, '_> {
 
     /// What an impact loses, as far as it is given.
     pub(super) fn impact(&mut self) -> Result<Impact, Reported> {
-        let (restitution, speed) = (self.positive_if_any("restitution")?, self.positive_if_any("speed")?);
-        if let Some(e) = restitution
-            && !(LEAST_RESTITUTION..=1.0).contains(&e)
-        {
-            let message = format!("`restitution` is {}, expected {LEAST_RESTITUTION} to 1", short(e));
-            let help = "1 is elastic contact; the default is 0.5 at the speed `speed` [m/s]";
-            return Err(self.sink.error("E060", self.span_of("restitution"), message, help));
-        }
+        let within = |site: &mut Self, name: &str, [least, most]: [f64; 2], help: &str| match site.number(name)? {
+            Some(x) if !(least..=most).contains(&x) => {
+                let message = format!("`{name}` is {x:e}, expected {least:e} to {most:e}");
+                Err(site.sink.error("E060", site.span_of(name), message, help))
+            }
+            x => Ok(x),
+        };
+        let elastic = "1 is elastic contact; the default is 0.5 at the speed `speed` [m/s]";
+        let restitution = within(self, "restitution", [LEAST_RESTITUTION, 1.0], elastic)?;
+        let speed =
+            within(self, "speed", IMPACT_SPEEDS, "a speed of impact [m/s]; by default it is found from statics")?;
         Ok(Impact { restitution, speed })
     }
 

@@ -136,9 +136,9 @@ impl Line {
         let still = || waits() && asked.elapsed() < patience;
         let Self { runtime, requests, replies, owed } = self;
         if *owed == 0 {
-            // a reply that nobody asked for would be taken for that to this question
+            // a reply without a request would be taken for that to this question
             match pin!(replies.message()).poll(&mut Context::from_waker(Waker::noop())) {
-                Poll::Ready(Ok(Some(_))) => return Err(unexpected("one that nobody asked for")),
+                Poll::Ready(Ok(Some(_))) => return Err(unexpected("no request is open")),
                 Poll::Ready(Err(status)) => return Err(said(&status, asked, patience)),
                 Poll::Ready(Ok(None)) => return Err(said(&ended(), asked, patience)),
                 Poll::Pending => {}
