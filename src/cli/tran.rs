@@ -234,10 +234,12 @@ impl Tran {
         let run = TransientOptions {
             stop: self.stop,
             signals: signals.to_vec(),
+            points: self.points,
             voltages: self.ports.clone(),
             release,
             method,
             step: self.step,
+            until: self.until.clone(),
             ..TransientOptions::default()
         };
         let busy = progress::spinner("mesh");
