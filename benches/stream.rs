@@ -100,7 +100,7 @@ fn lines(criterion: &mut Criterion, name: &str, address: &Address) {
     let mut client = Client::connect(&address.uri(), PATIENCE).expect("connects");
     let model = client.compile(&Bundle::from_text("plate.net", NETLIST), &CompileOptions::default()).expect("compiles");
     let lines = Lines::new().expect("a thread");
-    let mut line = lines.open(&address.uri(), None, PATIENCE, &|| true).expect("a stream");
+    let mut line = lines.open((&address.uri(), 0), None, PATIENCE, &|| true).expect("a stream");
     let mut ask = |kind| {
         let request = proto::DeviceRequest { kind: Some(kind) }.encode_to_vec();
         let reply = line.ask(&request, PATIENCE, &|| true).expect("an answer")?;

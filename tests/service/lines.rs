@@ -58,7 +58,7 @@ fn each_question_has_its_own_reply() {
     let server = start_with("127.0.0.1:0", Limits::default(), slow);
     let model = block_on(async { compiled(&mut server.client().await).await });
     let lines = Lines::new().expect("a thread");
-    let mut line = lines.open(&server.address.to_string(), None, DEADLINE, &|| true).expect("a stream");
+    let mut line = lines.open((&server.address.to_string(), 0), None, DEADLINE, &|| true).expect("a stream");
     let open = Ask::Open(proto::OpenRequest { model, ports: vec!["p".into()], ..Default::default() });
     let opened = ask(&mut line, open, DEADLINE).expect("a reply");
     assert!(matches!(opened, Some(ReplyKind::Opened(_))), "{opened:?}");
@@ -82,7 +82,7 @@ fn a_server_that_goes() {
     let lines = Lines::new().expect("a thread");
     let folder = tempfile::tempdir().expect("a folder");
     let address = format!("unix://{}/s", folder.path().display());
-    let open = || lines.open(&address, None, DEADLINE, &|| true);
+    let open = || lines.open((&address, 0), None, DEADLINE, &|| true);
     assert_eq!(open().err().map(|status| status.code()), Some(Code::Unavailable));
     for _ in 0..2 {
         let mut server = start_with(&address, Limits { drain: Duration::from_millis(10), ..Limits::default() }, slow);

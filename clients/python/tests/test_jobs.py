@@ -62,7 +62,7 @@ def test_sweeps_are_listed_and_shared(client: bimorph.Client) -> None:
     assert [status.id for status in client.sweeps() if status.id not in before] == [one.id]
     assert one.wait() == client.sweep(NET, gaps(5), PULL_IN)
     one.delete()
-    with pytest.raises(bimorph.InvalidRequest, match="release_after_s"):
+    with pytest.raises(bimorph.InvalidRequest, match="release_after: expected"):
         client.submit(NET, gaps(5), PULL_IN, release_after=-1.0)
 
 

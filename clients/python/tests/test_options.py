@@ -44,7 +44,7 @@ def test_every_option_reaches_the_server(client: bimorph.Client) -> None:
         ("band", -1.0, "above 0, at most 1e12 Hz"),
         ("segments", 0, "from 1 to 100000"),
         ("segments", 100_001, "from 1 to 100000"),
-        ("junctions", "welded", "centreline, offset or calibrated"),
+        ("junctions", "welded", '"centreline", "offset" or "calibrated"'),
     ],
 )
 def test_ranges(client: bimorph.Client, name: str, value: Any, expected: str) -> None:

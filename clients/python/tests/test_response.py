@@ -53,10 +53,10 @@ def test_modes_and_spacing(plate: bimorph.Model) -> None:
 def test_refusals(plate: bimorph.Model) -> None:
     """What means nothing, and what is too much, is refused by name, whatever its size."""
     for what, drive, keywords in [
-        ("from", "m.fx", {"start": 0.0, "stop": 1.0}),
-        ("from", "m.fx", {"start": math.nan, "stop": 1.0}),
-        ("to", "m.fx", {"start": 1.0, "stop": 1e300}),
-        ("to", "m.fx", {"start": 2.0, "stop": 1.0}),
+        ("start", "m.fx", {"start": 0.0, "stop": 1.0}),
+        ("start", "m.fx", {"start": math.nan, "stop": 1.0}),
+        ("stop", "m.fx", {"start": 1.0, "stop": 1e300}),
+        ("stop", "m.fx", {"start": 2.0, "stop": 1.0}),
         ("points", "m.fx", {"start": 1.0, "stop": 2.0, "points": 2_000_000_000}),
         ("drive", "nobody.fx", {"start": 1.0, "stop": 2.0}),
         ("signal", "m.fx", {"signals": ["nobody.x"], "start": 1.0, "stop": 2.0}),

@@ -30,10 +30,10 @@ const QUEUE: usize = 64;
 const PING: Duration = Duration::from_millis(2000);
 const PONG: Duration = Duration::from_millis(2500);
 
-/// Connections to servers without TLS, one to each.
+/// Connections to servers without TLS, by address and number: a server takes only so many streams on each.
 pub struct Lines {
     runtime: Arc<Loop>,
-    open: Mutex<BTreeMap<String, Channel>>,
+    open: Mutex<BTreeMap<(String, usize), Channel>>,
 }
 
 /// A Trial stream.
@@ -54,14 +54,14 @@ impl Lines {
         Ok(Self { runtime: Loop::new()?, open: Mutex::default() })
     }
 
-    /// A stream to the server at `uri` (`unix:///path`, `host:port`), showing `authorization`; the connection is shared with others.
-    /// Waits at most for `patience`, while `waits` says that it is still wanted.
+    /// A stream to the server at `uri` (`unix:///path`, `host:port`), showing `authorization`, on the connection of that `number`, which is
+    /// shared with others. Waits at most for `patience`, while `waits` says that it is still wanted.
     ///
     /// # Errors
     /// UNAVAILABLE where there is no server; what it refuses.
     pub fn open(
         &self,
-        uri: &str,
+        (uri, number): (&str, usize),
         authorization: Option<&str>,
         patience: Duration,
         waits: &dyn Fn() -> bool,
@@ -77,7 +77,7 @@ impl Lines {
             if let Some(value) = &value {
                 request.metadata_mut().insert("authorization", value.clone());
             }
-            let mut rpc = BimorphClient::new(self.channel(uri)?).max_decoding_message_size(usize::MAX);
+            let mut rpc = BimorphClient::new(self.channel(uri, number)?).max_decoding_message_size(usize::MAX);
             Ok((self.runtime.wait(rpc.trial(request), &still)?, requests))
         };
         // a connection that broke while nobody asked shows at the next question; this one may be asked again
@@ -85,16 +85,16 @@ impl Lines {
             if !is_broken(&status) {
                 return Err(status);
             }
-            self.open.lock().unwrap_or_else(PoisonError::into_inner).remove(uri);
+            self.open.lock().unwrap_or_else(PoisonError::into_inner).remove(&(uri.to_owned(), number));
             begin()
         });
         let (replies, requests) = begun.map_err(|status: Status| said(&status, asked, patience))?;
         Ok(Line { runtime: Arc::clone(&self.runtime), requests, replies: replies.into_inner(), owed: 0 })
     }
 
-    fn channel(&self, uri: &str) -> Result<Channel, Status> {
+    fn channel(&self, uri: &str, number: usize) -> Result<Channel, Status> {
         let mut open = self.open.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(channel) = open.get(uri) {
+        if let Some(channel) = open.get(&(uri.to_owned(), number)) {
             return Ok(channel.clone());
         }
         let address: Address = uri.parse().map_err(|error| Status::invalid_argument(format!("{error}")))?;
@@ -106,7 +106,7 @@ impl Lines {
             .http2_keep_alive_interval(PING)
             .keep_alive_timeout(PONG)
             .connect_lazy();
-        open.insert(uri.to_owned(), channel.clone());
+        open.insert((uri.to_owned(), number), channel.clone());
         Ok(channel)
     }
 }

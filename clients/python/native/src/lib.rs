@@ -154,10 +154,18 @@ impl Servers {
         client::Lines::new().map(Self).map_err(|error| PyOSError::new_err(error.to_string()))
     }
 
-    /// The questions of one device on the server at an address without TLS, each answered within `patience` [s].
-    fn line(&self, py: Python<'_>, address: &str, authorization: Option<&str>, patience: f64) -> PyResult<RemoteLine> {
+    /// The questions of one device on the server at an address without TLS, each answered within `patience` [s], over the connection of
+    /// that number.
+    fn line(
+        &self,
+        py: Python<'_>,
+        address: &str,
+        authorization: Option<&str>,
+        patience: f64,
+        connection: usize,
+    ) -> PyResult<RemoteLine> {
         let patience = Duration::try_from_secs_f64(patience).unwrap_or(Duration::MAX);
-        let line = wait(py, None, |wanted| self.0.open(address, authorization, patience, wanted))?;
+        let line = wait(py, None, |wanted| self.0.open((address, connection), authorization, patience, wanted))?;
         Ok(RemoteLine(Mutex::new(Some(line))))
     }
 }

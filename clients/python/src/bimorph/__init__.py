@@ -15,6 +15,7 @@ from .errors import (
     BimorphError,
     Diagnostic,
     InvalidRequest,
+    InvalidType,
     LimitExceeded,
     NetlistError,
     NoResult,
@@ -42,8 +43,9 @@ from .results import (
 )
 from .server import Server, serve
 from .session import Session
-from .sweep import LogNormal, Modes, Normal, PullIn, Row, Samples, Static, Table, Transient, Uniform
+from .sweep import LogNormal, Modes, Normal, PullIn, Samples, Static, Transient, Uniform
 from .sweep_handle import Sweep, SweepStatus
+from .table import Row, Table
 from .ticket import Snapshot, Ticket
 
 __all__ = [
@@ -55,6 +57,7 @@ __all__ = [
     "Diagnostic",
     "FrequencyResponse",
     "InvalidRequest",
+    "InvalidType",
     "LimitExceeded",
     "LogNormal",
     "Model",

@@ -31,7 +31,7 @@ from . import sweep_handle as _sweep_handle
 from .local import ADDRESS
 from .results import TrialReply
 from .stopping import Stopping, current
-from .sweep import Row
+from .table import Row
 
 P = ParamSpec("P")
 S = TypeVar("S")

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import importlib.metadata
+import math
 import os
 import threading
 import time
@@ -23,16 +24,19 @@ from . import native
 from .access import Access, is_secure, target
 from .errors import BimorphError, Unavailable, from_rpc
 from .line import Line, NativeLine
-from .stopping import current
+from .stopping import check, current
+from .streams import Place, Places
 from .v1 import model_pb2, service_pb2_grpc
 
 T = TypeVar("T")
 
 _ATTEMPTS = 6
-"""Attempts in a row without a word, after which a server is given up."""
+"""Attempts in a row, after which a server is given up that has never answered."""
 
 _PAUSE = 0.1
 """Pause before the second attempt [s]; each further one is twice as long."""
+_LONGEST_PAUSE = 1.0
+"""Longest of these pauses [s]."""
 
 _OPTIONS = [
     ("grpc.max_receive_message_length", 64 << 20),
@@ -55,27 +59,49 @@ _PLAIN = [*_OPTIONS, ("grpc.default_authority", "localhost")]
 
 
 class _Connection:
-    """A gRPC channel of this process; closed when nobody holds it any more."""
+    """The gRPC channels of this process to one server, a second one where the first is full of streams; closed when unused."""
 
     def __init__(self, address: str, access: Access) -> None:
         self._pid = os.getpid()
-        self._channel: Any = None
+        self._address, self._access = address, access
+        self._channels: list[Any] = []
+        self._stubs: list[Any] = []
+        self._lock = threading.Lock()
+        self.compared = False
+        """Whether the server's version is known."""
+        self.answered = False
+        """Whether the server has answered a call."""
+        self.places = Places()
+        """Places of streams on each channel."""
+        self.native_places = Places()
+        """The same of the connections of the module that is not Python."""
+        # A method ``__del__`` would let another thread find it in ``_connections`` while it closes.
+        weakref.finalize(self, _close, self._channels, self._pid)
+        self.stub: Any = self.stub_of(0)
+        """Calls over the first channel."""
+
+    def stub_of(self, number: int) -> Any:
+        """Calls over one of the channels."""
+        with self._lock:
+            while len(self._stubs) <= number:
+                channel = self._open()
+                self._channels.append(channel)
+                self._stubs.append(service_pb2_grpc.BimorphStub(channel))
+            return self._stubs[number]
+
+    def _open(self) -> Any:
+        address, access = self._address, self._access
         if is_secure(address):
             credentials = grpc.ssl_channel_credentials(*access.certificates())
-            self._channel = grpc.secure_channel(target(address), credentials, options=_OPTIONS)
-        else:
-            self._channel = grpc.insecure_channel(target(address), options=_PLAIN)
-        self.stub: Any = service_pb2_grpc.BimorphStub(self._channel)
-        self.compared = False
-        """Whether the server's version was looked at."""
-        # When nobody has it any more. A method ``__del__`` would let another thread find it in ``_connections`` while it closes.
-        weakref.finalize(self, _close, self._channel, self._pid)
+            return grpc.secure_channel(target(address), credentials, options=_OPTIONS)
+        return grpc.insecure_channel(target(address), options=_PLAIN)
 
 
-def _close(channel: Any, pid: int) -> None:
+def _close(channels: list[Any], pid: int) -> None:
     # A channel of another process is left alone: closing it here could hang.
     if pid == os.getpid():
-        channel.close()
+        for channel in channels:
+            channel.close()
 
 
 _connections: weakref.WeakValueDictionary[tuple[str, Access], _Connection] = weakref.WeakValueDictionary()
@@ -116,6 +142,8 @@ class Channel:
     def __init__(self, address: str, timeout: float, access: Access | None = None) -> None:
         self.address = address
         self.timeout = timeout
+        self.reconnect = timeout
+        """How long a server that has answered is asked again where the network fails [s]."""
         self._access = access or Access()
         self.metadata: tuple[tuple[str, str], ...] | None = None
         """What every call carries; known once the stub is."""
@@ -138,14 +166,17 @@ class Channel:
         ask, stopping = getattr(self.stub, method), current.get()
 
         def wait() -> Any:
+            timeout = None if self.timeout == math.inf else self.timeout
             if stopping is None:
-                return ask(request, timeout=self.timeout, metadata=self.metadata)
-            future = ask.future(request, timeout=self.timeout, metadata=self.metadata)
+                return ask(request, timeout=timeout, metadata=self.metadata)
+            future = ask.future(request, timeout=timeout, metadata=self.metadata)
             stopping.begun(future.cancel)
             return future.result()
 
         answer = self.guard(wait)
         connection = self._connection
+        if connection is not None:
+            connection.answered = True
         if connection is not None and not connection.compared:
             connection.compared = True
             self._compare(answer if method == "Info" else None)
@@ -156,6 +187,11 @@ class Channel:
         if info is None:
             with contextlib.suppress(BimorphError):
                 info = self.call("Info", model_pb2.InfoRequest())
+        connection = self._connection
+        if info is not None and connection is not None:
+            for one in info.settings:
+                if one.name == "streams_per_connection" and one.value.isdecimal():
+                    connection.places.limit = connection.native_places.limit = max(int(one.value), 1)
         if info is None or info.version == OWN or (self.address, info.version) in _told:
             return
         _told.add((self.address, info.version))
@@ -164,51 +200,69 @@ class Channel:
 
     def stream(self, method: str, request: Any) -> Iterator[Any]:
         """A call with many answers; left early, it is cancelled."""
-        stub = self.stub
-        call = self.guard(lambda: getattr(stub, method)(request, metadata=self.metadata))
-        stopping = current.get()
-        if stopping is not None:
-            stopping.begun(call.cancel)
+        place, stub = self.place()
         try:
-            while True:
-                try:
-                    yield next(call)
-                    continue
-                except StopIteration:
-                    return
-                except grpc.RpcError as error:
-                    failure = from_rpc(error, self.address)
-                raise failure
+            call = self.guard(lambda: getattr(stub, method)(request, metadata=self.metadata))
+            stopping = current.get()
+            if stopping is not None:
+                stopping.begun(call.cancel)
+            try:
+                while True:
+                    try:
+                        yield next(call)
+                        continue
+                    except StopIteration:
+                        return
+                    except grpc.RpcError as error:
+                        failure = from_rpc(error, self.address)
+                    raise failure
+            finally:
+                call.cancel()
         finally:
-            call.cancel()
+            place.release()
+
+    def place(self) -> tuple[Place, Any]:
+        """The place of a stream, and the stub over whose channel it goes."""
+        _ = self.stub
+        connection = self._connection
+        assert connection is not None
+        place = connection.places.take()
+        try:
+            return place, connection.stub_of(place.connection)
+        except BaseException:
+            place.release()
+            raise
+
+    def native_place(self) -> Place:
+        """The place of a stream on a connection of the module that is not Python."""
+        _ = self.stub
+        assert self._connection is not None
+        return self._connection.native_places.take()
 
     def line(self, timeout: float) -> Line | NativeLine:
         """Questions to one device, each with a reply within ``timeout`` [s]."""
         if is_secure(self.address) or native.found() is None:
             return Line(self, timeout)
-        # what every call carries is known once the stub is
-        _ = self.stub
         return NativeLine(self, timeout)
 
-    def persist(self, ask: Callable[[Callable[[], None]], T]) -> T:
-        """Asks again where the network fails. ``ask`` is given what to call when it hears that things go on.
+    def persist(self, ask: Callable[[], T], within: float | None = None) -> T:
+        """Asks again where the network fails, until ``within`` [s] is over, by default :attr:`reconnect`. A server that has not answered
+        once in this process is given up after six attempts: its address may be wrong.
 
         For questions alone that may be asked twice.
         """
-        failures = 0
-
-        def heard() -> None:
-            nonlocal failures
-            failures = 0
-
+        deadline, failures = time.monotonic() + (self.reconnect if within is None else within), 0
         while True:
             try:
-                return ask(heard)
+                return ask()
             except Unavailable:
                 failures += 1
-                if failures >= _ATTEMPTS:
+                pause = min(_PAUSE * 2 ** (failures - 1), _LONGEST_PAUSE)
+                known = within is not None or (self._connection is not None and self._connection.answered)
+                if time.monotonic() + pause >= deadline or not known and failures >= _ATTEMPTS:
                     raise
-            time.sleep(_PAUSE * 2 ** (failures - 1))
+            check()
+            time.sleep(pause)
 
     def guard(self, call: Callable[[], T]) -> T:
         """Turns a status into an error of this package.
@@ -228,7 +282,8 @@ class Channel:
         self._connection = None
 
     def __getstate__(self) -> dict[str, Any]:
-        return {"address": self.address, "timeout": self.timeout, "access": self._access}
+        return {"address": self.address, "timeout": self.timeout, "access": self._access, "reconnect": self.reconnect}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__init__(state["address"], state["timeout"], state["access"])  # type: ignore[misc]
+        self.reconnect = state["reconnect"]

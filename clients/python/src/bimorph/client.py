@@ -10,6 +10,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
+from . import arguments
 from . import sweep as sweeps
 from .access import Access
 from .aloud import of_netlist
@@ -19,11 +20,14 @@ from .errors import InvalidRequest, NetlistError
 from .local import ADDRESS, LocalChannel
 from .messages import diagnostic, options_to_wire
 from .model import Model
+from .naming import by_argument
 from .netlist import Netlist
 from .options import Options
 from .session import Session, resumed
 from .stopping import apart
 from .sweep_handle import Sweep, SweepStatus, status_of
+from .sweep_wire import to_wire
+from .table import Table
 from .ticket import Ticket
 from .v1 import jobs_pb2, model_pb2
 
@@ -55,11 +59,15 @@ class Client:
         client_cert: str | os.PathLike[str] | None = None,
         client_key: str | os.PathLike[str] | None = None,
     ) -> None:
+        arguments.text("address", address, "the address of a server")
+        timeout = arguments.timeout("timeout", timeout)
+        named = {"ca": ca, "token_file": token_file, "client_cert": client_cert, "client_key": client_key}
+        files = {name: None if file is None else arguments.path(name, file, "the path of a file") for name, file in named.items()}
+        shown = None if token is None else arguments.token("token", token)
         if address == ADDRESS:
             self._channel: Channel = LocalChannel()
             return
-        files = [None if file is None else os.fspath(file) for file in (ca, token_file, client_cert, client_key)]
-        self._channel = Channel(address, timeout, Access(files[0], files[1], files[2], files[3], token))
+        self._channel = Channel(address, timeout, Access(**files, token=shown))
 
     @property
     def address(self) -> str:
@@ -86,12 +94,13 @@ class Client:
         ``process`` is the name of one that the server has ("polymumps", "soi") or the path of a process file; without it the drawing
         names its own. ``cell`` is the cell to read where several are called by no other.
         """
-        path = Path(layout)
-        text = "" if process is None else os.fspath(process)
+        path = Path(arguments.path("layout", layout, "the path of a layout"))
+        text = "" if process is None else arguments.path("process", process, "the name of a process or the path of its file")
+        cell = None if cell is None else arguments.text("cell", cell, "the name of a cell")
         if text and Path(text).suffix:
-            text = Path(text).read_text(encoding="utf-8") + "\n"
+            text = arguments.content("process", text).decode("utf-8", errors="replace") + "\n"
         request = model_pb2.ConvertRequest(
-            name=str(path), layout=path.read_bytes(), process=text, cell=cell or ""
+            name=str(path), layout=arguments.content("layout", path), process=text, cell=cell or ""
         )
         answer = self._channel.call("Convert", request)
         return Conversion(
@@ -126,8 +135,8 @@ class Client:
 
         Raises :class:`NetlistError` with all diagnostics.
         """
+        wire = options_to_wire(set, options)
         bundle = self._bundle(netlist, include)
-        wire = options_to_wire(set or {}, options)
         request = model_pb2.CompileRequest(bundle=bundle, options=wire)
         try:
             answer = self._channel.call("Compile", request)
@@ -154,14 +163,17 @@ class Client:
         shard: tuple[int, int] = (0, 1),
         progress: Callable[[int, int], object] | None = None,
         **options: Unpack[Options],
-    ) -> sweeps.Table:
+    ) -> Table:
         """Runs ``analysis`` on the full grid of ``parameters``, on all cores of the server: netlist parameters [SI], voltages of ports (``"heat.v"``
         [V]) and options of the model (``"option.tol"``) by name. Names in a tuple go together: ``{("w", "gap"): [(2e-6, 1e-6), (1.8e-6, 1.2e-6)]}``
         is a list of points, and an axis like any other.
 
         ``samples`` are drawn at every point of the grid, which may be empty (``{}``): Monte Carlo.
-        ``shard`` (i, n) runs only points whose number modulo n is i. ``progress`` is told (points done, points).
+        ``shard`` (i, n) runs only points whose number modulo n is i. ``progress`` is called with (points done, points).
+
+        Raises :class:`NoResult` where no point of the whole sweep has a result; a point without one beside others is a row with its ``error``.
         """
+        arguments.function("progress", progress)
         with self.submit(
             netlist, parameters, analysis, set=set, include=include, samples=samples, shard=shard, **options
         ) as running:
@@ -184,32 +196,36 @@ class Client:
         """Starts a :meth:`sweep` and comes back at once: ``wait()`` has its table, and its ``id`` finds it again (:meth:`attach`), on a server
         with a folder for states also when that was started anew.
 
-        With ``share`` it is the one that computes the same, if this client has one there, running or done. ``release_after`` [s] lets the
+        With ``share`` it is the sweep that this client submitted with ``share`` for the same netlist, options, points and ``release_after``,
+        running or done, if the server has one. ``release_after`` [s] lets the
         server cancel it when it has had no connection of this client for so long; None: it runs on.
         """
-        if release_after == 0:
-            # on the wire that means never
-            raise ValueError("release_after: expected a time above 0 s, or None, got 0")
+        if release_after is not None:
+            release_after = arguments.number("release_after", release_after, "None or a time in seconds", above=0.0)
+        share = arguments.flag("share", share)
+        spec, wire = to_wire(parameters, analysis, shard, samples), options_to_wire(set, options)
         request = jobs_pb2.SubmitJobRequest(
             bundle=self._bundle(netlist, include),
-            options=options_to_wire(set or {}, options),
-            sweep=sweeps.to_wire(parameters, analysis, shard, samples),
+            options=wire,
+            sweep=spec,
             # an answer that is lost starts no second sweep
             request_id="" if share else uuid.uuid4().hex,
             share=share,
             release_after_s=release_after or 0.0,
         )
-        with apart():
-            job = self._channel.persist(lambda heard: self._channel.call("SubmitJob", request))
-        return Sweep(self._channel, job.name, share)
+        with apart(), by_argument("SubmitJob"):
+            job = self._channel.persist(lambda: self._channel.call("SubmitJob", request))
+        return Sweep(self._channel, job.name, share, is_part=spec.shards > 1)
 
     def attach(self, sweep: str) -> Sweep:
         """A sweep of this server by its ``id``, with or without ``jobs/``.
 
         Raises :class:`NotFound` for one that the server does not have (any more).
         """
+        arguments.text("sweep", sweep, "the id of a sweep")
         found = Sweep(self._channel, sweep if "/" in sweep else f"jobs/{sweep}", shared=True)
-        found.status()
+        with by_argument("GetJob"):
+            found.status()
         return found
 
     def sweeps(self) -> list[SweepStatus]:
@@ -224,12 +240,14 @@ class Client:
                 return found
 
     def _bundle(self, netlist: str | os.PathLike[str] | Netlist, include: Iterable[str | os.PathLike[str]]) -> Any:
+        if not isinstance(netlist, Netlist):
+            netlist = arguments.path("netlist", netlist, "a path or a Netlist")
         if not isinstance(netlist, Netlist) and Path(netlist).suffix.lower() in LAYOUTS:
             converted = self.convert(netlist)
             for said in converted.told():
                 warnings.warn(f"{netlist}: {said}", LayoutWarning, stacklevel=4)
             netlist = converted.netlist
-        read = netlist if isinstance(netlist, Netlist) else Netlist.read(netlist, include)
+        read = netlist if isinstance(netlist, Netlist) else Netlist._read("netlist", netlist, include)
         return model_pb2.Bundle(root=read.root, files=dict(read.files))
 
     def resume(self, ticket: Ticket, timeout: float = 60.0) -> Session:
@@ -238,7 +256,8 @@ class Client:
         Raises :class:`NotFound` when the session is not kept (any more), :class:`NoResult` when its states are of another version
         of the server. Whatever this raises, what is kept stays.
         """
-        return resumed(self._channel, ticket, timeout)
+        ticket = arguments.instance("ticket", ticket, Ticket, "a Ticket, as Session.ticket() gives it")
+        return resumed(self._channel, ticket, arguments.timeout("timeout", timeout))
 
     def close(self) -> None:
         """Closes the connection. The client may be used again."""

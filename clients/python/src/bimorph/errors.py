@@ -42,8 +42,8 @@ class Diagnostic:
     """A way out; may be empty."""
 
 
-class InvalidRequest(BimorphError):
-    """A request that means nothing; ``violations`` says which fields."""
+class InvalidRequest(BimorphError, ValueError):
+    """An argument that cannot be used, as found here or by the server; the text begins with its name, and ``violations`` says which fields."""
 
     def __init__(self, message: str, violations: Sequence[Violation] = ()) -> None:
         super().__init__(message)
@@ -52,6 +52,10 @@ class InvalidRequest(BimorphError):
     def __reduce__(self) -> tuple[Any, ...]:
         # Errors of worker processes arrive as what they were.
         return (type(self), (str(self), self.violations))
+
+
+class InvalidType(InvalidRequest, TypeError):
+    """An argument of another type than expected."""
 
 
 class NetlistError(InvalidRequest):
@@ -74,7 +78,15 @@ class LimitExceeded(BimorphError):
 
 
 class NoResult(BimorphError):
-    """An analysis without a result: no equilibrium, nothing pulls in, a step that failed."""
+    """An analysis without a result: no equilibrium, nothing pulls in, a step that failed, a sweep whose points all failed."""
+
+    def __init__(self, message: str, table: Any = None) -> None:
+        super().__init__(message)
+        self.table = table
+        """Of a sweep whose points all failed, its :class:`Table`, with the reason of each; None otherwise."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return (type(self), (str(self), self.table))
 
 
 class StepFailed(NoResult):

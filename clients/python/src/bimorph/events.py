@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from .errors import InvalidRequest
+from .arguments import number, text, wrong, wrong_type
 from .results import Statistics
 from .v1 import analysis_pb2
 
@@ -14,16 +14,20 @@ Until = str | tuple[str, float]
 
 def until_to_wire(until: Until | None) -> Any:
     """The event that ends a run; None: none does."""
+    expected = '"contact", "release" or (signal, level)'
+    if until is None:
+        return None
+    if not isinstance(until, (str, tuple, list)):
+        raise wrong_type("until", expected, until)
     match until:
-        case None:
-            return None
         case "contact":
             return analysis_pb2.Until(contact=True)
         case "release":
             return analysis_pb2.Until(release=True)
-        case (str(name), float() | int() as level):
-            return analysis_pb2.Until(crossing=analysis_pb2.Named(name=name, value=level))
-    raise InvalidRequest(f'until: expected "contact", "release" or (signal, level), got {until!r}')
+        case (str(name), level):
+            value = number("until", level, f"{expected} with a finite level,")
+            return analysis_pb2.Until(crossing=analysis_pb2.Named(name=text("until", name, "the name of a signal"), value=value))
+    raise wrong("until", expected, until)
 
 
 def statistics(one: Any) -> Statistics:

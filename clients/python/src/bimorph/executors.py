@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-import atexit
-import contextlib
+import inspect
 import os
 import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
+from .arguments import function, integer, path, settings, text, wrong_type
 from .client import Client
 from .conversion import LAYOUTS
-from .errors import BimorphError, Unavailable
+from .errors import BimorphError, InvalidRequest, Unavailable
+from .messages import options_to_wire
 from .netlist import Netlist
-from .server import Server, serve
-from .sweep import Analysis, Axes, Samples, Table
+from .server import Server
+from .sweep import Analysis, Axes, Samples
+from .sweep_wire import to_wire
+from .table import Table, with_results
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -54,22 +57,32 @@ def sweep_on(
     """The table of :meth:`Client.sweep`, computed in ``shards`` parts as tasks of ``executor``: the same rows, whoever computes them.
 
     Each worker process starts a server of its own, which ends with it (the program ``bimorph`` must be there), or all talk to
-    ``server``. A part whose server or connection dies is given out again, ``retries`` times; what becomes of a worker that dies is
-    the executor's own: Dask starts it anew, a process pool is broken. ``progress`` is told (parts done, parts).
+    ``server``. A part whose server or connection dies is submitted again as a new task, ``retries`` times; what becomes of a worker that
+    dies is the executor's own: Dask starts it anew, a process pool is broken. ``progress`` is called with (parts done, parts).
 
-    Raises :class:`BimorphError`, or what the executor raises.
+    Raises :class:`BimorphError`, :class:`NoResult` where no point has a result, or what the executor raises.
     """
-    if shards < 1:
-        raise ValueError(f"shards: expected at least 1, got {shards}")
+    if not callable(getattr(executor, "submit", None)):
+        raise wrong_type("executor", "an object with a method submit(task, *arguments)", executor)
+    shards, retries = integer("shards", shards, 1), integer("retries", retries, 0)
+    server = None if server is None else text("server", server, "the address of a server")
+    function("progress", progress)
     if not isinstance(netlist, Netlist):
-        if os.path.splitext(netlist)[1].lower() in LAYOUTS:
-            raise ValueError(f"{os.fspath(netlist)} is a layout: make a netlist of it first, client.convert(…).netlist")
-        netlist = Netlist.read(netlist, include)
-    bundle = netlist
+        if os.path.splitext(path("netlist", netlist, "a path or a Netlist"))[1].lower() in LAYOUTS:
+            raise InvalidRequest(f"netlist: {os.fspath(netlist)} is a layout: make a netlist of it first, client.convert(…).netlist")
+        netlist = Netlist._read("netlist", netlist, include)
+    bundle, set = netlist, settings("set", set)
+    # an argument that no part can use is rejected here
+    to_wire(parameters, analysis, (0, shards), samples)
+    options_to_wire(set, options)
+
+    # Dask names a task by its arguments, and a second one of the same name has the result of the first, also if that is an error.
+    own_name = {"pure": False} if _names_tasks(executor) else {}
 
     def start(number: int) -> Any:
         shard = (number, shards)
-        return executor.submit(part, server, bundle, dict(parameters), analysis, dict(set or {}), samples, shard, dict(options))
+        given = (server, bundle, dict(parameters), analysis, dict(set or {}), samples, shard, dict(options))
+        return executor.submit(part, *given, **own_name)
 
     running = [start(number) for number in range(shards)]
     tables: list[Table] = []
@@ -84,7 +97,7 @@ def sweep_on(
                 running[number] = start(number)
         if progress is not None:
             progress(number + 1, shards)
-    return together(tables)
+    return with_results(together(tables))
 
 
 def together(tables: Sequence[Table]) -> Table:
@@ -128,14 +141,21 @@ def part(
 ) -> Table:
     """One shard, where this is called: what :func:`sweep_on` submits."""
     with Client(server) if server else _own().client() as client:
-        return client.sweep(netlist, parameters, analysis, set=set, samples=samples, shard=shard, **options)
+        # a part may lack results that others have
+        with client.submit(netlist, parameters, analysis, set=set, samples=samples, shard=shard, **options) as running:
+            return running._whole()
+
+
+def _names_tasks(executor: Executor) -> bool:
+    try:
+        return "pure" in inspect.signature(executor.submit).parameters
+    except (TypeError, ValueError):
+        return False
 
 
 _lock = threading.Lock()
-_stack = contextlib.ExitStack()
-"""Ends the server of this process."""
 _server: Server | None = None
-_inherited: list[contextlib.ExitStack] = []
+_inherited: list[Server | None] = []
 
 
 def _own() -> Server:
@@ -143,23 +163,16 @@ def _own() -> Server:
     threads still run."""
     global _server
     with _lock:
-        if _server is None or _server.process.poll() is not None:
-            _stack.close()
-            _server = _stack.enter_context(serve())
-        return _server
-
-
-@atexit.register
-def _end() -> None:
-    with _lock:
-        _stack.close()
+        if _server is None:
+            _server = Server()
+        return _server.start()
 
 
 def _forked() -> None:
     """In a child: the server of the parent is neither used nor ended."""
-    global _lock, _stack, _server
-    _inherited.append(_stack)
-    _lock, _stack, _server = threading.Lock(), contextlib.ExitStack(), None
+    global _lock, _server
+    _inherited.append(_server)
+    _lock, _server = threading.Lock(), None
 
 
 if hasattr(os, "register_at_fork"):

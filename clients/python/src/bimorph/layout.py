@@ -17,12 +17,14 @@ their ports lie in one place. gdsfactory's lengths are in micrometres, those of 
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from .arguments import flag, instance, mapping, number, wrong, wrong_type
+from .arguments import text as a_text
+from .errors import InvalidRequest
 from .netlist import Netlist
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z")
@@ -60,10 +62,7 @@ class Kind:
         if unknown:
             known = ", ".join(self.parameters)
             raise TypeError(f"{self.name} has no parameter {unknown[0]!r}; there are {known}")
-        for name, value in settings.items():
-            if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-                raise ValueError(f"{self.name}: {name} must be a finite number, got {value!r}")
-        return Cell(self, {name: float(value) for name, value in settings.items()})
+        return Cell(self, {name: number(f"{self.name}: {name}", value) for name, value in settings.items()})
 
 
 @dataclass(frozen=True)
@@ -206,7 +205,7 @@ class Mechanism:
 
     def __init__(self, process: str = POLY) -> None:
         """``process`` defines the layer ``p1`` of which everything is made."""
-        self.process = process
+        self.process = a_text("process", process, "the definition of a process")
         self._kinds: dict[str, Kind] = {}
         self._lines: list[str] = []
         self._names: set[str] = set()
@@ -216,17 +215,18 @@ class Mechanism:
 
         ``nodes`` says where each node of the cell is joined; optional ones may be left out.
         """
-        _check_name(name)
+        _check_name("name", name)
         if name in self._names:
-            raise ValueError(f"there is an instance {name!r} already")
-        kind = cell.kind
+            raise InvalidRequest(f"name: there is an instance {name!r} already")
+        kind = instance("cell", cell, Cell, "a cell of the library, as anchor() or comb(fingers=40)").kind
+        angle, mirrored = number("angle", angle, "an angle in rad"), flag("mirrored", mirrored)
         nodes = {node: f"{name}_{node}" for node in kind.optional} | nodes
         missing = [node for node in kind.nodes if node not in nodes]
         unknown = sorted(set(nodes) - set(kind.nodes))
         if missing or unknown:
             raise ValueError(f"{kind.name} has the nodes {', '.join(kind.nodes)}; got {', '.join(nodes) or 'none'}")
-        for node in nodes.values():
-            _check_name(node)
+        for end, node in nodes.items():
+            _check_name(end, node)
         if self._kinds.setdefault(kind.name, kind) != kind:
             raise ValueError(f"there is another cell called {kind.name!r}")
         self._names.add(name)
@@ -240,17 +240,19 @@ class Mechanism:
 
     def place(self, origin: str, node: str, x: float, y: float) -> None:
         """Places ``node`` at (x, y) [m] from ``origin``, for parts that nothing joins."""
-        for name in (origin, node):
-            _check_name(name)
-        self._lines.append(f"pos * [{origin} {node}] [x={float(x)!r} y={float(y)!r}]")
+        _check_name("origin", origin)
+        _check_name("node", node)
+        x, y = number("x", x, "a length in m"), number("y", y, "a length in m")
+        self._lines.append(f"pos * [{origin} {node}] [x={x!r} y={y!r}]")
 
     def line(self, text: str) -> None:
         """Adds a line of netlist: a port, a load, a ground."""
-        self._lines.append(text)
+        self._lines.append(a_text("text", text, "a line of a netlist", empty=True))
 
     def netlist(self, name: str = "mechanism.net") -> Netlist:
         """The netlist of it."""
         subnets = "\n".join(kind.subnet() for kind in self._kinds.values())
+        a_text("name", name, "the name of a file")
         return Netlist.text(f"{self.process}\n\n{subnets}\n" + "\n".join(self._lines) + "\n", name)
 
 
@@ -265,9 +267,17 @@ def from_gdsfactory(component: Any, *, kinds: Mapping[str, Kind] | None = None, 
     """
     from .component import mechanism
 
-    return mechanism(component, KINDS if kinds is None else kinds, process)
+    a_text("process", process, "the definition of a process")
+    found = KINDS if kinds is None else mapping("kinds", kinds, "cells by the names of their components")
+    for name, kind in found.items():
+        instance(f"kinds[{name!r}]", kind, Kind, "a cell of the library")
+    if not isinstance(component, Mapping) and not hasattr(component, "get_netlist"):
+        raise wrong_type("component", "a component of gdsfactory, or what its get_netlist() gives", component)
+    if isinstance(component, Mapping) and not isinstance(component.get("instances"), Mapping):
+        raise wrong("component", "a netlist of gdsfactory, with its instances by name", component)
+    return mechanism(component, found, process)
 
 
-def _check_name(name: str) -> None:
-    if not _NAME.match(name):
-        raise ValueError(f"{name!r} is no name: expected letters, digits and _, a letter first")
+def _check_name(argument: str, name: str) -> None:
+    if not _NAME.match(a_text(argument, name, "a name")):
+        raise InvalidRequest(f"{argument}: {name!r} is no name: expected letters, digits and _, a letter first")

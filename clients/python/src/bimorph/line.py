@@ -10,6 +10,7 @@ import collections
 import queue
 import threading
 import time
+import weakref
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -41,8 +42,9 @@ class Line:
         self._sent: collections.deque[_Question] = collections.deque()
         self.over: BimorphError | None = None
         """Why it is over; None: it is not."""
-        stub = channel.stub
+        self._place, stub = channel.place()
         self._call = stub.Trial(self._outgoing(), metadata=channel.metadata)
+        self._call.add_callback(self._place.release)
         threading.Thread(target=self._receive, args=(self._call,), daemon=True).start()
 
     def ask(self, request: Any) -> Any:
@@ -119,8 +121,15 @@ class NativeLine:
         self.over: BimorphError | None = None
         """Why it is over; None: it is not."""
         self._refusal = native.module().Refusal
-        shown = dict(channel.metadata or ()).get("authorization")
-        self._line = self._guarded(lambda: native.of_process("Servers").line(channel.address, shown, timeout))
+        place = channel.native_place()
+        # what every call carries is known once there is a place
+        shown, connection = dict(channel.metadata or ()).get("authorization"), place.connection
+        try:
+            self._line = self._guarded(lambda: native.of_process("Servers").line(channel.address, shown, timeout, connection))
+        except BaseException:
+            place.release()
+            raise
+        self._release = weakref.finalize(self, place.release)
 
     def ask(self, request: Any) -> Any:
         """The reply to a question."""
@@ -137,6 +146,7 @@ class NativeLine:
         """Ends the stream: later questions raise ``why``."""
         self.over = self.over or why
         self._line.close()
+        self._release()
 
     def _said(self, request: Any) -> Any:
         if self.over is not None:

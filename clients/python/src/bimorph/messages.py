@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+import functools
+from collections.abc import Iterable, Mapping
+from typing import Any, get_type_hints
 
-from . import sweep as sweeps
-from .errors import Diagnostic, InvalidRequest
-from .options import WIRE
+from . import arguments
+from .errors import Diagnostic, InvalidType
+from .options import WIRE, Options
+from .sweep_wire import setting
 from .v1 import analysis_pb2, model_pb2
 
 Voltages = Mapping[str, float]
@@ -19,15 +21,21 @@ def estimate_of(answer: Any) -> float | None:
     return answer.estimated_error if answer.HasField("estimated_error") else None
 
 
-def options_to_wire(settings: Mapping[str, float | str], options: Mapping[str, Any]) -> Any:
+def options_to_wire(settings: Mapping[str, float | str] | None, options: Mapping[str, Any]) -> Any:
     """Netlist parameters and options of a model."""
     unknown = [name for name in options if name not in WIRE]
     if unknown:
-        raise TypeError(f"no option {unknown[0]!r}; there are {', '.join(WIRE)}")
-    given = {WIRE[name]: value for name, value in options.items() if value is not None}
-    return model_pb2.CompileOptions(
-        set=[sweeps.setting(name, value) for name, value in settings.items()], **given
-    )
+        raise InvalidType(f"{unknown[0]}: no such option; there are {', '.join(WIRE)}")
+    kinds = _kinds()
+    checked = {name: arguments.of_annotation(name, value, kinds[name]) for name, value in options.items()}
+    given = {WIRE[name]: value for name, value in checked.items() if value is not None}
+    set = [setting(name, value) for name, value in arguments.settings("set", settings).items()]
+    return model_pb2.CompileOptions(set=set, **given)
+
+
+@functools.cache
+def _kinds() -> dict[str, Any]:
+    return get_type_hints(Options)
 
 
 def setting_value(setting: Any) -> float | str:
@@ -42,25 +50,9 @@ def diagnostic(d: Any) -> Diagnostic:
     return Diagnostic(d.code, severity, d.file, d.line, d.column, d.message, d.help)
 
 
-def at_least(what: str, value: int, least: int) -> int:
-    """A number that is given; the protocol takes 0 for one that is not."""
-    if value < least:
-        raise InvalidRequest(f"{what}: expected at least {least}, got {value}")
-    return value
-
-
-def listed(what: str, names: Sequence[str]) -> Sequence[str]:
-    """Names, of which a text is none but a list of letters."""
-    if isinstance(names, str):
-        raise InvalidRequest(f'{what}: expected a list of names, got the text "{names}"; write ["{names}"]')
-    return names
-
-
 def named(voltages: Voltages | None) -> list[Any]:
     """Port voltages."""
-    if voltages is not None and not isinstance(voltages, Mapping):
-        raise InvalidRequest(f'voltages: expected names of ports with their volts, as {{"drive": 3.0}}, got {voltages!r}')
-    return [analysis_pb2.Named(name=name, value=value) for name, value in (voltages or {}).items()]
+    return [analysis_pb2.Named(name=name, value=value) for name, value in arguments.volts("voltages", voltages).items()]
 
 
 def by_name(named: Iterable[Any]) -> dict[str, float]:

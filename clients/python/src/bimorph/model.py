@@ -3,23 +3,27 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal
 
 import numpy as np
 
+from . import arguments
 from .aloud import of_mesh, said
 from .channel import Channel
 from .errors import Diagnostic, InvalidRequest, NotFound, Unavailable
 from .events import Until, statistics, until_to_wire
-from .messages import Voltages, at_least, by_name, diagnostic, estimate_of, listed, named, setting_value
-from .results import FrequencyResponse, ModesResult, NodeMotion, PullInResult, Root, StaticResult, TransientResult
+from .messages import Voltages, by_name, diagnostic, estimate_of, named, setting_value
+from .naming import by_argument, each
+from .response import SPACINGS, response_of
+from .results import FrequencyResponse, ModesResult, NodeMotion, PullInResult, StaticResult, TransientResult
 from .session import Session, opened_just_now
 from .stopping import apart
 from .ticket import Snapshot
 from .v1 import analysis_pb2, device_pb2, model_pb2
 from .verified import Checked
-from .waveforms import Waveform, drive, told
+from .waveforms import Waveform, checked, drive, told
 
 class Model:
     """A compiled netlist on a server. Make one with :meth:`Client.compile`.
@@ -59,11 +63,12 @@ class Model:
 
     def _call(self, method: str, request: Any) -> Any:
         """A call about this model, which the server may have forgotten: the same netlist gives the same model."""
-        try:
-            return self._channel.call(method, request)
-        except NotFound:
-            self._channel.call("Compile", self._source)
-            return self._channel.call(method, request)
+        with by_argument(method):
+            try:
+                return self._channel.call(method, request)
+            except NotFound:
+                self._channel.call("Compile", self._source)
+                return self._channel.call(method, request)
 
     def _checked(self, call: str) -> Checked:
         return Checked(self._channel.address, f"{call} of model {self.id[:8]}")
@@ -106,7 +111,7 @@ class Model:
 
     def modes(self, count: int = 6, voltages: Voltages | None = None) -> ModesResult:
         """The ``count`` lowest modes about the equilibrium at these port voltages [V]."""
-        request = analysis_pb2.ModesRequest(model=self.id, count=at_least("count", count, 1), voltages=named(voltages))
+        request = analysis_pb2.ModesRequest(model=self.id, count=arguments.integer("count", count, 1), voltages=named(voltages))
         answer = self._call("Modes", request)
         self._checked("modes").modes(answer)
         shapes = [
@@ -146,47 +151,30 @@ class Model:
         ``"decade"``; more are added about resonances and zeros unless ``even``. ``by_modes`` sums over modes with static correction, the
         ``modes`` lowest or, with 0, those to twice ``stop``; else each frequency is exact.
         """
-        kinds: dict[str, Any] = {"log": 0, "decade": 1, "linear": 2}
-        if spacing not in kinds:
-            raise InvalidRequest(f'spacing: expected "log", "decade" or "linear", got {spacing!r}')
+        start = arguments.number("start", start, "a frequency in Hz", above=0.0)
+        stop = arguments.number("stop", stop, f"a frequency in Hz from start, {start:g}, on", least=start)
         request = analysis_pb2.FrequencyResponseRequest(
             model=self.id,
-            drive=drive,
-            signals=listed("signals", signals),
+            drive=arguments.text("drive", drive, "the name of a drive"),
+            signals=arguments.names("signals", signals),
             from_hz=start,
             to_hz=stop,
-            points=at_least("points", points, 1),
-            spacing=kinds[spacing],
-            even=even,
-            by_modes=by_modes,
-            modes=modes,
+            points=arguments.integer("points", points, 1),
+            spacing=SPACINGS[arguments.choice("spacing", spacing, SPACINGS)],
+            even=arguments.flag("even", even),
+            by_modes=arguments.flag("by_modes", by_modes),
+            modes=arguments.integer("modes", modes),
             voltages=named(voltages),
         )
         answer = self._call("FrequencyResponse", request)
-        self._checked("ac").response(answer, signals)
-
-        def roots(wire: Iterable[Any]) -> list[Root]:
-            return [Root(complex(root.re, root.im)) for root in wire]
-
-        return FrequencyResponse(
-            drive=drive,
-            drive_unit=answer.drive_unit,
-            frequencies_hz=np.array(answer.frequencies_hz, dtype=np.float64),
-            signals={s.name: np.array(s.re, dtype=np.float64) + 1j * np.array(s.im, dtype=np.float64) for s in answer.signals},
-            units={s.name: s.unit for s in answer.signals},
-            at_rest={s.name: s.at_rest if s.HasField("at_rest") else None for s in answer.signals},
-            poles=roots(answer.poles) if answer.poles_known else None,
-            zeros={s.name: roots(s.zeros) if s.zeros_known else None for s in answer.signals},
-            points_added=answer.points_added,
-            modes=answer.modes or None,
-            modal_error=answer.modal_error if answer.HasField("modal_error") else None,
-            unknowns=answer.unknowns,
-            estimated_error=estimate_of(answer),
-            warnings=said(answer.warnings),
-        )
+        self._checked("ac").response(answer, request.signals)
+        said(answer.warnings)
+        return response_of(answer, drive)
 
     def pull_in(self, max_v: float = 200.0, port: str = "") -> PullInResult:
         """Pull-in and release voltage [V] of ``port`` (default: the first), looking up to ``max_v`` [V]."""
+        port = arguments.text("port", port, "the name of a port", empty=True)
+        max_v = arguments.number("max_v", max_v, "a voltage", above=0.0)
         request = analysis_pb2.PullInRequest(model=self.id, port=port, max_v=max_v)
         answer = self._call("PullIn", request)
         release = answer.release_v if answer.HasField("release_v") else None
@@ -212,21 +200,27 @@ class Model:
         ``release`` is a variant of the same netlist whose static equilibrium is the initial state; without it the part
         starts at rest as drawn. ``tol`` is the relative error of a step [1], 0: the model's; the mesh holds the
         smaller of the two. ``until`` ends the run at an event: ``"contact"`` where parts begin to touch, ``"release"`` where they part,
-        ``("yoke.y", -1e-6)`` where a signal crosses a level in its unit. ``progress`` is told the fraction done.
+        ``("yoke.y", -1e-6)`` where a signal crosses a level in its unit. ``progress`` is called with the fraction done.
 
         ``inputs`` are waveforms of ports, ``{"heat": (times, volts)}``: straight lines between corners, constant before and after. The
         run then begins in the static equilibrium at 0, and its steps end at every corner. How far mesh and steps may be off is seen from
         a run on a finer mesh with a tenth of ``tol``, which costs several times as much: ``estimate=False`` leaves it out.
         """
-        at_least("points", points, 2)
-        listed("signals", signals)
-        if release is not None and not isinstance(release, Model):
-            raise InvalidRequest(f"release: expected a model, as compile() gives it of the netlist with its load, got {release!r}")
+        stop = arguments.number("stop", stop, "a time in seconds", above=0.0)
+        signals = arguments.names("signals", signals)
+        if not signals:
+            raise arguments.wrong("signals", "at least one signal", signals)
+        points = arguments.integer("points", points, 2)
+        tol = arguments.number("tol", tol, "a relative error, or 0 for that of the model,", least=0.0, below=1.0)
+        held = arguments.volts("voltages", voltages)
+        estimate = arguments.flag("estimate", estimate)
+        if release is not None:
+            arguments.instance("release", release, Model, "None or a model, as compile() gives it of the netlist with its load")
+        arguments.function("progress", progress)
         if inputs is not None:
             if release is not None or tol or until is not None:
                 raise ValueError("a run along inputs begins in their equilibrium, with the model's own tolerance: no release, tol or until")
-            held: dict[str, Waveform] = {port: ([0.0], [volts]) for port, volts in (voltages or {}).items()}
-            waves = {**held, **inputs}
+            waves: dict[str, Waveform] = {**{port: ([0.0], [volts]) for port, volts in held.items()}, **checked(inputs)}
             with self._session(signals) as session:
                 found = drive(session, waves, stop, points, progress)
             if not estimate:
@@ -252,12 +246,13 @@ class Model:
                 model._describe()
         t: list[float] = []
         columns: list[list[float]] = [[] for _ in signals]
-        checked = self._checked("transient")
-        for event in self._channel.stream("Transient", request):
+        replies = self._checked("transient")
+        crossed = ((re.escape(f'signal "{until[0]}"'), "until"),) if isinstance(until, tuple) and until[0] not in signals else ()
+        for event in each("Transient", self._channel.stream("Transient", request), *crossed):
             if progress is not None:
                 progress(event.progress)
             if event.HasField("samples"):
-                checked.samples(event.samples, t[-1] if t else -math.inf, len(columns))
+                replies.samples(event.samples, t[-1] if t else -math.inf, len(columns))
                 t.extend(event.samples.t)
                 for column, more in zip(columns, event.samples.signals):
                     column.extend(more.values)
@@ -316,21 +311,28 @@ class Model:
         kept: bool = False,
     ) -> Session:
         """The same, of which nothing is said."""
+        signals, ports = tuple(arguments.names("signals", signals)), tuple(arguments.names("ports", ports))
+        timeout, kept = arguments.timeout("timeout", timeout), arguments.flag("kept", kept)
+        seed = None if seed is None else arguments.integer("seed", seed, 0, (1 << 64) - 1)
+        if noise_band is not None:
+            noise_band = arguments.number("noise_band", noise_band, "None or a band in Hz", above=0.0)
+            if seed is None:
+                raise InvalidRequest("noise_band: expected a seed with it, got none")
         self._describe()
-        if seed is None and noise_band is not None:
-            raise ValueError("noise_band says nothing without a seed")
         noise = None if seed is None else device_pb2.Agitation(seed=seed, band_hz=noise_band)
         if kept:
             with apart():
                 opened = self._call("Open", device_pb2.OpenRequest(model=self.id, ports=ports, signals=signals, noise=noise))
             return opened_just_now(self._channel, self.id, timeout, opened.session)
-        return Session(self._channel, self.id, tuple(ports), tuple(signals), timeout, noise=noise)
+        return Session(self._channel, self.id, ports, signals, timeout, noise=noise)
 
     def restore(self, snapshot: Snapshot, timeout: float = 60.0) -> Session:
         """Opens a device that goes on from a :meth:`Session.snapshot` of this model, with the same bits.
 
         Raises :class:`NoResult` for a snapshot of another model or another version of the server.
         """
+        snapshot = arguments.instance("snapshot", snapshot, Snapshot, "a Snapshot, as Session.snapshot() gives it")
+        timeout = arguments.timeout("timeout", timeout)
         request = device_pb2.RestoreRequest(model=self.id, snapshot=snapshot.states)
         with apart():
             opened = self._call("Restore", request)

@@ -9,6 +9,10 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from .arguments import content, items, mapping, wrong, wrong_type
+from .arguments import path as a_path
+from .arguments import text as the_text
+
 _WORDS = re.compile(
     r"""%[^\n]*                                # a comment
       | "[^"\n]*"? | '[^'\n]*'?                # a string
@@ -37,6 +41,16 @@ class Netlist:
     files: Mapping[str, str] = field(repr=False)
     """Text of each file by the name under which it is included."""
 
+    def __post_init__(self) -> None:
+        the_text("root", self.root, "the name of a file")
+        files = mapping("files", self.files, "texts of files by their names")
+        for name, content in files.items():
+            the_text("files: name of a file", name, "a text")
+            if not isinstance(content, str):
+                raise wrong_type(f"files[{name!r}]", "the text of a file", content)
+        if self.root not in files:
+            raise wrong("root", f"the name of one of the files, {', '.join(map(repr, files)) or 'none'}", self.root)
+
     @classmethod
     def read(cls, path: str | os.PathLike[str], include: Iterable[str | os.PathLike[str]] = ()) -> Netlist:
         """Reads ``path`` and every file it ``uses``.
@@ -45,11 +59,17 @@ class Netlist:
         directory, then in the folders of ``include``. Each spelled name is read once, where the text meets it first; a
         :class:`DroppedInclude` warning tells when that leaves out a different file.
         """
-        path = Path(path)
+        return cls._read("path", path, include)
+
+    @classmethod
+    def _read(cls, argument: str, given: str | os.PathLike[str], include: Iterable[str | os.PathLike[str]]) -> Netlist:
+        """The same, where the path is the argument of that name."""
+        path = Path(a_path(argument, given, "the path of a netlist"))
         root = str(path)
-        files = {root: _text(path)}
+        files = {root: content(argument, path).decode("utf-8", errors="replace")}
         found: dict[str, Path] = {}
-        folders = [Path(), *map(Path, include)]
+        places = items("include", include, "a list of folders")
+        folders = [Path(), *(Path(a_path(f"include[{k}]", one, "the path of a folder")) for k, one in enumerate(places))]
 
         def includes(name: str, folder: Path, depth: int) -> None:
             for spelled in _uses(files[name]):
@@ -72,7 +92,9 @@ class Netlist:
     @classmethod
     def text(cls, text: str, name: str = "netlist.net") -> Netlist:
         """A netlist given as text, without includes of its own."""
-        return cls(name, {name: text})
+        if not isinstance(text, str):
+            raise wrong_type("text", "the text of a netlist", text)
+        return cls(the_text("name", name, "the name of a file"), {name: text})
 
 
 def _text(path: Path) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 import subprocess
@@ -13,7 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import BimorphError, Unavailable
+from . import arguments
+from .errors import BimorphError, InvalidRequest, Unavailable
 from .server import program
 
 
@@ -54,18 +56,25 @@ def run(deck: str | os.PathLike[str], *, remote: str | None = None, timeout: flo
 
     Raises :class:`BimorphError` with what ngspice or the device said where the run has no result.
     """
+    text = isinstance(deck, str) and "\n" in deck
+    if text:
+        arguments.text("deck", deck, "the text of a deck")
+    else:
+        arguments.content("deck", arguments.path("deck", deck, "a path, or the text of a deck"))
+    remote = None if remote is None else arguments.text("remote", remote, "the address of a server")
+    timeout = arguments.timeout("timeout", timeout)
     binary = program()
     if binary is None:
         raise Unavailable("the program bimorph was not found; set BIMORPH_BIN to its path, or put it on PATH")
     with tempfile.TemporaryDirectory(prefix="bimorph-") as folder:
-        path = Path(deck) if not (isinstance(deck, str) and "\n" in deck) else Path(folder) / "deck.cir"
-        if path.parent == Path(folder):
+        path = Path(folder) / "deck.cir" if text else Path(deck)
+        if text:
             path.write_text(_absolute(str(deck)))
         raw = Path(folder) / "waves.raw"
         words = [binary, "cosim", str(path), "--out", str(raw)]
         words += ["--remote", remote] if remote else []
         try:
-            done = subprocess.run(words, capture_output=True, text=True, timeout=timeout)
+            done = subprocess.run(words, capture_output=True, text=True, timeout=None if timeout == math.inf else timeout)
         except subprocess.TimeoutExpired:
             raise BimorphError(f"{path.name}: ngspice had no end after {timeout:g} s") from None
         if done.returncode != 0 or not raw.is_file():
@@ -100,11 +109,12 @@ def read_raw(content: bytes) -> list[Plot]:
 
     Raises :class:`ValueError` for another file.
     """
+    content = arguments.instance("content", content, bytes, "the bytes of a raw file")
     plots = []
     while content.strip():
         head, found, content = content.partition(b"Binary:\n")
         if not found:
-            raise ValueError("not a binary raw file: no line 'Binary:'")
+            raise InvalidRequest("content: not a binary raw file: no line 'Binary:'")
         text = head.decode("utf-8", "replace")
         entries = dict(re.findall(r"^([A-Z][\w. ]*?):[ \t]*(.*)$", text, re.MULTILINE))
         count, points = int(entries["No. Variables"]), int(entries["No. Points"])
@@ -112,7 +122,7 @@ def read_raw(content: bytes) -> list[Plot]:
         kind: Any = np.complex128 if "complex" in entries["Flags"] else np.float64
         size = count * points * np.dtype(kind).itemsize
         if len(content) < size:
-            raise ValueError(f"the raw file ends within its numbers: {len(content)} bytes of {size}")
+            raise InvalidRequest(f"content: the raw file ends within its numbers: {len(content)} bytes of {size}")
         table = np.frombuffer(content[:size], dtype=kind).reshape(points, count)
         content = content[size:]
         plots.append(Plot(entries["Plotname"].strip(), {name: table[:, k].copy() for k, name in enumerate(names)}))

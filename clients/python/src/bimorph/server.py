@@ -1,7 +1,8 @@
-"""A server for the time of a ``with`` block."""
+"""A server of this process: for the time of a ``with`` block, or from :meth:`Server.start` to :meth:`Server.close`."""
 
 from __future__ import annotations
 
+import atexit
 import collections
 import contextlib
 import os
@@ -10,54 +11,110 @@ import subprocess
 import sysconfig
 import tempfile
 import threading
-from collections.abc import Iterator
+from types import TracebackType
 from typing import IO
 
+from . import arguments
 from .client import Client
-from .errors import Unavailable
+from .errors import BimorphError, Unavailable
 
 _START_S = 30.0
 _STOP_S = 15.0
+_RECONNECT_S = 5.0
+
+_running: set[Server] = set()
+"""Started servers of this process: those that nobody closed end with the interpreter, while its threads still run."""
 
 
 class Server:
-    """A running server that was started here."""
+    """``bimorph serve`` on a temporary Unix socket.
 
-    def __init__(self, address: str, process: subprocess.Popen[str]) -> None:
-        self.address = address
+    It belongs to this process: it ends with it, however that ends (also by ``SIGKILL`` or ``os._exit``), holds none of its files, and is not
+    interrupted by Ctrl-C in its terminal. In a forked child, :meth:`close` leaves it alone.
+
+    In a ``with`` block it is closed at the end; where no block fits, as over the cells of a notebook, between :meth:`start` and
+    :meth:`close`, or the end of the interpreter.
+    """
+
+    def __init__(self, binary: str | os.PathLike[str] | None = None) -> None:
+        """``binary`` is the program, by default the one that :func:`program` finds."""
+        self._binary = None if binary is None else arguments.path("binary", binary, "the path of the program bimorph")
+        self._lock = threading.RLock()
+        self._running: _Running | None = None
+        self._process: subprocess.Popen[str] | None = None
+
+    @property
+    def address(self) -> str:
         """``unix:///path`` of its socket."""
-        self.process = process
-        """The process."""
+        return self._held().address
+
+    @property
+    def process(self) -> subprocess.Popen[str]:
+        """The process; of a server that was closed, the one that it had."""
+        if self._process is None:
+            raise _not_started()
+        return self._process
+
+    def start(self) -> Server:
+        """Starts it, unless it runs already; returns this object.
+
+        Raises :class:`Unavailable` when the program is not found or does not start; its last words are in the message.
+        """
+        with self._lock:
+            held = self._running
+            if held is not None and (held.owner != os.getpid() or held.process.poll() is not None):
+                self.close()
+                held = None
+            if held is None:
+                self._running = _Running(self._binary or program())
+                self._process = self._running.process
+                _running.add(self)
+        return self
+
+    def close(self) -> None:
+        """Stops it; it may be started again."""
+        with self._lock:
+            held, self._running = self._running, None
+            _running.discard(self)
+            if held is not None:
+                held.close()
 
     def client(self, timeout: float = 120.0) -> Client:
         """A client of this server; ``timeout`` [s] bounds each unary call."""
-        return Client(self.address, timeout)
+        client = Client(self.address, timeout)
+        # a server that has ended is not there again under its address
+        client._channel.reconnect = _RECONNECT_S
+        return client
+
+    def _held(self) -> _Running:
+        held = self._running
+        if held is None:
+            raise _not_started()
+        return held
+
+    def __enter__(self) -> Server:
+        return self.start()
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        held = self._running
+        return f"<Server at {held.address}>" if held is not None else "<Server, not running>"
 
 
-_held: set[IO[str]] = set()
+def _not_started() -> BimorphError:
+    return BimorphError("the server does not run: start() it, or use it in a `with` block")
 
 
-def _let_go() -> None:
-    """In a forked child: its copies of the pipes would keep the servers of its parent alive."""
-    nothing = os.open(os.devnull, os.O_RDWR)
-    for pipe in _held:
-        os.dup2(nothing, pipe.fileno(), inheritable=False)
-    os.close(nothing)
+def serve(binary: str | os.PathLike[str] | None = None) -> Server:
+    """Starts a :class:`Server`, to be used in a ``with`` block or closed with :meth:`Server.close`.
 
-
-if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_let_go)
-
-
-@contextlib.contextmanager
-def _folder() -> Iterator[str]:
-    """A temporary folder that only the process that made it takes away."""
-    owner, folder = os.getpid(), tempfile.mkdtemp(prefix="bimorph-")
-    try:
-        yield folder
-    finally:
-        if os.getpid() == owner:
-            shutil.rmtree(folder, ignore_errors=True)
+    Raises :class:`Unavailable` when the program is not found or does not start.
+    """
+    return Server(binary).start()
 
 
 def program() -> str | None:
@@ -67,66 +124,91 @@ def program() -> str | None:
     return os.environ.get("BIMORPH_BIN") or shutil.which(own) or shutil.which("bimorph")
 
 
-@contextlib.contextmanager
-def serve(binary: str | None = None) -> Iterator[Server]:
-    """Starts ``bimorph serve`` on a temporary Unix socket, and stops it at the end of the block.
+class _Running:
+    """A process that serves."""
 
-    The server is this process's own: it ends with it, however it ends (also by ``SIGKILL`` or ``os._exit``), holds none of its
-    files, and is not interrupted by Ctrl-C in its terminal. In a forked child, the end of the block leaves it alone.
-
-    Raises :class:`Unavailable` when the program is not found or does not start; its last words are in the message.
-    """
-    binary = binary or program()
-    if binary is None:
-        raise Unavailable("the program bimorph was not found; set BIMORPH_BIN to its path, or put it on PATH")
-    with _folder() as folder:
-        address = f"unix://{folder}/s"
+    def __init__(self, binary: str | None) -> None:
+        if binary is None:
+            raise Unavailable("the program bimorph was not found; set BIMORPH_BIN to its path, or put it on PATH")
+        self.owner = os.getpid()
+        self._folder = tempfile.mkdtemp(prefix="bimorph-")
+        self.address = f"unix://{self._folder}/s"
         try:
-            # Standard input is a pipe that nobody writes to: it ends when this process does.
-            process = subprocess.Popen(
-                [binary, "serve", "--listen", address, "--while-stdin"],
+            # Standard input is a pipe without a writer but this process: it ends when this process does.
+            self.process = subprocess.Popen(
+                [binary, "serve", "--listen", self.address, "--while-stdin"],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.PIPE,
                 text=True,
+                errors="replace",
                 start_new_session=True,
             )
         except OSError as error:
-            raise Unavailable(f"{binary} cannot be started: {error}") from None
-        assert process.stderr is not None and process.stdin is not None
-        owner = os.getpid()
-        _held.add(process.stdin)
-        ready, said = threading.Event(), collections.deque[str](maxlen=20)
-        listener = threading.Thread(target=_listen, args=(process.stderr, ready, said), daemon=True)
-        listener.start()
+            shutil.rmtree(self._folder, ignore_errors=True)
+            raise Unavailable(f"binary: {binary} cannot be started: {error}") from None
+        assert self.process.stderr is not None and self.process.stdin is not None
+        _pipes.add(self.process.stdin)
+        ready, lines = threading.Event(), collections.deque[str](maxlen=20)
+        self._listener = threading.Thread(target=_listen, args=(self.process.stderr, ready, lines), daemon=True)
         try:
-            # The end of its words sets `ready` too, a moment before the process is seen to have ended.
-            if not ready.wait(_START_S) or not any(line.startswith("listening on") for line in said):
-                raise Unavailable(f"{binary} serve did not start: {''.join(said).strip() or 'no word from it'}")
-            yield Server(address, process)
-        finally:
-            if os.getpid() == owner:
-                _held.discard(process.stdin)
-                _stop(process)
-                listener.join(_STOP_S)
-                process.stderr.close()
+            self._listener.start()
+            # The end of its output sets `ready` too, a moment before the end of the process shows.
+            if not ready.wait(_START_S) or not any(line.startswith("listening on") for line in lines):
+                raise Unavailable(f"binary: {binary} serve did not start: {''.join(lines).strip() or 'it printed nothing'}")
+        except BaseException:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """Ends the process and removes its folder; in a forked child nothing happens."""
+        if os.getpid() != self.owner:
+            return
+        process = self.process
+        assert process.stderr is not None and process.stdin is not None
+        _pipes.discard(process.stdin)
+        with contextlib.suppress(OSError):
+            process.stdin.close()
+        process.terminate()
+        try:
+            process.wait(_STOP_S)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+        with contextlib.suppress(RuntimeError):
+            self._listener.join(_STOP_S)
+        if not self._listener.is_alive():
+            process.stderr.close()
+        shutil.rmtree(self._folder, ignore_errors=True)
 
 
-def _stop(process: subprocess.Popen[str]) -> None:
-    if process.stdin is not None:
-        process.stdin.close()
-    process.terminate()
-    try:
-        process.wait(_STOP_S)
-    except subprocess.TimeoutExpired:
-        process.kill()
-        process.wait()
-
-
-def _listen(lines: IO[str], ready: threading.Event, said: collections.deque[str]) -> None:
-    """Reads what the server says, to its end: a full pipe would stop it."""
+def _listen(lines: IO[str], ready: threading.Event, last: collections.deque[str]) -> None:
+    """Reads what the server prints, to its end: a full pipe would stop it."""
     for line in lines:
-        said.append(line)
+        last.append(line)
         if line.startswith("listening on"):
             ready.set()
     ready.set()
+
+
+_pipes: set[IO[str]] = set()
+"""Standard inputs of the servers of this process."""
+
+
+@atexit.register
+def _end() -> None:
+    for server in list(_running):
+        server.close()
+
+
+def _forked() -> None:
+    """In a forked child: its copies of the pipes would keep the servers of its parent alive."""
+    _running.clear()
+    nothing = os.open(os.devnull, os.O_RDWR)
+    for pipe in _pipes:
+        os.dup2(nothing, pipe.fileno(), inheritable=False)
+    os.close(nothing)
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_forked)

@@ -11,8 +11,10 @@ from dataclasses import replace
 from types import TracebackType
 from typing import Any
 
+from .arguments import MAX_STEP, given_to, instance, number, one_of, text
 from .channel import Channel
 from .errors import BimorphError, InvalidRequest, NotFound, StepFailed, from_fault, shown
+from .naming import by_argument
 from .results import NodeMotion, TrialReply
 from .stopping import apart, check
 from .ticket import Snapshot, Ticket
@@ -69,7 +71,8 @@ class Session:
                 open=device_pb2.OpenRequest(model=model, ports=ports, signals=signals, noise=noise)
             )
         try:
-            opened = self._checked.kind(self._ask(first), "opened")
+            with by_argument("Open"):
+                opened = self._checked.kind(self._ask(first), "opened")
             self._checked.opened(opened.device, ports, None if session else signals)
         except BaseException:
             # the session was there before this object: it stays, to be joined again
@@ -100,6 +103,10 @@ class Session:
         ``parent`` is the state to start from, by default the accepted one. A reply with ``need_dt`` asks for a shorter
         step.
         """
+        if dt is not None:
+            dt = number("dt", dt, "None or a time in seconds", above=0.0, most=MAX_STEP)
+        if parent is not None:
+            instance("parent", parent, TrialReply, "a TrialReply of this session or None")
         with self._lock:
             return self._try(self._vector(voltages), dt, parent or self.accepted)
 
@@ -125,10 +132,11 @@ class Session:
         """Makes a trial's state the one that later trials start from, and its voltages, or those named here, what ports not named keep.
         In a kept session it has outlived the server when this returns, and if this raises, the state before is still accepted and the
         same trial gives the same state again."""
+        instance("reply", reply, TrialReply, "a TrialReply of this session")
         if reply.need_dt is not None:
-            raise ValueError("a reply that asks for a shorter step has no state to accept")
+            raise InvalidRequest("reply: expected one with a state, got one that needs a shorter step")
         with self._lock:
-            held = {**reply.voltages, **(voltages or {})}
+            held = {**reply.voltages, **({} if voltages is None else given_to(self._voltages, voltages))}
             self._accept(reply, dict(zip(self.ports, self._vector(held))))
 
     def _accept(self, reply: TrialReply, voltages: dict[str, float]) -> None:
@@ -161,7 +169,7 @@ class Session:
         """Goes ``dt`` [s] on, the voltages [V] going linearly to these, in as many pieces as the device asks for. It is taken as a
         whole or, where this raises, not at all."""
         with self._lock:
-            return self._step(voltages, dt)
+            return self._step(voltages, number("dt", dt, "a time in seconds", above=0.0, most=MAX_STEP))
 
     def _step(self, voltages: Mapping[str, float], dt: float) -> TrialReply:
         start, end = [self._voltages[port] for port in self.ports], self._vector(voltages)
@@ -203,7 +211,8 @@ class Session:
         return _matrix(names, names, values)
 
     def _small_signal(self, omega: float, reply: TrialReply | None, *, noise: bool) -> device_pb2.SmallSignal:
-        state = reply or self.accepted
+        omega = number("omega", omega, "an angular frequency in rad/s", least=0.0)
+        state = self.accepted if reply is None else instance("reply", reply, TrialReply, "a TrialReply of this session or None")
         if state is None:
             raise ValueError("there is no accepted state; call operating_point first")
         request = device_pb2.SmallSignalRequest(token=state.token, omega=omega, noise=noise)
@@ -217,11 +226,13 @@ class Session:
         """Value of an opened signal in the accepted state, in its unit."""
         if self.accepted is None:
             raise ValueError("there is no accepted state; call operating_point or step first")
-        return self.accepted.outputs[signal]
+        return self.accepted.outputs[one_of("signal", signal, self.signals, "signals of the session")]
 
     def motion(self, node: str) -> NodeMotion:
         """Displacement of a node in the accepted state; ``NODE.x``, ``.y`` and ``.rz`` must be among the signals."""
-        return NodeMotion(*(self.read(f"{node}.{axis}") for axis in ("x", "y", "rz")))
+        text("node", node, "the name of a node")
+        wanted = [one_of("node", f"{node}.{axis}", self.signals, "signals of the session") for axis in ("x", "y", "rz")]
+        return NodeMotion(*map(self.read, wanted))
 
     def snapshot(self) -> Snapshot:
         """The accepted state, to go on from later, in another process, or on another server."""
@@ -248,8 +259,8 @@ class Session:
             return Ticket(self._model, self._session, self.accepted, self.t, dict(self._voltages))
 
     def resume(self) -> Session:
-        """This session on a new connection, when the old one broke, a call took too long, or the server was started anew. This
-        object is closed, the session is not; if this raises, both are as they were.
+        """This session on a new connection, when the old one broke, a call took too long, or the server was started anew; a server that is
+        away is waited for until the timeout. This object is closed, the session is not; if this raises, both are as they were.
         """
         with self._lock:
             ticket = self.ticket()
@@ -280,10 +291,8 @@ class Session:
         self.close()
 
     def _vector(self, voltages: Mapping[str, float]) -> list[float]:
-        unknown = [name for name in voltages if name not in self.ports]
-        if unknown:
-            raise InvalidRequest(f"no port named {unknown[0]!r}; the session has {list(self.ports)}")
-        return [float(voltages.get(port, self._voltages[port])) for port in self.ports]
+        given, held = given_to(self._voltages, voltages), self._voltages
+        return [given[port] if port in given else held[port] for port in self.ports]
 
     def _named(self, wire: Any, t: float, vector: list[float]) -> TrialReply:
         if wire.status == device_pb2.TrialReply.STATUS_FAIL:
@@ -333,7 +342,8 @@ def opened_just_now(channel: Channel, model: str, timeout: float, session: str) 
 
 
 def resumed(channel: Channel, ticket: Ticket, timeout: float) -> Session:
-    session = Session(channel, ticket.model, (), (), timeout, ticket.session)
+    """The session of a ticket; a server that is away is waited for until the timeout."""
+    session = channel.persist(lambda: Session(channel, ticket.model, (), (), timeout, ticket.session), timeout)
     session.accepted, session.t, session._voltages = ticket.accepted, ticket.t, dict(ticket.voltages)
     return session
 

@@ -6,6 +6,8 @@ import html
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from .arguments import wrong_type
+
 if TYPE_CHECKING:
     import pandas
     import pyarrow
@@ -51,6 +53,8 @@ def _alike(values: Sequence[Any]) -> Sequence[Any]:
 def axes(given: Axes | None) -> Axes:
     """Where to draw: what was given, or a new figure."""
     if given is not None:
+        if not (hasattr(given, "plot") and hasattr(given, "set_xlabel")):
+            raise wrong_type("ax", "axes of matplotlib or None", given)
         return given
     try:
         from matplotlib import pyplot

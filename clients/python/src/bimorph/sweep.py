@@ -1,20 +1,18 @@
-"""Sweeps: what to compute on a grid of parameters, and the table that comes back."""
+"""Sweeps: what to compute on a grid of parameters, and which values vary at random."""
 
 from __future__ import annotations
 
-import csv
-import io
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
-from . import showing
-from .v1 import analysis_pb2, model_pb2, sweep_pb2
+from .arguments import choice, integer, items, mapping, names, number, text, volts, wrong, wrong_type
 
-if TYPE_CHECKING:
-    import pandas
-    import pyarrow
+
+def _set(owner: object, **fields: Any) -> None:
+    """Fields of a frozen object, as they were checked."""
+    for name, value in fields.items():
+        object.__setattr__(owner, name, value)
 
 
 @dataclass(frozen=True)
@@ -26,6 +24,9 @@ class Static:
     voltages: Mapping[str, float] = field(default_factory=dict)
     """Port voltages [V]."""
 
+    def __post_init__(self) -> None:
+        _set(self, outputs=tuple(names("outputs", self.outputs)), voltages=volts("voltages", self.voltages))
+
 
 @dataclass(frozen=True)
 class Modes:
@@ -34,6 +35,9 @@ class Modes:
     count: int = 6
     voltages: Mapping[str, float] = field(default_factory=dict)
     """Port voltages of the operating point [V]."""
+
+    def __post_init__(self) -> None:
+        _set(self, count=integer("count", self.count, 1), voltages=volts("voltages", self.voltages))
 
 
 @dataclass(frozen=True)
@@ -44,6 +48,9 @@ class PullIn:
     """Highest voltage tried [V]."""
     port: str = ""
     """Port or netlist source; empty: the first."""
+
+    def __post_init__(self) -> None:
+        _set(self, max_v=number("max_v", self.max_v, "a voltage", above=0.0), port=text("port", self.port, "a name", empty=True))
 
 
 @dataclass(frozen=True)
@@ -57,6 +64,13 @@ class Transient:
     voltages: Mapping[str, float] = field(default_factory=dict)
     """Port voltages held during the run [V]."""
 
+    def __post_init__(self) -> None:
+        signals = names("signals", self.signals)
+        if not signals:
+            raise wrong("signals", "at least one signal", self.signals)
+        stop = number("stop", self.stop, "a time in seconds", above=0.0)
+        _set(self, stop=stop, signals=tuple(signals), voltages=volts("voltages", self.voltages))
+
 
 Analysis = Static | Modes | PullIn | Transient
 
@@ -69,6 +83,9 @@ class Normal:
     deviation: float
     """Standard deviation, from 0."""
 
+    def __post_init__(self) -> None:
+        _set(self, mean=number("mean", self.mean), deviation=number("deviation", self.deviation, least=0.0))
+
 
 @dataclass(frozen=True)
 class Uniform:
@@ -76,6 +93,12 @@ class Uniform:
 
     low: float
     high: float
+
+    def __post_init__(self) -> None:
+        low, high = number("low", self.low), number("high", self.high)
+        if low > high:
+            raise wrong("high", f"at least low, {low:g}", high)
+        _set(self, low=low, high=high)
 
 
 @dataclass(frozen=True)
@@ -85,6 +108,9 @@ class LogNormal:
     median: float
     deviation: float
     """Standard deviation of the natural logarithm, from 0."""
+
+    def __post_init__(self) -> None:
+        _set(self, median=number("median", self.median, above=0.0), deviation=number("deviation", self.deviation, least=0.0))
 
 
 @dataclass(frozen=True)
@@ -103,141 +129,25 @@ class Samples:
     correlations: Mapping[tuple[str, str], float] = field(default_factory=dict)
     """Of two normal or log-normal parameters (of the logarithm there), between -1 and 1."""
 
-
-def _samples(samples: Samples) -> Any:
-    vary = []
-    for name, given in samples.vary.items():
-        if isinstance(given, Normal):
-            one = sweep_pb2.SweepVary(name=name, normal=sweep_pb2.SweepNormal(mean=given.mean, deviation=given.deviation))
-        elif isinstance(given, Uniform):
-            one = sweep_pb2.SweepVary(name=name, uniform=sweep_pb2.SweepUniform(low=given.low, high=given.high))
-        elif isinstance(given, LogNormal):
-            wire = sweep_pb2.SweepLogNormal(median=given.median, deviation=given.deviation)
-            one = sweep_pb2.SweepVary(name=name, log_normal=wire)
-        else:
-            raise TypeError(f"{name}: expected Normal, Uniform or LogNormal, got {given!r}")
-        vary.append(one)
-    designs = {
-        "random": sweep_pb2.SweepSamples.DESIGN_RANDOM,
-        "lhs": sweep_pb2.SweepSamples.DESIGN_LATIN_HYPERCUBE,
-        "sobol": sweep_pb2.SweepSamples.DESIGN_SOBOL,
-    }
-    if samples.design not in designs:
-        raise ValueError(f"design: expected one of {', '.join(designs)}, got {samples.design!r}")
-    correlations = [sweep_pb2.SweepCorrelation(a=a, b=b, value=value) for (a, b), value in samples.correlations.items()]
-    return sweep_pb2.SweepSamples(
-        vary=vary,
-        count=samples.count,
-        seed=samples.seed,
-        design=designs[samples.design],
-        correlations=correlations,
-    )
-
-
-@dataclass(frozen=True)
-class Row:
-    """One point of the grid."""
-
-    point: int
-    """Number in the full grid, from 0; the last parameter varies fastest."""
-    parameters: dict[str, float | str]
-    """Value of each parameter [SI]."""
-    results: dict[str, float]
-    """Results that exist at this point; empty when ``error`` is set."""
-    error: str
-    """Why the point has no result; empty when it has."""
-    estimated_error: float | None = None
-    """Largest estimated relative error of the results by the mesh; None without an estimate."""
-    warning: str = ""
-    """Why the results may be further off than the tolerance; empty when they are not."""
-
-
-@dataclass(frozen=True, repr=False)
-class Table:
-    """Everything a sweep found, in grid order."""
-
-    parameters: list[str]
-    results: list[str]
-    units: dict[str, str]
-    """Unit of each result column."""
-    rows: list[Row]
-
-    def column(self, name: str) -> list[float | str | None]:
-        """One column; None where a point has no such value. A result may be named with its unit, ``f1 [Hz]``, as it must be where a
-        parameter has its name. Raises :class:`KeyError` for a name that is no column, or two."""
-        headings = {self._heading(result): result for result in self.results}
-        if name in headings:
-            return [row.results.get(headings[name]) for row in self.rows]
-        if name in self.parameters and name in self.results:
-            raise KeyError(f"{name!r} is a parameter and a result: the result is {self._heading(name)!r}, the parameter is in `rows`")
-        if name in self.parameters:
-            return [row.parameters[name] for row in self.rows]
-        if name not in self.results:
-            raise KeyError(f"no column {name!r}; there are {', '.join([*self.parameters, *self.results])}")
-        return [row.results.get(name) for row in self.rows]
-
-    def _heading(self, result: str) -> str:
-        return f"{result} [{self.units[result]}]"
-
-    def to_pandas(self) -> pandas.DataFrame:
-        """A column for each parameter and each result (NaN where a point has none), by number of the point; with ``estimated_error``,
-        ``warning`` and ``error``. A result that has the name of a parameter is called with its unit, ``f1 [Hz]``.
-
-        Raises :class:`ValueError` for a parameter with one of the three names."""
-        return showing.frame(self._columns(math.nan), ("point", [row.point for row in self.rows]))
-
-    def to_arrow(self) -> pyarrow.Table:
-        """The columns of :meth:`to_pandas` behind the number of the point, null where a point has no such number; the unit of a result stands
-        in the metadata of its field, the number of columns that are parameters in that of the table. For Parquet:
-        ``pyarrow.parquet.write_table(table.to_arrow(), "mc.parquet")``.
-
-        Raises :class:`ValueError` for a parameter with one of the names of the last columns."""
-        units = {(self._heading(name) if name in self.parameters else name): self.units[name] for name in self.results}
-        columns = {"point": [row.point for row in self.rows], **self._columns(None)}
-        return showing.arrow(columns, {**units, "estimated_error": "1"}, {"parameters": str(len(self.parameters))})
-
-    def _columns(self, none: float | None) -> dict[str, list[Any]]:
-        """Every column but the number of the point; ``none`` where a point has no such number."""
-        last = ("estimated_error", "warning", "error")
-        taken = [name for name in self.parameters if name in ("point", *last)]
-        if taken:
-            raise ValueError(f"parameter {taken[0]!r} has the name of another column: rename it, or read `rows`")
-        columns: dict[str, list[Any]] = {name: [row.parameters[name] for row in self.rows] for name in self.parameters}
-        for name in self.results:
-            called = self._heading(name) if name in self.parameters else name
-            columns[called] = [row.results.get(name, none) for row in self.rows]
-        return columns | {name: [getattr(row, name) for row in self.rows] for name in last}
-
-    def __repr__(self) -> str:
-        failed = sum(1 for row in self.rows if row.error)
-        points = f"{len(self.rows)} points" + (f", {failed} of them failed" if failed else "")
-        return f"<Table of {', '.join(self.results)} over {', '.join(self.parameters) or 'nothing'}: {points}>"
-
-    def _repr_html_(self) -> str:
-        head = ["point", *self.parameters, *map(self._heading, self.results), ""]
-        rows = (
-            [row.point, *row.parameters.values(), *(row.results.get(name) for name in self.results), row.error or row.warning]
-            for row in self.rows
-        )
-        return showing.table(head, rows)
-
-    def to_csv(self) -> str:
-        """CSV with the columns of ``bimorph sweep``: point, parameters, results with units, estimate, warning, error."""
-        out = io.StringIO()
-        writer = csv.writer(out, lineterminator="\n")
-        writer.writerow(["point", *self.parameters, *map(self._heading, self.results), "estimated_error [1]", "warning", "error"])
-        for row in self.rows:
-            values = [row.results.get(name, "") for name in self.results]
-            estimate = "" if row.estimated_error is None else row.estimated_error
-            writer.writerow([row.point, *row.parameters.values(), *values, estimate, row.warning, row.error])
-        return out.getvalue()
-
-
-def setting(name: str, value: float | str) -> Any:
-    """A named value as it travels."""
-    if isinstance(value, str):
-        return model_pb2.Setting(name=name, text=value)
-    return model_pb2.Setting(name=name, number=float(value))
+    def __post_init__(self) -> None:
+        vary = dict(mapping("vary", self.vary, 'parameters with their distributions, as {"w": Normal(2e-6, 5e-8)}'))
+        if not vary:
+            raise wrong("vary", "at least one parameter", self.vary)
+        for name, given in vary.items():
+            text("vary: name of a parameter", name, "a text")
+            if not isinstance(given, (Normal, Uniform, LogNormal)):
+                raise wrong_type(f"vary[{name!r}]", "Normal, Uniform or LogNormal", given)
+        correlations: dict[tuple[str, str], float] = {}
+        for pair, value in mapping("correlations", self.correlations, "pairs of parameters with their correlations").items():
+            if not (isinstance(pair, tuple) and len(pair) == 2 and all(isinstance(one, str) for one in pair)):
+                raise wrong_type("correlations", "pairs of names of parameters as keys", pair)
+            found = number(f"correlations[{pair!r}]", value)
+            if not -1.0 <= found <= 1.0:
+                raise wrong(f"correlations[{pair!r}]", "a number from -1 to 1", value)
+            correlations[pair] = found
+        count, seed = integer("count", self.count, 1), integer("seed", self.seed, 0, (1 << 64) - 1)
+        choice("design", self.design, ("random", "lhs", "sobol"))
+        _set(self, vary=vary, count=count, seed=seed, correlations=correlations)
 
 
 Value = float | str
@@ -250,43 +160,53 @@ Axes = (
 """Axes of a grid: the values of a parameter by its name, or the points of several that go together by their names in a tuple."""
 
 
-def _axes(parameters: Axes) -> list[Any]:
-    """The axes as they travel."""
-    axes = []
-    for key, values in parameters.items():
-        names = (key,) if isinstance(key, str) else tuple(key)
-        points: Sequence[Any] = values
-        rows: list[tuple[Value, ...]] = [(point,) if isinstance(key, str) else tuple(point) for point in points]
-        wrong = next((row for row in rows if len(row) != len(names)), None)
-        if not names or wrong is not None:
-            raise ValueError(f"{key!r}: expected a value for each of {len(names)} names at every point, got {wrong!r}")
-        for k, name in enumerate(names):
-            word = name.startswith("option.")
-            listed = [str(row[k]).lower() if word and isinstance(row[k], bool) else row[k] for row in rows]
-            settings = sweep_pb2.SettingList(values=[setting("", value) for value in listed])
-            axes.append(sweep_pb2.SweepParameter(name=name, **{"in_step" if k else "list": settings}))
+def points(parameters: Axes) -> list[tuple[tuple[str, ...], list[tuple[Value, ...]]]]:
+    """Axes as they were checked: names that go together, and their values at each point."""
+    axes: list[tuple[tuple[str, ...], list[tuple[Value, ...]]]] = []
+    for key, values in mapping("parameters", parameters, 'names with their values, as {"w": [1.8e-6, 2.2e-6]}').items():
+        where = f"parameters[{key!r}]" if isinstance(key, (str, tuple)) else "parameters: name of a parameter"
+        together: tuple[str, ...]
+        rows: list[tuple[Any, ...]]
+        if isinstance(key, str):
+            together, rows = (text(where, key, "a name"),), [(point,) for point in items(where, values, "a list of values")]
+        elif isinstance(key, tuple) and key:
+            together = tuple(text(where, name, "names as text") for name in key)
+            listed = items(where, values, f"a list of points, each with a value for each of {len(key)} names")
+            rows = [tuple(items(f"{where}[{k}]", row, f"a value for each of {len(key)} names")) for k, row in enumerate(listed)]
+        else:
+            raise wrong_type(where, "a name, or a tuple of names that go together", key)
+        if not rows:
+            raise wrong(where, "at least one value", values)
+        axes.append((together, [_point(where, k, together, row) for k, row in enumerate(rows)]))
     return axes
 
 
-def to_wire(
-    parameters: Axes,
-    analysis: Analysis,
-    shard: tuple[int, int],
-    samples: Samples | None = None,
-) -> Any:
-    """A specification as it travels."""
-    spec = sweep_pb2.SweepSpec(parameters=_axes(parameters), shard=shard[0], shards=shard[1])
-    if samples is not None:
-        spec.samples.CopyFrom(_samples(samples))
-    if isinstance(analysis, PullIn):
-        spec.pull_in.CopyFrom(sweep_pb2.SweepPullIn(port=analysis.port, max_v=analysis.max_v))
-        return spec
-    voltages = [analysis_pb2.Named(name=name, value=value) for name, value in analysis.voltages.items()]
-    if isinstance(analysis, Static):
-        spec.static.CopyFrom(sweep_pb2.SweepStatic(outputs=analysis.outputs, voltages=voltages))
-    elif isinstance(analysis, Transient):
-        wire = sweep_pb2.SweepTransient(stop_s=analysis.stop, outputs=analysis.signals, voltages=voltages)
-        spec.transient.CopyFrom(wire)
-    else:
-        spec.modes.CopyFrom(sweep_pb2.SweepModes(count=analysis.count, voltages=voltages))
-    return spec
+def _point(where: str, k: int, together: tuple[str, ...], row: tuple[Any, ...]) -> tuple[Value, ...]:
+    if len(row) != len(together):
+        raise wrong(f"{where}[{k}]", f"a value for each of {len(together)} names", row)
+    return tuple(_value(f"{where}[{k}]", name, value) for name, value in zip(together, row))
+
+
+def _value(where: str, name: str, value: Any) -> Value:
+    """A number, or a text; of options flags too."""
+    if name.startswith("option."):
+        if isinstance(value, bool):
+            return str(value).lower()
+        if isinstance(value, str):
+            return text(where, value, "a value of an option")
+    elif isinstance(value, str):
+        return text(where, value, "a number or a text")
+    return number(where, value, "a finite number or a text")
+
+
+def shard_of(shard: Any) -> tuple[int, int]:
+    """A part (i, n) of a sweep."""
+    expected = "(i, n), the part number i of n, with 0 <= i < n"
+    if not isinstance(shard, (tuple, list)):
+        raise wrong_type("shard", expected, shard)
+    if len(shard) != 2:
+        raise wrong("shard", expected, shard)
+    i, n = (integer(f"shard[{k}]", part) for k, part in enumerate(shard))
+    if not i < n:
+        raise wrong("shard", expected, shard)
+    return i, n

@@ -9,10 +9,11 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import Any, NamedTuple
 
+from .arguments import function, integer
 from .channel import Channel
 from .errors import BimorphError, NoResult, NotFound, Unavailable
 from .stopping import apart
-from .sweep import Row, Table
+from .table import Row, Table, with_results
 from .v1 import jobs_pb2
 
 _STATES = {
@@ -25,6 +26,9 @@ _STATES = {
 
 _ATTEMPTS = 6
 """Streams in a row that break without a word, after which the rows are given up."""
+
+_LEAVE_S = 5.0
+"""At the end of a block, a server that does not answer is given up after this time [s]."""
 
 
 @dataclass(frozen=True)
@@ -92,9 +96,10 @@ class Sweep:
     or was attached to.
     """
 
-    def __init__(self, channel: Channel, id: str, shared: bool = False) -> None:
+    def __init__(self, channel: Channel, id: str, shared: bool = False, is_part: bool = False) -> None:
         self._channel = channel
         self._shared = shared
+        self._is_part = is_part
         self.id = id
         """Its name on the server."""
 
@@ -106,11 +111,17 @@ class Sweep:
         return status_of(self._channel.call("GetJob", jobs_pb2.GetJobRequest(name=self.id)))
 
     def wait(self, progress: Callable[[int, int], object] | None = None) -> Table:
-        """Its table, once it is done; ``progress`` is told (points done, points). A network that fails meanwhile costs it nothing: the rows
+        """Its table, once it is done; ``progress`` is called with (points done, points). A network that fails meanwhile costs it nothing: the rows
         go on where they were.
 
-        Raises :class:`BimorphError` when it ends without all of its rows.
+        Raises :class:`BimorphError` when it ends without all of its rows, and :class:`NoResult` where no row has a result.
         """
+        found = self._whole(function("progress", progress))
+        # a part may lack results that other parts have
+        return found if self._is_part else with_results(found)
+
+    def _whole(self, progress: Callable[[int, int], object] | None = None) -> Table:
+        """Its table, also where no row has a result."""
         points = self._persistent_status().points
         rows: list[_Found] = []
         parameters: list[str] = []
@@ -128,6 +139,9 @@ class Sweep:
         Raises :class:`BimorphError` after the last row when it ends without all of them, and where a server has lost rows and computed them
         again, of which the numbers are then others.
         """
+        return self._rows(integer("first", first))
+
+    def _rows(self, first: int) -> Iterator[Row]:
         for chunk in self._chunks(first):
             for found in chunk.found:
                 yield found.row
@@ -145,14 +159,17 @@ class Sweep:
     def cancel(self) -> None:
         """Ends it, if it still runs. The rows that it has stay. A network that fails meanwhile is asked again."""
         request = jobs_pb2.CancelJobRequest(name=self.id)
-        self._channel.persist(lambda heard: self._channel.call("CancelJob", request))
+        self._channel.persist(lambda: self._channel.call("CancelJob", request))
 
     def delete(self) -> None:
         """Ends it, if it still runs, and lets the server forget it. A network that fails meanwhile is asked again."""
+        self._delete(None)
+
+    def _delete(self, within: float | None) -> None:
         request = jobs_pb2.DeleteJobRequest(name=self.id)
         tries = 0
 
-        def ask(heard: Callable[[], None]) -> None:
+        def ask() -> None:
             nonlocal tries
             tries += 1
             try:
@@ -162,7 +179,7 @@ class Sweep:
                 if tries == 1:
                     raise
 
-        self._channel.persist(ask)
+        self._channel.persist(ask, within)
 
     def __enter__(self) -> Sweep:
         return self
@@ -172,7 +189,7 @@ class Sweep:
     ) -> None:
         if not self._shared:
             with contextlib.suppress(BimorphError), apart():
-                self.delete()
+                self._delete(_LEAVE_S)
 
     def watch(self) -> Iterator[SweepStatus]:
         """How far it has come, until it ends."""
@@ -180,7 +197,7 @@ class Sweep:
             yield status_of(job)
 
     def _persistent_status(self) -> SweepStatus:
-        return self._channel.persist(lambda heard: self.status())
+        return self._channel.persist(lambda: self.status())
 
     def _chunks(self, first: int) -> Iterator[_Chunk]:
         """Rows as they come, from one on; where the network fails, from the next one on."""

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .arguments import integer, mapping, number, text, wrong_type
+from .errors import InvalidRequest
 from .results import TransientResult
 from .session import Session
 
@@ -30,20 +32,30 @@ def checked(inputs: Mapping[str, Waveform]) -> dict[str, tuple[NDArray[np.float6
     Raises :class:`ValueError` for one that is none.
     """
     found = {}
-    for port, wave in inputs.items():
+    for port, wave in mapping("inputs", inputs, 'ports with their waveforms, as {"drive": (times, volts)}').items():
+        where = f"inputs: input {text('inputs: name of a port', port, 'a text')!r}"
         if not isinstance(wave, (tuple, list)) or len(wave) != 2:
-            raise ValueError(f"input {port!r}: expected (times, values), got {wave!r}; hold a constant one by voltages={{...}}")
-        t, values = wave
-        times, levels = np.asarray(t, dtype=float), np.asarray(values, dtype=float)
+            raise wrong_type(where, "(times, values); hold a constant one by voltages={...};", wave)
+        times, levels = (_numbers(where, part) for part in wave)
         if times.ndim != 1 or times.shape != levels.shape or times.size == 0:
-            raise ValueError(f"input {port!r}: expected as many times as values, got {times.shape} and {levels.shape}")
+            raise InvalidRequest(f"{where}: expected as many times as values, got {times.shape} and {levels.shape}")
         if not (np.isfinite(times).all() and np.isfinite(levels).all()):
-            raise ValueError(f"input {port!r}: times and values must be finite")
+            raise InvalidRequest(f"{where}: times and values must be finite")
         if (np.diff(times) <= 0).any():
             late = int(np.argmax(np.diff(times) <= 0))
-            raise ValueError(f"input {port!r}: times must ascend, got {times[late]:g} s before {times[late + 1]:g} s")
+            raise InvalidRequest(f"{where}: times must ascend, got {times[late]:g} s before {times[late + 1]:g} s")
         found[port] = (times, levels)
     return found
+
+
+def _numbers(where: str, values: Any) -> NDArray[np.float64]:
+    try:
+        found = np.asarray(values)
+    except (TypeError, ValueError):
+        raise wrong_type(where, "times and values as lists of numbers", values) from None
+    if found.size and found.dtype.kind not in "iuf":
+        raise wrong_type(where, "times and values as lists of numbers", values)
+    return found.astype(np.float64)
 
 
 def drive(
@@ -58,8 +70,8 @@ def drive(
     It begins in the static equilibrium of the inputs at 0. Steps end at every corner of a waveform; within one the device controls
     its own.
     """
-    if not (0.0 < stop < math.inf and points >= 2):
-        raise ValueError(f"expected a finite stop > 0 and at least 2 points, got {stop:g} s and {points}")
+    number("stop", stop, "a time in seconds", above=0.0)
+    integer("points", points, 2)
     waves = checked(inputs)
     for port, (t, _) in waves.items():
         _long_enough(port, t, stop)
@@ -113,8 +125,8 @@ def _long_enough(port: str, times: NDArray[np.float64], stop: float) -> None:
     """Raises :class:`ValueError` for an edge within the run that is too short to be told from a corner."""
     for start, end in zip(times, times[1:]):
         if end > 0.0 and start < stop and end - start < _EDGE * stop:
-            raise ValueError(
-                f"input {port!r}: an edge of {end - start:.3g} s at {start:g} s; in a run of {stop:g} s it must last at least {_EDGE * stop:g} s"
+            raise InvalidRequest(
+                f"inputs: input {port!r}: an edge of {end - start:.3g} s at {start:g} s; in a run of {stop:g} s it must last at least {_EDGE * stop:g} s"
             )
 
 

@@ -1,0 +1,128 @@
+"""The table of a sweep."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from . import showing
+from .arguments import text
+from .errors import NoResult
+
+if TYPE_CHECKING:
+    import pandas
+    import pyarrow
+
+
+@dataclass(frozen=True)
+class Row:
+    """One point of the grid."""
+
+    point: int
+    """Number in the full grid, from 0; the last parameter varies fastest."""
+    parameters: dict[str, float | str]
+    """Value of each parameter [SI]."""
+    results: dict[str, float]
+    """Results that exist at this point; empty when ``error`` is set."""
+    error: str
+    """Why the point has no result; empty when it has."""
+    estimated_error: float | None = None
+    """Largest estimated relative error of the results by the mesh; None without an estimate."""
+    warning: str = ""
+    """Why the results may be further off than the tolerance; empty when they are not."""
+
+
+@dataclass(frozen=True, repr=False)
+class Table:
+    """Everything a sweep found, in grid order."""
+
+    parameters: list[str]
+    results: list[str]
+    units: dict[str, str]
+    """Unit of each result column."""
+    rows: list[Row]
+
+    def column(self, name: str) -> list[float | str | None]:
+        """One column; None where a point has no such value. A result may be named with its unit, ``f1 [Hz]``, as it must be where a
+        parameter has its name. Raises :class:`KeyError` for a name that is no column, or two."""
+        text("name", name, "the name of a column")
+        headings = {self._heading(result): result for result in self.results}
+        if name in headings:
+            return [row.results.get(headings[name]) for row in self.rows]
+        if name in self.parameters and name in self.results:
+            raise KeyError(f"{name!r} is a parameter and a result: the result is {self._heading(name)!r}, the parameter is in `rows`")
+        if name in self.parameters:
+            return [row.parameters[name] for row in self.rows]
+        if name not in self.results:
+            raise KeyError(f"name: no column {name!r}; there are {', '.join([*self.parameters, *self.results])}")
+        return [row.results.get(name) for row in self.rows]
+
+    def _heading(self, result: str) -> str:
+        return f"{result} [{self.units[result]}]"
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """A column for each parameter and each result (NaN where a point has none), by number of the point; with ``estimated_error``,
+        ``warning`` and ``error``. A result that has the name of a parameter is called with its unit, ``f1 [Hz]``.
+
+        Raises :class:`ValueError` for a parameter with one of the three names."""
+        return showing.frame(self._columns(math.nan), ("point", [row.point for row in self.rows]))
+
+    def to_arrow(self) -> pyarrow.Table:
+        """The columns of :meth:`to_pandas` behind the number of the point, null where a point has no such number; the unit of a result stands
+        in the metadata of its field, the number of columns that are parameters in that of the table. For Parquet:
+        ``pyarrow.parquet.write_table(table.to_arrow(), "mc.parquet")``.
+
+        Raises :class:`ValueError` for a parameter with one of the names of the last columns."""
+        units = {(self._heading(name) if name in self.parameters else name): self.units[name] for name in self.results}
+        columns = {"point": [row.point for row in self.rows], **self._columns(None)}
+        return showing.arrow(columns, {**units, "estimated_error": "1"}, {"parameters": str(len(self.parameters))})
+
+    def _columns(self, none: float | None) -> dict[str, list[Any]]:
+        """Every column but the number of the point; ``none`` where a point has no such number."""
+        last = ("estimated_error", "warning", "error")
+        taken = [name for name in self.parameters if name in ("point", *last)]
+        if taken:
+            raise ValueError(f"parameter {taken[0]!r} has the name of another column: rename it, or read `rows`")
+        columns: dict[str, list[Any]] = {name: [row.parameters[name] for row in self.rows] for name in self.parameters}
+        for name in self.results:
+            called = self._heading(name) if name in self.parameters else name
+            columns[called] = [row.results.get(name, none) for row in self.rows]
+        return columns | {name: [getattr(row, name) for row in self.rows] for name in last}
+
+    def __repr__(self) -> str:
+        failed = sum(1 for row in self.rows if row.error)
+        points = f"{len(self.rows)} points" + (f", {failed} of them failed" if failed else "")
+        return f"<Table of {', '.join(self.results)} over {', '.join(self.parameters) or 'nothing'}: {points}>"
+
+    def _repr_html_(self) -> str:
+        head = ["point", *self.parameters, *map(self._heading, self.results), ""]
+        rows = (
+            [row.point, *row.parameters.values(), *(row.results.get(name) for name in self.results), row.error or row.warning]
+            for row in self.rows
+        )
+        return showing.table(head, rows)
+
+    def to_csv(self) -> str:
+        """CSV with the columns of ``bimorph sweep``: point, parameters, results with units, estimate, warning, error."""
+        out = io.StringIO()
+        writer = csv.writer(out, lineterminator="\n")
+        writer.writerow(["point", *self.parameters, *map(self._heading, self.results), "estimated_error [1]", "warning", "error"])
+        for row in self.rows:
+            values = [row.results.get(name, "") for name in self.results]
+            estimate = "" if row.estimated_error is None else row.estimated_error
+            writer.writerow([row.point, *row.parameters.values(), *values, estimate, row.warning, row.error])
+        return out.getvalue()
+
+
+def with_results(table: Table) -> Table:
+    """The table itself.
+
+    Raises :class:`NoResult` where it has points, and none of them has a result; ``error.table`` has the reason of each.
+    """
+    if not table.rows or any(not row.error for row in table.rows):
+        return table
+    first = table.rows[0]
+    raise NoResult(f"none of the {len(table.rows)} points of the sweep has a result; point {first.point}: {first.error}", table)
