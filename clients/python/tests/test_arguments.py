@@ -275,7 +275,29 @@ def of_sweeps(running: bimorph.Sweep, table: bimorph.Table, address: str, values
         "Sweep.wait": Case(running.wait, {}, {"progress": OPTIONAL_FUNCTION}),
         "Sweep.rows": Case(lambda **given: list(running.rows(**given)), {}, {"first": integer(0)}, running.rows),
         "Table.column": Case(table.column, {"name": "f1"}, {"name": never}),
+        **files(table),
         "sweep_on": Case(bimorph.sweep_on, good, accepts),
+    }
+
+
+def files(table: bimorph.Table) -> dict[str, Case]:
+    """Tables written to a store that nothing else sees, where Arrow is installed."""
+    try:
+        from pyarrow import fs
+    except ImportError:
+        return {}
+    store = fs._MockFileSystem()
+
+    def in_memory(path: Any) -> None:
+        table.to_parquet(path, filesystem=store)
+
+    def over(filesystem: Any) -> None:
+        if filesystem is not None:
+            table.to_parquet("/nosuch/a/b", filesystem=filesystem)
+
+    return {
+        "Table.to_parquet": Case(in_memory, {"path": "a"}, {"path": text}, table.to_parquet, skip=("filesystem",)),
+        "Table.to_parquet over": Case(over, {"filesystem": None}, {"filesystem": nothing}),
     }
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import pathlib
+from pathlib import Path
 
 import pytest
 from conftest import PLATE
@@ -105,3 +106,30 @@ def test_points_that_go_together_and_options(client: bimorph.Client) -> None:
         client.sweep(netlist, {("k", "drive.v"): [(1.0,)]}, held)
     with pytest.raises(bimorph.BimorphError, match="one of tol, band"):
         client.sweep(netlist, {"option.tool": [1.0]}, held)
+
+
+def test_tables_on_file_systems(client: bimorph.Client, tmp_path: Path) -> None:
+    """A Parquet file is read back with its rows and units, from a path, a URI, a part of a file system, and a store in memory; where it cannot be
+    written, nothing is left."""
+    pytest.importorskip("pyarrow")
+    from pyarrow import fs, parquet
+
+    table = client.sweep(bimorph.Netlist.text(PLATE, "plate.net"), {"k": [1.0, 4.0]}, bimorph.Modes(1))
+    memory = fs._MockFileSystem()
+    memory.create_dir("bucket")
+    places = [
+        (tmp_path / "a.parquet", None, fs.LocalFileSystem(), str(tmp_path / "a.parquet")),
+        ((tmp_path / "b.parquet").as_uri(), None, fs.LocalFileSystem(), str(tmp_path / "b.parquet")),
+        ("c.parquet", fs.SubTreeFileSystem(str(tmp_path), fs.LocalFileSystem()), fs.LocalFileSystem(), str(tmp_path / "c.parquet")),
+        ("bucket/d.parquet", memory, memory, "bucket/d.parquet"),
+    ]
+    for path, given, store, place in places:
+        table.to_parquet(path, filesystem=given)
+        read = parquet.read_table(place, filesystem=store)
+        assert read.column("f1").to_pylist() == table.column("f1") and read.equals(table.to_arrow())
+        assert read.schema.field("f1").metadata == {b"unit": b"Hz"}
+    with pytest.raises(OSError, match="nosuch"):
+        table.to_parquet(tmp_path / "nosuch" / "e.parquet")
+    with pytest.raises(bimorph.InvalidRequest, match="path: expected .*nosuch://"):
+        table.to_parquet("nosuch://bucket/f.parquet")
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["a.parquet", "b.parquet", "c.parquet"]

@@ -5,12 +5,14 @@ from __future__ import annotations
 import csv
 import io
 import math
+import os
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from . import showing
 from .arguments import text
 from .errors import NoResult
+from .files import to_parquet
 
 if TYPE_CHECKING:
     import pandas
@@ -72,13 +74,17 @@ class Table:
 
     def to_arrow(self) -> pyarrow.Table:
         """The columns of :meth:`to_pandas` behind the number of the point, null where a point has no such number; the unit of a result stands
-        in the metadata of its field, the number of columns that are parameters in that of the table. For Parquet:
-        ``pyarrow.parquet.write_table(table.to_arrow(), "mc.parquet")``.
+        in the metadata of its field, the number of columns that are parameters in that of the table.
 
         Raises :class:`ValueError` for a parameter with one of the names of the last columns."""
         units = {(self._heading(name) if name in self.parameters else name): self.units[name] for name in self.results}
         columns = {"point": [row.point for row in self.rows], **self._columns(None)}
         return showing.arrow(columns, {**units, "estimated_error": "1"}, {"parameters": str(len(self.parameters))})
+
+    def to_parquet(self, path: str | os.PathLike[str], *, filesystem: Any = None) -> None:
+        """Writes :meth:`to_arrow` as a Parquet file. ``path`` is a path here or the URI of an object store that pyarrow has (``s3://``, ``gs://``,
+        ``abfs://``, ``hdfs://``), or one of ``filesystem``, a file system of ``pyarrow.fs`` or of fsspec."""
+        to_parquet(self.to_arrow(), path, filesystem)
 
     def _columns(self, none: float | None) -> dict[str, list[Any]]:
         """Every column but the number of the point; ``none`` where a point has no such number."""
