@@ -275,8 +275,47 @@ def of_sweeps(running: bimorph.Sweep, table: bimorph.Table, address: str, values
         "Sweep.wait": Case(running.wait, {}, {"progress": OPTIONAL_FUNCTION}),
         "Sweep.rows": Case(lambda **given: list(running.rows(**given)), {}, {"first": integer(0)}, running.rows),
         "Table.column": Case(table.column, {"name": "f1"}, {"name": never}),
+        "Table.statistics": Case(table.statistics, {}, {"limits": empty_list, "percentiles": either(empty_list, arrays)}),
+        "Table.histogram": Case(table.histogram, {"name": "f1"}, {"name": never, "bins": integer(1, 1000)}),
+        "Limit": Case(bimorph.Limit, {"name": "f1", "relation": "<", "value": 1.0}, {"name": text, "relation": never, "value": number()}),
+        **pictures(table),
         **files(table),
         "sweep_on": Case(bimorph.sweep_on, good, accepts),
+    }
+
+
+def arrays(value: Any) -> bool:
+    """Percentages."""
+    return value == (1, 2, 3) if isinstance(value, tuple) else hasattr(value, "__next__") or isinstance(value, np.ndarray) and value.ndim == 1 and value.dtype.kind == "f"
+
+
+def drawn(table: bimorph.Table) -> Callable[..., None]:
+    """Draws a table on axes that are given."""
+
+    def draw(ax: Any) -> None:
+        if ax is not None:
+            table.plot(ax=ax)
+
+    return draw
+
+
+def pictures(table: bimorph.Table) -> dict[str, Case]:
+    """Tables drawn, where matplotlib is installed."""
+    try:
+        import matplotlib
+
+        matplotlib.use("Agg")
+        from matplotlib import pyplot
+    except ImportError:
+        return {}
+
+    def draw(name: Any) -> None:
+        table.plot(name)
+        pyplot.close("all")
+
+    return {
+        "Table.plot": Case(draw, {"name": "f1"}, {"name": nothing}, table.plot, skip=("ax",)),
+        "Table.plot on": Case(drawn(table), {"ax": None}, {"ax": nothing}),
     }
 
 
@@ -418,6 +457,7 @@ def test_bad_arguments_are_rejected_by_name(cases: dict[str, Case]) -> None:
 MADE_BY_CALLS = {
     *("Conversion", "Diagnostic", "FrequencyResponse", "Model", "ModesResult", "NodeMotion", "Options", "Piece", "PullInResult", "Root"),
     *("Row", "Session", "Snapshot", "StaticResult", "Statistics", "Sweep", "SweepStatus", "Table", "Ticket", "TransientResult", "TrialReply"),
+    *("ColumnStatistics", "Fraction", "Histogram", "SweepStatistics"),
     *("Violation", "aio", "local"),
 }
 """Public names without arguments of a user: what calls give, the package for asyncio, which passes its arguments on, and `local()`."""

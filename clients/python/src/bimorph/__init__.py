@@ -39,25 +39,30 @@ from .results import (
     StaticResult,
     Statistics,
     TransientResult,
-    TrialReply,
 )
 from .server import Server, serve
 from .session import Session
 from .sweep import LogNormal, Modes, Normal, PullIn, Samples, Static, Transient, Uniform
 from .sweep_handle import Sweep, SweepStatus
+from .sweep_statistics import ColumnStatistics, Fraction, Histogram, Limit, SweepStatistics
 from .table import Row, Table
 from .ticket import Snapshot, Ticket
+from .trial_reply import TrialReply
 
 __all__ = [
     "AccuracyWarning",
     "BimorphError",
     "Client",
+    "ColumnStatistics",
     "Conversion",
-    "LayoutWarning",
     "Diagnostic",
+    "Fraction",
     "FrequencyResponse",
+    "Histogram",
     "InvalidRequest",
     "InvalidType",
+    "LayoutWarning",
+    "Limit",
     "LimitExceeded",
     "LogNormal",
     "Model",
@@ -86,6 +91,7 @@ __all__ = [
     "Statistics",
     "StepFailed",
     "Sweep",
+    "SweepStatistics",
     "SweepStatus",
     "Table",
     "Ticket",

@@ -29,7 +29,7 @@ from . import model as _model
 from . import session as _session
 from . import sweep_handle as _sweep_handle
 from .local import ADDRESS
-from .results import TrialReply
+from .trial_reply import TrialReply
 from .stopping import Stopping, current
 from .table import Row
 

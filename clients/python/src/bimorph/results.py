@@ -9,11 +9,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from . import showing
+from . import labelled, plots, showing
+from .trial_reply import TrialReply as TrialReply
 
 if TYPE_CHECKING:
     import pandas
+    import xarray
     from matplotlib.axes import Axes
+
+_MOTION = {"x": "m", "y": "m", "rz": "rad"}
+"""Components of the motion of a node, and their units."""
+_MODES = {"frequency_hz": "Hz", "residual": "1", "error": "1"}
+"""Numbers of a mode, and their units."""
 
 
 @dataclass(frozen=True)
@@ -56,9 +63,20 @@ class StaticResult:
     """Motions that nothing resists noticeably and no load excites; they are held where they are."""
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Displacement [m] and rotation [rad] of every node."""
-        columns = {axis: [getattr(node, axis) for node in self.nodes.values()] for axis in ("x", "y", "rz")}
-        return showing.frame(columns, ("node", list(self.nodes)))
+        """Displacement [m] and rotation [rad] of every node; ``attrs["units"]`` has the units."""
+        return showing.frame(self._columns(), ("node", list(self.nodes)), _MOTION)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The same, by node; each array has its unit in ``attrs["units"]``."""
+        about = {"estimated_error": self.estimated_error, "pulled_in": int(self.pulled_in), "jumped": int(self.jumped)}
+        return labelled.dataset(("node", list(self.nodes), ""), self._columns(), _MOTION, about)
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draws the displacement of every node."""
+        return plots.static(self, ax)
+
+    def _columns(self) -> dict[str, list[float]]:
+        return {axis: [getattr(node, axis) for node in self.nodes.values()] for axis in _MOTION}
 
     def _repr_html_(self) -> str:
         rows = ((name, node.x, node.y, node.rz) for name, node in self.nodes.items())
@@ -92,7 +110,24 @@ class ModesResult:
     def to_pandas(self) -> pandas.DataFrame:
         """Frequency [Hz], residual and estimated error, by number from 1."""
         columns = {"frequency_hz": self.frequencies_hz, "residual": self.residuals, "error": self.errors}
-        return showing.frame(columns, ("mode", range(1, len(self.frequencies_hz) + 1)))
+        return showing.frame(columns, ("mode", range(1, len(self.frequencies_hz) + 1)), _MODES)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The same, and the shapes ``x``, ``y`` and ``rz`` by mode and node, each with its unit in ``attrs["units"]``."""
+        errors = [math.nan if error is None else error for error in self.errors]
+        columns = {"frequency_hz": self.frequencies_hz, "residual": self.residuals, "error": errors}
+        modes = ("mode", range(1, len(self.frequencies_hz) + 1), "")
+        found = labelled.dataset(modes, columns, _MODES, {"estimated_error": self.estimated_error, "deflection_m": self.deflection_m})
+        nodes = list(self.shapes[0]) if self.shapes else []
+        found = found.assign_coords(node=nodes)
+        for axis, unit in (("x", "1"), ("y", "1"), ("rz", "rad/m")):
+            shapes = np.array([[getattr(shape[node], axis) for node in nodes] for shape in self.shapes]).reshape(len(self.shapes), len(nodes))
+            found[axis] = (("mode", "node"), shapes, {"units": unit})
+        return found
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draws the frequency of every mode, with its estimated error."""
+        return plots.modes(self, ax)
 
     def _repr_html_(self) -> str:
         rows = zip(range(1, len(self.frequencies_hz) + 1), self.frequencies_hz, self.errors)
@@ -168,17 +203,17 @@ class FrequencyResponse:
         return {name: np.angle(values) for name, values in self.signals.items()}
 
     def to_pandas(self) -> pandas.DataFrame:
-        """A complex column for each signal, by frequency [Hz]."""
-        return showing.frame(self.signals, ("frequency_hz", self.frequencies_hz))
+        """A complex column for each signal, by frequency [Hz]; ``attrs["units"]`` has the units."""
+        return showing.frame(self.signals, ("frequency_hz", self.frequencies_hz), {"frequency_hz": "Hz", **self.units})
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The same, each signal with its unit in ``attrs["units"]``."""
+        about = {"drive": self.drive, "drive_unit": self.drive_unit, "estimated_error": self.estimated_error}
+        return labelled.dataset(("frequency_hz", self.frequencies_hz, "Hz"), self.signals, self.units, about)
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draws the magnitude of every signal over frequency, both on logarithmic scales."""
-        ax = showing.axes(ax)
-        for name, values in self.magnitude.items():
-            ax.loglog(self.frequencies_hz, values, label=f"{name} [{self.units[name]}]")
-        ax.set_xlabel("f [Hz]")
-        ax.legend()
-        return ax
+        return plots.response(self, ax)
 
     def _repr_html_(self) -> str:
         head = ["f [Hz]", *(f"|{name}| [{self.units[name]}]" for name in self.signals)]
@@ -202,6 +237,25 @@ class PullInResult:
     """False where nothing holds the part beyond pull-in: no gap closes on contact."""
     warnings: tuple[str, ...] = ()
     """What the numbers do not say by themselves."""
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """One row, by port; ``attrs["units"]`` has the units."""
+        columns = {"pull_in_v": [self.pull_in_v], "release_v": [math.nan if self.release_v is None else self.release_v]}
+        return showing.frame(columns, ("port", [self.port]), {"pull_in_v": "V", "release_v": "V"})
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The same, each number with its unit in ``attrs["units"]``."""
+        columns = {"pull_in_v": [self.pull_in_v], "release_v": [math.nan if self.release_v is None else self.release_v]}
+        about = {"estimated_error": self.estimated_error, "held": int(self.held)}
+        return labelled.dataset(("port", [self.port], ""), columns, {"pull_in_v": "V", "release_v": "V"}, about)
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draws where the gap closes on the way up, and where it opens on the way down."""
+        return plots.pull_in(self, ax)
+
+    def _repr_html_(self) -> str:
+        note = showing.note(self.estimated_error, self.warnings)
+        return showing.table(["port", "pull-in [V]", "release [V]"], [(self.port, self.pull_in_v, self.release_v)], note)
 
 
 @dataclass(frozen=True)
@@ -260,49 +314,19 @@ class TransientResult:
         return f"<TransientResult of {names}: {len(self.t)} times to {self.t[-1] if len(self.t) else 0.0:g} s>"
 
     def to_pandas(self) -> pandas.DataFrame:
-        """A column for each signal, by time [s]."""
-        return showing.frame(self.signals, ("t", self.t))
+        """A column for each signal, by time [s]; ``attrs["units"]`` has the units."""
+        return showing.frame(self.signals, ("t", self.t), {"t": "s", **self.units})
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The same, each signal with its unit in ``attrs["units"]``."""
+        about = {"estimated_error": self.estimated_error, "step_error": self.step_error, "reliable_until": self.reliable_until}
+        return labelled.dataset(("t", self.t, "s"), self.signals, self.units, about)
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draws every signal over time, in its unit."""
-        ax = showing.axes(ax)
-        for name, values in self.signals.items():
-            ax.plot(self.t, values, label=f"{name} [{self.units[name]}]")
-        ax.set_xlabel("t [s]")
-        ax.legend()
-        return ax
+        return plots.transient(self, ax)
 
     def _repr_html_(self) -> str:
         head = ["t [s]", *(f"{name} [{unit}]" for name, unit in self.units.items())]
         rows = zip(self.t.tolist(), *(values.tolist() for values in self.signals.values()))
         return showing.table(head, rows, showing.note(self.estimated_error, self.warnings))
-
-
-@dataclass(frozen=True)
-class TrialReply:
-    """What a device answers to port voltages. Matrices are by name: ``di_dv["heat"]["sense"]``."""
-
-    token: int
-    """Names the new state; 0 when ``need_dt`` is set."""
-    t: float
-    """Time of the state [s]."""
-    currents: dict[str, float]
-    """Conduction current into each port [A]."""
-    charges: dict[str, float]
-    """Charge on each port [C]; the port current is the current plus the rate of this."""
-    di_dv: dict[str, dict[str, float]]
-    """∂current/∂voltage [S]."""
-    dq_dv: dict[str, dict[str, float]]
-    """∂charge/∂voltage [F], with the mechanical response over this step."""
-    outputs: dict[str, float]
-    """Opened signals, each in its unit."""
-    doutputs_dv: dict[str, dict[str, float]]
-    """∂output/∂voltage [unit/V]."""
-    dt_next: float
-    """Longest next step likely to be accepted [s]; infinite when the device does not care."""
-    jumped: bool
-    """A static trial passed a fold: pulled in, or let go."""
-    need_dt: float | None
-    """Set when the step was too long: ask again with at most this [s]. Nothing else holds then."""
-    voltages: dict[str, float]
-    """What was given to each port [V, or the unit of its kind]."""

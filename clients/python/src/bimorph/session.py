@@ -15,9 +15,10 @@ from .arguments import MAX_STEP, given_to, instance, number, one_of, text
 from .channel import Channel
 from .errors import BimorphError, InvalidRequest, NotFound, StepFailed, from_fault, shown
 from .naming import by_argument
-from .results import NodeMotion, TrialReply
+from .results import NodeMotion
 from .stopping import apart, check
 from .ticket import Snapshot, Ticket
+from .trial_reply import TrialReply
 from .v1 import device_pb2
 from .verified import Checked
 

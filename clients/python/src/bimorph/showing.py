@@ -17,15 +17,16 @@ _SHOWN = 20
 """Rows that a notebook shows of a long table."""
 
 
-def frame(columns: Mapping[str, Any], index: tuple[str, Any] | None = None) -> pandas.DataFrame:
-    """A table of pandas; ``index`` is its name and values."""
+def frame(columns: Mapping[str, Any], index: tuple[str, Any] | None = None, units: Mapping[str, str] | None = None) -> pandas.DataFrame:
+    """A table of pandas; ``index`` is its name and values, ``units`` stand in ``attrs["units"]``."""
     try:
         import pandas
     except ImportError:
         raise ImportError("to_pandas() needs pandas: pip install pandas") from None
-    if index is None:
-        return pandas.DataFrame(dict(columns))
-    return pandas.DataFrame(dict(columns), index=pandas.Index(index[1], name=index[0]))
+    found = pandas.DataFrame(dict(columns), index=None if index is None else pandas.Index(index[1], name=index[0]))
+    if units:
+        found.attrs["units"] = dict(units)
+    return found
 
 
 def arrow(columns: Mapping[str, Sequence[Any]], units: Mapping[str, str], about: Mapping[str, str]) -> pyarrow.Table:

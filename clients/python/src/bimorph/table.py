@@ -6,17 +6,21 @@ import csv
 import io
 import math
 import os
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
-from . import showing
+from . import labelled, plots, showing
 from .arguments import text
 from .errors import NoResult
 from .files import to_parquet
+from .sweep_statistics import PERCENTILES, Histogram, Limit, SweepStatistics, histogram_of, statistics_of
 
 if TYPE_CHECKING:
     import pandas
     import pyarrow
+    import xarray
+    from matplotlib.axes import Axes
 
 
 @dataclass(frozen=True)
@@ -69,17 +73,43 @@ class Table:
         """A column for each parameter and each result (NaN where a point has none), by number of the point; with ``estimated_error``,
         ``warning`` and ``error``. A result that has the name of a parameter is called with its unit, ``f1 [Hz]``.
 
+        ``attrs["units"]`` has the units of results.
+
         Raises :class:`ValueError` for a parameter with one of the three names."""
-        return showing.frame(self._columns(math.nan), ("point", [row.point for row in self.rows]))
+        return showing.frame(self._columns(math.nan), ("point", [row.point for row in self.rows]), self._units())
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Every result on the full grid, with an axis for each parameter; where the points are no full grid, as of samples, by number of the
+        point. Each array has its unit in ``attrs["units"]``; NaN where a point has none."""
+        return labelled.of_table(self)
+
+    def statistics(
+        self, limits: str | Limit | Iterable[str | Limit] = (), percentiles: Sequence[float] = PERCENTILES
+    ) -> SweepStatistics:
+        """Mean, standard deviation and percentiles of every result, and the fraction of points within ``limits``, such as ``"yoke.y>-1.1u"``:
+        the yield. A point without a result is beyond its limits."""
+        return statistics_of(self, limits, percentiles)
+
+    def histogram(self, name: str, bins: int | Literal["auto"] = "auto") -> Histogram:
+        """How often a result lies between edges of equal distance."""
+        return histogram_of(self, name, bins)
+
+    def plot(self, name: str | None = None, ax: Axes | None = None) -> Axes:
+        """Draws a result, by default the first, over the last parameter, with a line for each value of the others; of random samples its
+        histogram."""
+        return plots.sweep(self, name, ax)
+
+    def _units(self) -> dict[str, str]:
+        units = {(self._heading(name) if name in self.parameters else name): self.units[name] for name in self.results}
+        return {**units, "estimated_error": "1"}
 
     def to_arrow(self) -> pyarrow.Table:
         """The columns of :meth:`to_pandas` behind the number of the point, null where a point has no such number; the unit of a result stands
         in the metadata of its field, the number of columns that are parameters in that of the table.
 
         Raises :class:`ValueError` for a parameter with one of the names of the last columns."""
-        units = {(self._heading(name) if name in self.parameters else name): self.units[name] for name in self.results}
         columns = {"point": [row.point for row in self.rows], **self._columns(None)}
-        return showing.arrow(columns, {**units, "estimated_error": "1"}, {"parameters": str(len(self.parameters))})
+        return showing.arrow(columns, self._units(), {"parameters": str(len(self.parameters))})
 
     def to_parquet(self, path: str | os.PathLike[str], *, filesystem: Any = None) -> None:
         """Writes :meth:`to_arrow` as a Parquet file. ``path`` is a path here or the URI of an object store that pyarrow has (``s3://``, ``gs://``,

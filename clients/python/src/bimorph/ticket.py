@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from .results import TrialReply
+from .trial_reply import TrialReply
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,130 @@
+"""Pictures of results, by matplotlib, which is imported when one is drawn."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .arguments import text
+from .errors import InvalidRequest
+from .showing import axes
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from .results import FrequencyResponse, ModesResult, PullInResult, StaticResult, TransientResult
+    from .table import Table
+
+_LONGEST = 40
+"""Names that stand on an axis."""
+
+
+def static(result: StaticResult, ax: Axes | None) -> Axes:
+    """Displacement of every node."""
+    ax = axes(ax)
+    places = np.arange(len(result.nodes))
+    for axis, marker in (("x", "o"), ("y", "s")):
+        ax.plot(places, [getattr(node, axis) for node in result.nodes.values()], marker, label=f"{axis} [m]")
+    if len(places) <= _LONGEST:
+        ax.set_xticks(places, list(result.nodes), rotation=90)
+    ax.set_xlabel("node")
+    ax.legend()
+    return ax
+
+
+def modes(result: ModesResult, ax: Axes | None) -> Axes:
+    """Frequency of every mode, with its estimated error."""
+    ax = axes(ax)
+    numbers = np.arange(1, len(result.frequencies_hz) + 1)
+    frequencies = np.array(result.frequencies_hz)
+    errors = np.array([math.nan if error is None else abs(error) for error in result.errors], dtype=float)
+    if len(errors) == len(frequencies) and np.isfinite(errors).any():
+        ax.errorbar(numbers, frequencies, yerr=np.nan_to_num(errors) * frequencies, fmt="o", capsize=3)
+    else:
+        ax.plot(numbers, frequencies, "o")
+    ax.set_xticks(numbers)
+    ax.set_xlabel("mode")
+    ax.set_ylabel("f [Hz]")
+    return ax
+
+
+def pull_in(result: PullInResult, ax: Axes | None) -> Axes:
+    """State of the gap over the voltage: it closes on the way up and opens on the way down."""
+    ax = axes(ax)
+    top = 1.2 * result.pull_in_v
+    ax.plot([0.0, result.pull_in_v, result.pull_in_v, top], [0, 0, 1, 1], label="up")
+    back = 0.0 if result.release_v is None else result.release_v
+    down = ([top, 0.0], [1, 1]) if result.release_v is None else ([top, back, back, 0.0], [1, 1, 0, 0])
+    ax.plot(*down, "--", label="down" if result.release_v is not None else "down: it stays closed")
+    ax.set_yticks([0, 1], ["open", "closed"])
+    ax.set_xlabel(f"{result.port} [V]")
+    ax.legend()
+    return ax
+
+
+def response(result: FrequencyResponse, ax: Axes | None) -> Axes:
+    """Magnitude of every signal over frequency, both on logarithmic scales."""
+    ax = axes(ax)
+    for name, values in result.magnitude.items():
+        ax.loglog(result.frequencies_hz, values, label=f"{name} [{result.units[name]}]")
+    ax.set_xlabel("f [Hz]")
+    ax.legend()
+    return ax
+
+
+def transient(result: TransientResult, ax: Axes | None) -> Axes:
+    """Every signal over time, in its unit."""
+    ax = axes(ax)
+    for name, values in result.signals.items():
+        ax.plot(result.t, values, label=f"{name} [{result.units[name]}]")
+    ax.set_xlabel("t [s]")
+    ax.legend()
+    return ax
+
+
+def sweep(table: Table, name: str | None, ax: Axes | None) -> Axes:
+    """A result over the last parameter of numbers, a line for each value of the others; over no parameter, or random samples, its histogram."""
+    name = _result(table, name)
+    ax = axes(ax)
+    label = f"{name} [{table.units[name]}]"
+    numbers = [one for one in table.parameters if not any(isinstance(row.parameters[one], str) for row in table.rows)]
+    lines: dict[tuple[Any, ...], list[tuple[float, float]]] = {}
+    for row in table.rows:
+        if numbers:
+            others = tuple(value for one, value in row.parameters.items() if one != numbers[-1])
+            lines.setdefault(others, []).append((float(row.parameters[numbers[-1]]), row.results.get(name, math.nan)))
+    if not numbers or len(table.rows) > 3 and len(lines) == len(table.rows) or _is_random(table, numbers[-1]):
+        found = table.histogram(name)
+        ax.stairs(found.counts, found.edges, fill=True)
+        ax.set_xlabel(label)
+        ax.set_ylabel("points")
+        return ax
+    rest = [one for one in table.parameters if one != numbers[-1]]
+    for others, points in lines.items():
+        points.sort()
+        said = ", ".join(f"{one} = {value if isinstance(value, str) else format(value, 'g')}" for one, value in zip(rest, others))
+        ax.plot(*zip(*points), "o-", markersize=3, label=said or None)
+    ax.set_xlabel(numbers[-1])
+    ax.set_ylabel(label)
+    if 1 < len(lines) <= 12:
+        ax.legend()
+    return ax
+
+
+def _result(table: Table, name: str | None) -> str:
+    if name is None:
+        if not table.results:
+            raise InvalidRequest("name: the table has no results to draw")
+        return table.results[0]
+    if text("name", name, "the name of a result") not in table.results:
+        raise InvalidRequest(f"name: no result {name!r}; there are {', '.join(table.results)}")
+    return name
+
+
+def _is_random(table: Table, parameter: str) -> bool:
+    """Whether samples were drawn: values that are all different and not in order."""
+    values = [row.parameters[parameter] for row in table.rows]
+    ordered = sorted(values, key=float)
+    return len(values) > 3 and len(set(values)) == len(values) and values not in (ordered, ordered[::-1])

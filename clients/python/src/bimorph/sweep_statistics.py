@@ -1,0 +1,217 @@
+"""Statistics of a sweep: moments, percentiles, the fraction of points within limits, and histograms.
+
+A point without a result is outside of every limit on that result, and in no moment, percentile or histogram.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .arguments import choice, integer, items, number, text, wrong
+from .errors import InvalidRequest
+from .showing import table as html
+
+if TYPE_CHECKING:
+    from .table import Table
+
+_SUFFIXES = {"": 1.0, "f": 1e-15, "p": 1e-12, "n": 1e-9, "u": 1e-6, "m": 1e-3, "k": 1e3, "meg": 1e6, "g": 1e9, "t": 1e12}
+_LIMIT = re.compile(r"\s*(?P<name>.+?)\s*(?P<relation><=|>=|<|>)\s*(?P<value>[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)(?P<suffix>[a-z]*)\s*\Z", re.IGNORECASE)
+_RELATIONS: dict[str, Callable[[Any, float], Any]] = {
+    "<": lambda values, bound: values < bound,
+    "<=": lambda values, bound: values <= bound,
+    ">": lambda values, bound: values > bound,
+    ">=": lambda values, bound: values >= bound,
+}
+_Z = 1.959963984540054
+"""Quantile of the normal distribution for 95 % on both sides."""
+PERCENTILES = (5.0, 50.0, 95.0)
+
+
+@dataclass(frozen=True)
+class Limit:
+    """What a result must keep to: ``yoke.y > -1.1u``."""
+
+    name: str
+    """Result, or parameter."""
+    relation: str
+    """``<``, ``<=``, ``>`` or ``>=``."""
+    value: float
+    """In the unit of the result."""
+
+    def __post_init__(self) -> None:
+        text("name", self.name, "the name of a result or a parameter")
+        choice("relation", self.relation, _RELATIONS)
+        object.__setattr__(self, "value", number("value", self.value))
+
+    def __str__(self) -> str:
+        return f"{self.name} {self.relation} {self.value:g}"
+
+
+@dataclass(frozen=True)
+class Fraction:
+    """A fraction of the points of a sweep."""
+
+    passed: int
+    """Points within the limits."""
+    points: int
+    """All points."""
+
+    @property
+    def value(self) -> float:
+        """``passed / points`` [1]; NaN without points."""
+        return self.passed / self.points if self.points else math.nan
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 % confidence interval of the fraction of independent random samples (Wilson, 1927) [1]."""
+        n, p = self.points, self.value
+        if not n:
+            return 0.0, 1.0
+        centre = (p + _Z * _Z / (2 * n)) / (1 + _Z * _Z / n)
+        half = _Z / (1 + _Z * _Z / n) * math.sqrt(p * (1 - p) / n + _Z * _Z / (4 * n * n))
+        return max(0.0, centre - half), min(1.0, centre + half)
+
+
+@dataclass(frozen=True)
+class ColumnStatistics:
+    """Statistics of a result over the points that have it."""
+
+    name: str
+    """Result."""
+    unit: str
+    """Its unit."""
+    count: int
+    """Points that have it."""
+    missing: int
+    """Points without it."""
+    mean: float
+    """Mean; NaN without points, as all that follows."""
+    deviation: float
+    """Standard deviation of a sample, with count - 1; NaN of one point."""
+    minimum: float
+    """Smallest value."""
+    maximum: float
+    """Largest value."""
+    percentiles: dict[float, float]
+    """Values by percentage, interpolated linearly between ordered values (Hyndman and Fan, 1996, type 7)."""
+
+
+@dataclass(frozen=True)
+class SweepStatistics:
+    """Statistics of every result of a sweep, and how many points keep to limits."""
+
+    points: int
+    """Points of the table."""
+    columns: dict[str, ColumnStatistics]
+    """By result."""
+    limits: tuple[tuple[Limit, Fraction], ...]
+    """Each limit, with the fraction of points that keep to it."""
+    passed: Fraction
+    """Points that keep to all of them: the yield. Without limits: those with a result."""
+
+    def _repr_html_(self) -> str:
+        rows = [
+            (f"{one.name} [{one.unit}]", one.count, one.mean, one.deviation, one.minimum, *one.percentiles.values(), one.maximum)
+            for one in self.columns.values()
+        ]
+        percentages = [f"{percentage:g} %" for percentage in next((list(one.percentiles) for one in self.columns.values()), [])]
+        low, high = self.passed.interval
+        kept = [f"{limit}: {fraction.value:.2%}" for limit, fraction in self.limits]
+        note = " · ".join([*kept, f"yield {self.passed.value:.2%}, 95 % interval {low:.2%} to {high:.2%}"])
+        return html(["result", "points", "mean", "standard deviation", "minimum", *percentages, "maximum"], rows, note)
+
+
+@dataclass(frozen=True, eq=False)
+class Histogram:
+    """How often a result lies between edges."""
+
+    name: str
+    """Result."""
+    unit: str
+    """Its unit."""
+    counts: NDArray[np.int64]
+    """Points in each bin."""
+    edges: NDArray[np.float64]
+    """Edges of the bins, one more; a value on an inner edge is in the bin above, the largest in the last."""
+
+
+def limit_of(given: Any, where: str = "limits") -> Limit:
+    """A limit as text: ``NAME>NUMBER``, with the suffixes of netlists (``u``, ``k``, ``meg``)."""
+    if isinstance(given, Limit):
+        return given
+    expected = "a limit as NAME>NUMBER, with <, <=, > or >= and the suffixes of netlists, such as \"yoke.y>-1.1u\","
+    found = _LIMIT.match(text(where, given, expected))
+    factor = _SUFFIXES.get(found["suffix"].lower()) if found else None
+    if found is None or factor is None:
+        raise wrong(where, expected, given)
+    # the nearest number to the decimal one, as netlists have it
+    exponent = round(math.log10(factor))
+    mantissa, _, power = found["value"].lower().partition("e")
+    return Limit(found["name"], found["relation"], float(f"{mantissa}e{int(power or 0) + exponent}"))
+
+
+def statistics_of(table: Table, limits: str | Limit | Iterable[str | Limit] = (), percentiles: Sequence[float] = PERCENTILES) -> SweepStatistics:
+    """Statistics of a table."""
+    listed = [limits] if isinstance(limits, (str, Limit)) else items("limits", limits, "a list of limits")
+    wanted = [limit_of(one, f"limits[{k}]") for k, one in enumerate(listed)]
+    shares = [_percentage(f"percentiles[{k}]", one) for k, one in enumerate(items("percentiles", percentiles, "a list of percentages"))]
+    columns = {name: _column(table, name, shares) for name in table.results}
+    passes = np.ones(len(table.rows), dtype=bool)
+    fractions = []
+    for limit in wanted:
+        if limit.name not in table.results and limit.name not in table.parameters:
+            known = ", ".join([*table.parameters, *table.results])
+            raise InvalidRequest(f"limits: no column {limit.name!r}; there are {known}")
+        keeps = _RELATIONS[limit.relation](values_of(table, limit.name), limit.value)
+        fractions.append((limit, Fraction(int(keeps.sum()), len(table.rows))))
+        passes &= keeps
+    if not wanted:
+        passes = np.array([not row.error for row in table.rows], dtype=bool)
+    return SweepStatistics(len(table.rows), columns, tuple(fractions), Fraction(int(passes.sum()), len(table.rows)))
+
+
+def histogram_of(table: Table, name: str, bins: int | str = "auto") -> Histogram:
+    """A histogram of a result."""
+    if isinstance(bins, str):
+        if bins != "auto":
+            raise wrong("bins", '"auto" or a number of bins', bins)
+    else:
+        bins = integer("bins", bins, 1, 100_000)
+    values = values_of(table, name)
+    counts, edges = np.histogram(values[np.isfinite(values)], bins=bins)
+    return Histogram(name, table.units.get(name, ""), counts.astype(np.int64), edges)
+
+
+def values_of(table: Table, name: str) -> NDArray[np.float64]:
+    """The numbers of a column; NaN where a point has none."""
+    found = table.column(name)
+    if any(isinstance(value, str) for value in found):
+        raise InvalidRequest(f"name: expected a column of numbers, got {name!r}, which has words")
+    return np.array([math.nan if value is None else value for value in found], dtype=np.float64)
+
+
+def _percentage(where: str, given: Any) -> float:
+    return number(where, given, "a percentage", least=0.0, most=100.0)
+
+
+def _column(table: Table, name: str, percentages: Sequence[float]) -> ColumnStatistics:
+    values = np.array([row.results[name] for row in table.rows if name in row.results], dtype=np.float64)
+    n = len(values)
+    return ColumnStatistics(
+        name,
+        table.units[name],
+        n,
+        len(table.rows) - n,
+        float(values.mean()) if n else math.nan,
+        float(values.std(ddof=1)) if n > 1 else math.nan,
+        float(values.min()) if n else math.nan,
+        float(values.max()) if n else math.nan,
+        {one: float(np.percentile(values, one)) if n else math.nan for one in percentages},
+    )
