@@ -4,7 +4,7 @@
 help:
 	@echo "make demo    build, run the bank in ngspice here and through a server, compare, draw (out/demo)"
 	@echo "make test    everything that must hold: format, lints, tests, documentation, Python, ngspice decks"
-	@echo "make soak    a thousand sessions for a minute, ten thousand in turn, two hundred kills, a hundred killed clients, hundreds of failures of the network: what a server bears (some minutes)"
+	@echo "make soak    a thousand sessions for a minute, ten thousand in turn, two hundred and fifty kills, hundreds of bits changed in files, a hundred killed clients, hundreds of failures of the network: what a server bears (some minutes)"
 	@echo "make fuzz    any text as netlist, any bytes as layout, as messages to a server and as snapshots, ten minutes each (FUZZ_MINUTES)"
 	@echo "make bench   measure (criterion)"
 	@echo "make pictures draw the scenes and the figures of docs/paper.md (docs/pictures)"
@@ -23,7 +23,7 @@ test:
 soak:
 	@scripts/setup build
 	cargo test --release --test service -- --ignored --nocapture --test-threads=1 soak:: cuts::soak cut_sweeps::soak
-	cargo test --release --test cli -- --ignored --nocapture --test-threads=1 kept::soak killed_clients::soak killed_jobs::soak
+	cargo test --release --test cli -- --ignored --nocapture --test-threads=1 damage::soak kept::soak killed_clients::soak killed_jobs::soak
 
 fuzz:
 	@scripts/setup build

@@ -27,6 +27,7 @@ mod noise;
 mod port_kind;
 pub mod ports;
 mod ringing;
+pub mod run;
 mod saved;
 pub mod scale;
 mod seen;

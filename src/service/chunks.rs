@@ -3,7 +3,7 @@
 use super::convert::analysis::summary_to_wire;
 use super::pace::{CHUNK_BYTES, HEARTBEAT};
 use super::shared::Shared;
-use super::turns::Place;
+use super::turns::{Party, Place};
 use super::{proto, status};
 use crate::analysis::AnalysisError;
 use crate::analysis::mesh::{self, fitted_in_time};
@@ -61,16 +61,33 @@ impl<T> Outlet<T> {
                     () = shared.shutdown.ending.cancelled() => false,
                 }
             });
+        let shared = Arc::clone(shared);
         if let Some(party) = party.filter(|_| self.open) {
-            self.place = self.runtime.block_on(async {
-                tokio::select! {
-                    place = shared.work.again(party) => place,
-                    () = sender.closed() => None,
-                }
-            });
+            self.place_again(party);
         }
         if shared.shutdown.ending.is_cancelled() {
-            let _ = sender.try_send(Err(status::stopping()));
+            let _ = self.sender.try_send(Err(status::stopping()));
+        }
+    }
+
+    fn place_again(&mut self, party: Party) {
+        let (sender, shared) = (&self.sender, &self.shared);
+        self.place = self.runtime.block_on(async {
+            tokio::select! {
+                place = shared.work.again(party) => place,
+                () = sender.closed() => None,
+            }
+        });
+    }
+
+    /// Those who wait for a place have their turn before it goes on.
+    pub(super) fn give_way(&mut self) {
+        if self.shared.work.waiting() > 0
+            && let Some(place) = self.place.take()
+        {
+            let party = place.party();
+            drop(place);
+            self.place_again(party);
         }
     }
 

@@ -142,6 +142,7 @@ impl Inside {
         let stream = runtime.block_on(async {
             match name {
                 "Transient" => calls.transient(decoded(request)?).await.map(as_bytes),
+                "Run" => calls.run(decoded(request)?).await.map(as_bytes),
                 "WatchJob" => calls.watch_job(decoded(request)?).await.map(as_bytes),
                 "FetchJob" => calls.fetch_job(decoded(request)?).await.map(as_bytes),
                 "WatchSweep" => calls.watch_sweep(decoded(request)?).await.map(as_bytes),

@@ -6,7 +6,7 @@ use std::time::{Duration, SystemTime};
 use tonic::Code;
 
 /// Calls that are counted by name; the last stands for all others.
-const CALLS: [&str; 33] = [
+const CALLS: [&str; 34] = [
     "Info",
     "Check",
     "Convert",
@@ -14,6 +14,7 @@ const CALLS: [&str; 33] = [
     "Describe",
     "Open",
     "Trial",
+    "Run",
     "Linearize",
     "Snapshot",
     "Restore",

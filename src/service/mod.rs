@@ -8,7 +8,7 @@
 //! a session that it has `joined`, [`inside`] is all of it without a network,
 //! `models`, `sessions` and `jobs` keep what clients can name, under `ids` that nobody guesses; a `session` answers each `question`, has its `usage` and its
 //! `spectra`, `snapshots` puts it into bytes, `store` and `keeper` hold what outlives the server, on a `disk`, which `waking` goes on with and
-//! [`survey`] looks at, `work` computes, in the `turns` of clients, `chunks` sends what is long, `status` says what went wrong, [`log`]
+//! [`survey`] looks at, `work` computes, in the `turns` of clients, `chunks` sends what is long, `runs` takes many steps in one call, `status` says what went wrong, [`log`]
 //! says it without waiting, [`limits`] is what clients may ask for, and [`settings`] all
 //! that a server is told, in whichever way it is [`written`].
 
@@ -79,6 +79,8 @@ mod restored;
 mod room;
 #[cfg(feature = "server")]
 mod rpc;
+#[cfg(feature = "server")]
+mod runs;
 #[cfg(feature = "server")]
 pub mod server;
 #[cfg(feature = "server")]

@@ -6,6 +6,7 @@ use super::convert::{self, model as text, options as options_wire};
 use super::jobs::{JobStream, RowStream, SweepStream, TableStream};
 use super::models::check_size;
 use super::question::Question;
+use super::runs::RunStream;
 use super::shared::{Calls, Reply};
 use super::stream::TrialStream;
 use super::{proto, status};
@@ -94,6 +95,12 @@ impl proto::bimorph_server::Bimorph for Calls {
 
     async fn trial(&self, request: Request<Streaming<proto::DeviceRequest>>) -> Reply<TrialStream> {
         Ok(Response::new(TrialStream::new(Arc::clone(&self.0), request.into_inner())))
+    }
+
+    type RunStream = RunStream;
+
+    async fn run(&self, request: Request<proto::RunRequest>) -> Reply<RunStream> {
+        self.ran(request.into_inner()).await
     }
 
     async fn linearize(&self, request: Request<proto::LinearizeRequest>) -> Reply<proto::LinearizeResponse> {

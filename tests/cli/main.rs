@@ -5,9 +5,11 @@ mod batch;
 mod bench;
 mod chart;
 mod configuration;
+mod damage;
 mod errors;
 mod export;
 #[cfg(target_os = "linux")]
+mod forged;
 mod full;
 mod health;
 mod jobs;

@@ -28,6 +28,7 @@ mod quotas;
 mod random;
 mod refusals;
 mod running;
+mod runs;
 mod same_bits;
 mod slow_readers;
 mod snapshots;

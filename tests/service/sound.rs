@@ -1,6 +1,7 @@
 //! A sound message of every call.
 
 use super::running::wire_bundle;
+use bimorph::service::convert::run::pack;
 use bimorph::service::proto;
 use prost::Message;
 use proto::device_request::Kind;
@@ -90,6 +91,17 @@ fn of_sessions(model: &dyn Fn() -> String, session: &str, snapshot: &[u8]) -> Ve
             "Linearize",
             proto::LinearizeRequest { session: session.clone(), token: 1, omega: vec![1e5, 1e6], noise: true }
                 .encode_to_vec(),
+        ),
+        (
+            "Run",
+            proto::RunRequest {
+                lanes: vec![proto::RunLane { session: session.clone(), start: pack(&[0.0]), ..Default::default() }],
+                times: pack(&[1e-7, 2e-7]),
+                values: pack(&[1.0]),
+                signals: vec!["m.x".into()],
+                ports: true,
+            }
+            .encode_to_vec(),
         ),
         ("Snapshot", proto::SnapshotRequest { session: session.clone(), token: 0 }.encode_to_vec()),
         ("Restore", proto::RestoreRequest { model: model(), snapshot: snapshot.to_vec() }.encode_to_vec()),

@@ -235,22 +235,20 @@ fn head(name: &str) -> io::Result<Vec<u8>> {
 }
 
 /// Reads a journal. A line that is cut off at its end is as if it had never been, and so is a first line that a disk made room for and did not
-/// fill before the power went.
+/// fill before the power went. A first line of which one byte is damaged is still that of its sweep: names have 32 digits.
 fn read(path: &Path, name: &str, bytes: &[u8]) -> Result<Lines, JournalError> {
+    let own = head(name).map_err(|source| JournalError::Io { path: path.to_owned(), source })?;
     let whole = bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |last| last + 1);
-    let mut lines = bytes[..whole].split_inclusive(|byte| *byte == b'\n');
     let mut found = Lines::default();
-    if let Some(line) = lines.next() {
-        let named: Option<Head> = serde_json::from_slice(line).ok();
-        if named.is_none_or(|head| head.sweep != name) {
-            let own = head(name).is_ok_and(|head| {
-                bytes.len() == head.len() && bytes.iter().zip(&head).all(|(byte, own)| [0, *own].contains(byte))
-            });
-            return if own { Ok(found) } else { Err(JournalError::Other { path: path.to_owned() }) };
-        }
-        found.good = whole;
+    let named = bytes.get(..own.len()).is_some_and(|line| line.iter().zip(&own).filter(|(a, b)| a != b).count() <= 1);
+    if !named {
+        let unfilled =
+            || bytes.len() == own.len() && bytes.iter().zip(&own).all(|(byte, own)| [0, *own].contains(byte));
+        return if whole == 0 || unfilled() { Ok(found) } else { Err(JournalError::Other { path: path.to_owned() }) };
     }
-    for line in lines {
+    // the end of the first line may be what is damaged
+    found.good = if whole < own.len() { 0 } else { whole };
+    for line in bytes.get(own.len()..whole).unwrap_or_default().split_inclusive(|byte| *byte == b'\n') {
         match opened(line).and_then(|object| serde_json::from_slice(&object).ok()) {
             Some(kept) => found.known.push(kept),
             None => found.damaged += 1,
@@ -315,8 +313,15 @@ mod tests {
         assert_eq!((points, journal.damaged()), (vec![0, 2, 3, 9], 1));
         drop(journal);
         assert_eq!(std::fs::read(&path).unwrap(), bytes);
-        // and a first line that is damaged is none of this sweep: nothing is removed
-        bytes[3] = 0;
+        // a first line of which one byte is damaged, its end among them, costs nothing
+        for at in [3, ends[0] - 1] {
+            let mut bytes = whole.clone();
+            bytes[at] ^= 1;
+            std::fs::write(&path, &bytes).unwrap();
+            assert_eq!(Journal::open(&path, "sweep", true).unwrap().1.len(), 5, "{at}");
+        }
+        // one that is damaged further is none of this sweep, and nothing is removed
+        (bytes[3], bytes[7]) = (0, 0);
         std::fs::write(&path, &bytes).unwrap();
         assert!(matches!(Journal::open(&path, "sweep", true), Err(JournalError::Other { .. })));
         assert_eq!(std::fs::read(&path).unwrap(), bytes);

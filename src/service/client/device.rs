@@ -38,8 +38,8 @@ pub struct RemoteDevice {
     /// What the server warned of when it compiled the model.
     warnings: Vec<Diagnostic>,
     /// Declared before `link`: a stream is let go before the runtime that drives it.
-    stream: Option<Stream>,
-    link: Option<Link>,
+    pub(super) stream: Option<Stream>,
+    pub(super) link: Option<Link>,
     /// Why the link was lost, for calls that come after.
     lost: Option<String>,
     /// What it was opened with.
@@ -185,7 +185,7 @@ impl RemoteDevice {
         let ReplyKind::Opened(opened) = self.send(open_request(&self.model, &self.asked)).ok()? else { return None };
         let device = opened.device.unwrap_or_default();
         verified::opened(&self.asked, &device).ok()?;
-        self.stream.as_mut()?.open(&device);
+        self.stream.as_mut()?.open(&opened.session, &device);
         for trial in way {
             self.send(RequestKind::Trial(trial)).ok().filter(|reply| matches!(reply, ReplyKind::Trial(_)))?;
         }
@@ -193,7 +193,7 @@ impl RemoteDevice {
     }
 
     /// A call begins, which ends within the deadline whatever it takes.
-    fn begin(&mut self) {
+    pub(super) fn begin(&mut self) {
         self.until = Instant::now() + self.deadline;
         self.link.iter().for_each(|link| link.end_by(self.until));
     }
@@ -203,7 +203,7 @@ impl RemoteDevice {
         found.map_err(|what| self.lose(&unexpected(&what)))
     }
 
-    fn shape(&self) -> (usize, usize) {
+    pub(super) fn shape(&self) -> (usize, usize) {
         self.stream.as_ref().map_or((0, 0), Stream::shape)
     }
 
@@ -224,7 +224,7 @@ impl RemoteDevice {
     }
 
     /// The error of a device that is not open: never opened, or lost since.
-    fn closed(&self) -> DeviceError {
+    pub(super) fn closed(&self) -> DeviceError {
         match &self.lost {
             Some(reason) => self.remote(format!("{reason} (the device must be opened again)")),
             None => DeviceError::NotOpen,
@@ -232,7 +232,7 @@ impl RemoteDevice {
     }
 
     /// Lets go of a link whose replies can no longer be matched with requests.
-    fn lose(&mut self, status: &Status) -> DeviceError {
+    pub(super) fn lose(&mut self, status: &Status) -> DeviceError {
         self.stream = None;
         self.link = None;
         let reason = reason(status);
@@ -240,7 +240,7 @@ impl RemoteDevice {
         self.remote(reason)
     }
 
-    fn remote(&self, reason: String) -> DeviceError {
+    pub(super) fn remote(&self, reason: String) -> DeviceError {
         DeviceError::Remote { address: self.address.clone(), reason }
     }
 
@@ -285,7 +285,7 @@ impl Device for RemoteDevice {
                 let device = opened.device.unwrap_or_default();
                 self.checked(verified::opened(request, &device))?;
                 self.lost = None;
-                self.stream.iter_mut().for_each(|stream| stream.open(&device));
+                self.stream.iter_mut().for_each(|stream| stream.open(&opened.session, &device));
                 Ok(wire::description_from_wire(device))
             }
             ReplyKind::Fault(fault) => Err(self.fault(fault)),

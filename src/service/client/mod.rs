@@ -14,6 +14,7 @@ mod link;
 mod order;
 mod persistence;
 mod replay;
+mod runs;
 #[cfg(feature = "tls")]
 mod secure;
 mod sweeps;

@@ -20,16 +20,19 @@ pub(super) struct Stream {
     /// Ports and signals of the device; none: it is not open.
     shape: Option<(usize, usize)>,
     pub(super) order: Order,
+    /// Id of the session that is open; empty: none.
+    pub(super) session: String,
 }
 
 impl Stream {
     /// One on which nothing is open yet.
     pub(super) fn new(requests: mpsc::Sender<proto::DeviceRequest>, replies: Streaming<proto::DeviceReply>) -> Self {
-        Self { requests, replies, shape: None, order: Order::default() }
+        Self { requests, replies, shape: None, order: Order::default(), session: String::new() }
     }
 
     /// A device was opened on it.
-    pub(super) fn open(&mut self, device: &proto::DeviceDescription) {
+    pub(super) fn open(&mut self, session: &str, device: &proto::DeviceDescription) {
+        session.clone_into(&mut self.session);
         self.shape = Some((device.ports.len(), device.signals.len()));
         self.order = Order::default();
     }

@@ -61,7 +61,7 @@ fn name(what: &str, name: &str) -> Result<(), String> {
     if bad { Err(format!("{what}: expected a name, got \"{}\"", text(name))) } else { Ok(()) }
 }
 
-fn length(what: &str, got: usize, expected: usize) -> Result<(), String> {
+pub(super) fn length(what: &str, got: usize, expected: usize) -> Result<(), String> {
     if got == expected { Ok(()) } else { Err(format!("{what}: expected {expected} numbers, got {got}")) }
 }
 

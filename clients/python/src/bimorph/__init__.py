@@ -9,6 +9,7 @@ import importlib.metadata
 
 from . import aio
 from .aloud import AccuracyWarning, NetlistWarning
+from .batch import Batch, BatchRun, Failure
 from .client import Client, local
 from .conversion import Conversion, LayoutWarning, Piece
 from .errors import (
@@ -40,6 +41,7 @@ from .results import (
     Statistics,
     TransientResult,
 )
+from .runs import Run, RunFailed
 from .server import Server, serve
 from .session import Session
 from .sweep import LogNormal, Modes, Normal, PullIn, Samples, Static, Transient, Uniform
@@ -51,11 +53,14 @@ from .trial_reply import TrialReply
 
 __all__ = [
     "AccuracyWarning",
+    "Batch",
+    "BatchRun",
     "BimorphError",
     "Client",
     "ColumnStatistics",
     "Conversion",
     "Diagnostic",
+    "Failure",
     "Fraction",
     "FrequencyResponse",
     "Histogram",
@@ -82,6 +87,8 @@ __all__ = [
     "Refused",
     "Root",
     "Row",
+    "Run",
+    "RunFailed",
     "Samples",
     "Server",
     "Session",

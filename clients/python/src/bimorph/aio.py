@@ -184,6 +184,7 @@ class Session(_Block[_session.Session]):
     accept = _awaited(_session.Session.accept)
     operating_point = _awaited(_session.Session.operating_point)
     step = _awaited(_session.Session.step)
+    run = _awaited(_session.Session.run)
     linearize = _awaited(_session.Session.linearize)
     noise = _awaited(_session.Session.noise)
     snapshot = _awaited(_session.Session.snapshot)

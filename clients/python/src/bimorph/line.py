@@ -27,6 +27,10 @@ _LOOK = 0.2
 """While a call waits, it looks this often whether the stream is over [s]."""
 
 
+_UNEXPECTED = "unexpected reply: "
+"""What the module says of a reply that it did not expect begins so."""
+
+
 class Line:
     """A Trial stream of its own.
 
@@ -163,6 +167,8 @@ class NativeLine:
             return call()
         except self._refusal as error:
             code, text, details = error.args
+        if text.startswith(_UNEXPECTED):
+            raise UnexpectedReply(f"server {self._address}: {text}")
         raise from_status(code, text, details, self._address)
 
 

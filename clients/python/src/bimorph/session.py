@@ -16,6 +16,7 @@ from .channel import Channel
 from .errors import BimorphError, InvalidRequest, NotFound, StepFailed, from_fault, shown
 from .naming import by_argument
 from .results import NodeMotion
+from .runs import Runs
 from .stopping import apart, check
 from .ticket import Snapshot, Ticket
 from .trial_reply import TrialReply
@@ -28,7 +29,7 @@ _PIECES = 4
 """After so many pieces of a step the server is told that the state before it is in use: of a large model it may hold no more than eight."""
 
 
-class Session:
+class Session(Runs):
     """A device with states of its own. Make one with :meth:`Model.session`, use it in a ``with`` block.
 
     A trial is a pure function of its parent state, its step and its voltages: trying leaves no trace, and the same trial

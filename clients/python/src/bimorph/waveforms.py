@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .arguments import integer, mapping, number, text, wrong_type
-from .errors import InvalidRequest
+from .errors import InvalidRequest, StepFailed
 from .results import TransientResult
+from .runs import Lane, advance, port_values
 from .session import Session
 
 Waveform = tuple[ArrayLike, ArrayLike]
@@ -79,22 +80,21 @@ def drive(
     corners = [t[(t > 0.0) & (t < stop)] for t, _ in waves.values()]
     times = _apart(np.concatenate([output, *corners]), stop)
 
-    def at(t: float) -> dict[str, float]:
-        return {port: float(np.interp(t, *wave)) for port, wave in waves.items()}
-
-    reply = session.operating_point(at(times[0]))
-    columns: dict[str, list[float]] = {name: [reply.outputs[name]] for name in session.signals}
-    wanted, now = 1, float(times[0])
-    for t in times[1:]:
-        reply = session.step(at(t), dt=float(t - now))
-        now = float(t)
-        if wanted < points and output[wanted] <= t:
-            for name, column in columns.items():
-                column.append(reply.outputs[name])
-            wanted += 1
-            if progress is not None:
-                progress(now / stop)
-    signals = {name: np.array(column) for name, column in columns.items()}
+    start = {port: float(np.interp(times[0], *wave)) for port, wave in waves.items()}
+    opening = session.operating_point(start)
+    later = times[1:]
+    values = port_values(session, {port: np.interp(later, *wave) for port, wave in waves.items()}, len(later))
+    names = list(session.signals)
+    lane = Lane.of(session, values, len(later), len(names), ports=False)
+    advance([lane], later, names, ports=False, progress=progress)
+    if lane.error:
+        at = float(later[lane.done])
+        raise StepFailed(f"step {lane.done}, to t = {at:.6g} s: {lane.error}")
+    # steps that end at corners alone are left out
+    wanted = np.searchsorted(later, output[1:])
+    signals = {
+        name: np.concatenate([[opening.outputs[name]], lane.outputs[wanted, k]]) for k, name in enumerate(names)
+    }
     return TransientResult(output, signals, dict(session.signals), len(times) - 1, 0, session.unknowns)
 
 

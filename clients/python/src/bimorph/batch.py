@@ -1,0 +1,229 @@
+"""Sessions that are stepped together, as arrays: copies of one model, or variants."""
+
+from __future__ import annotations
+
+import contextlib
+import contextvars
+from collections.abc import Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .arguments import MAX_STEP, instance, items, mapping, number
+from .errors import InvalidRequest
+from .model import Model
+from .runs import Array, Given, Lane, advance, checked_signals, checked_times, numbers, port_values, workers
+from .session import Session
+from .stopping import Stopping, current
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Where a session of a batch has stopped."""
+
+    index: int
+    """Number of the step that it could not take, from 0."""
+    t: float
+    """Time at its end [s]."""
+    reason: str
+    """Why."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class BatchRun:
+    """The steps that a batch took: a row for each session, a column for each time."""
+
+    t: Array
+    """Times at the ends of the steps [s] (n)."""
+    signals: dict[str, Array]
+    """Each signal, in its unit (sessions×n); NaN where a session did not come."""
+    units: dict[str, str]
+    """Unit of each signal."""
+    currents: dict[str, Array]
+    """Current into each port [A], or what ports of other kinds answer (sessions×n)."""
+    charges: dict[str, Array]
+    """Charge on each port [C] (sessions×n)."""
+    failures: dict[int, Failure]
+    """By session, where it has stopped before the last time."""
+
+    def __repr__(self) -> str:
+        lost = f", {len(self.failures)} stopped early" if self.failures else ""
+        rows = len(next(iter((self.currents or self.signals).values()), ()))
+        return f"<BatchRun of {rows} sessions, {len(self.t)} steps: {', '.join(self.signals) or 'no signals'}{lost}>"
+
+
+class Batch:
+    """Sessions with the same ports and signals, stepped together; use it in a ``with`` block, which closes them.
+
+    One call takes the steps of all of them: in this process on every core, on a server in few requests. Each has the bits that it has
+    alone.
+    """
+
+    def __init__(self, sessions: Sequence[Session]) -> None:
+        self.sessions: tuple[Session, ...] = tuple(items("sessions", sessions, "a list of sessions"))
+        """In the order of the rows of every result."""
+        if not self.sessions:
+            raise InvalidRequest("sessions: expected at least one")
+        for k, session in enumerate(self.sessions):
+            instance(f"sessions[{k}]", session, Session, "a Session")
+        first = self.sessions[0]
+        for k, session in enumerate(self.sessions):
+            if session.ports != first.ports or session.signals != first.signals:
+                raise InvalidRequest(f"sessions[{k}]: expected ports {list(first.ports)} and signals {list(first.signals)}, as the first has")
+            if session._channel.address != first._channel.address:
+                raise InvalidRequest(f"sessions[{k}]: expected one on {first._channel.address}, as the first is")
+            if session in self.sessions[:k]:
+                raise InvalidRequest(f"sessions[{k}]: a session is there twice")
+        self._pool: ThreadPoolExecutor | None = None
+
+    @classmethod
+    def of(cls, models: Sequence[Model], signals: Sequence[str] = (), ports: Sequence[str] = (), timeout: float = 60.0) -> Batch:
+        """Opens a session of each model: variants, or one model several times. Arguments as of :meth:`Model.session`."""
+        sessions: list[Session] = []
+        try:
+            for k, model in enumerate(items("models", models, "a list of models")):
+                instance(f"models[{k}]", model, Model, "a Model")
+                sessions.append(model.session(signals, ports, timeout))
+            return cls(sessions)
+        except BaseException:
+            for session in sessions:
+                session.close()
+            raise
+
+    def __len__(self) -> int:
+        return len(self.sessions)
+
+    @property
+    def ports(self) -> tuple[str, ...]:
+        """Ports of each session."""
+        return self.sessions[0].ports
+
+    @property
+    def signals(self) -> dict[str, str]:
+        """Opened signals of each session, and their units."""
+        return self.sessions[0].signals
+
+    @property
+    def t(self) -> Array:
+        """Time of each session [s]."""
+        return np.array([session.t for session in self.sessions])
+
+    def operating_point(self, voltages: Given) -> None:
+        """Static equilibrium of each session at these port voltages [V], at t = 0: a number for all, or one for each session."""
+        count = len(self.sessions)
+        held = {}
+        for port, value in mapping("voltages", voltages, 'names of ports with their volts, as {"drive": 3.0}').items():
+            held[port] = numbers(f"voltages[{port!r}]", value)
+            if held[port].shape not in ((), (count,)):
+                raise InvalidRequest(f"voltages[{port!r}]: expected a number, or one for each of {count} sessions, got shape {held[port].shape}")
+        for k, session in enumerate(self.sessions):
+            session.operating_point({port: float(value if value.ndim == 0 else value[k]) for port, value in held.items()})
+
+    def run(self, times: ArrayLike, voltages: Given, signals: Sequence[str] | None = None) -> BatchRun:
+        """Steps every session to each of these times [s] in turn. ``voltages`` are for each port a number, one for each time, or an array of a
+        row for each session. A session that cannot take a step stops there, and the others go on.
+        """
+        count = len(self.sessions)
+        t = checked_times(times, float(self.t.max()))
+        wanted = checked_signals(signals, self.signals)
+        mapping("voltages", voltages, 'names of ports with their volts, as {"drive": 3.0}')
+        varied = any(np.ndim(value) == 2 for value in voltages.values())
+        alike = not varied and all(session._voltages == self.sessions[0]._voltages for session in self.sessions)
+        shared = port_values(self.sessions[0], voltages, len(t)) if alike else None
+        lanes = [
+            Lane.of(
+                session,
+                shared if shared is not None else port_values(session, voltages, len(t), k, count),
+                len(t),
+                len(wanted),
+                True,
+            )
+            for k, session in enumerate(self.sessions)
+        ]
+        with contextlib.ExitStack() as locks:
+            for session in self.sessions:
+                locks.enter_context(session._lock)
+            self._advance(lanes, t, wanted)
+        return _gathered(lanes, t, wanted)
+
+    def step(self, voltages: Given, dt: float) -> BatchRun:
+        """One step of each session by ``dt`` [s], from their common time: :meth:`run` to a single time."""
+        dt = number("dt", dt, "a time in seconds", above=0.0, most=MAX_STEP)
+        now = self.t
+        if (now != now[0]).any():
+            raise InvalidRequest("the sessions stand at different times: run them to one time first")
+        count = len(self.sessions)
+        mapping("voltages", voltages, 'names of ports with their volts, as {"drive": 3.0}')
+        spread = {p: np.reshape(v, (count, 1)) if np.shape(v) == (count,) else v for p, v in voltages.items()}
+        return self.run([float(now[0]) + dt], spread)
+
+    def _advance(self, lanes: list[Lane], t: Array, wanted: list[str]) -> None:
+        channel = self.sessions[0]._channel
+        parts = workers(channel, len(lanes))
+        if parts == 1:
+            advance(lanes, t, wanted, True)
+            return
+        if self._pool is None:
+            self._pool = ThreadPoolExecutor(parts, thread_name_prefix="bimorph-batch")
+        outer, own = current.get(), [Stopping() for _ in range(parts)]
+
+        def stop() -> None:
+            for stopping in own:
+                stopping.stop()
+
+        if outer is not None:
+            outer.begun(stop)
+        ends = np.linspace(0, len(lanes), parts + 1).astype(int).tolist()
+
+        def part(k: int) -> None:
+            current.set(own[k])
+            advance(lanes[ends[k] : ends[k + 1]], t, wanted, True)
+
+        jobs: list[Future[Any]] = [self._pool.submit(contextvars.copy_context().run, part, k) for k in range(parts)]
+        try:
+            for job in jobs:
+                job.result()
+        except BaseException:
+            stop()
+            for job in jobs:
+                job.cancel()
+                with contextlib.suppress(BaseException):
+                    job.result()
+            raise
+
+    def close(self) -> None:
+        """Closes every session."""
+        for session in self.sessions:
+            session.close()
+        if self._pool is not None:
+            self._pool.shutdown()
+            self._pool = None
+
+    def __enter__(self) -> Batch:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self.close()
+
+
+def _gathered(lanes: Sequence[Lane], t: Array, wanted: Sequence[str]) -> BatchRun:
+    for lane in lanes:
+        for rows in (lane.outputs, lane.currents, lane.charges):
+            rows[lane.done :] = np.nan
+    session = lanes[0].session
+
+    def columns(names: Sequence[str], rows: list[Array]) -> dict[str, Array]:
+        return {name: np.stack([lane[:, k] for lane in rows]) for k, name in enumerate(names)}
+
+    return BatchRun(
+        t,
+        columns(wanted, [lane.outputs for lane in lanes]),
+        {name: session.signals[name] for name in wanted},
+        columns(session.ports, [lane.currents for lane in lanes]),
+        columns(session.ports, [lane.charges for lane in lanes]),
+        {k: Failure(lane.done, float(t[lane.done]), lane.error) for k, lane in enumerate(lanes) if lane.error},
+    )

@@ -1,0 +1,393 @@
+"""Many steps in one call: of one session, and of many that are stepped along the same times."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import os
+import threading
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import showing
+from .arguments import mapping, names, one_of, wrong_type
+from .channel import Channel
+from .errors import BimorphError, InvalidRequest, NotFound, StepFailed, Unavailable, shown
+from .local import ADDRESS
+from .stopping import Stopping, check, current
+from .v1 import device_pb2, run_pb2
+
+if TYPE_CHECKING:
+    import pandas
+
+    from .session import Session
+
+Array = NDArray[np.float64]
+Given = Mapping[str, "ArrayLike"]
+"""What the ports are given [V, or the unit of the port's kind], by name: a number, or one for each time."""
+
+_PART = 1 << 20
+"""Most port values of one request: longer runs are made of several."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Run:
+    """The steps of a session that one call took."""
+
+    t: Array
+    """Times at the ends of the steps [s]."""
+    signals: dict[str, Array]
+    """Each signal after each step, in its unit."""
+    units: dict[str, str]
+    """Unit of each signal."""
+    currents: dict[str, Array]
+    """Current into each port after each step [A], or what ports of other kinds answer."""
+    charges: dict[str, Array]
+    """Charge on each port after each step [C]."""
+    trials: int
+    """Trials that the steps took: a device may ask for shorter ones."""
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def __repr__(self) -> str:
+        return f"<Run of {len(self.t)} steps: {', '.join(self.signals) or 'no signals'}>"
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """A column for each signal, by time [s]."""
+        return showing.frame(self.signals, ("t", self.t))
+
+
+class RunFailed(StepFailed):
+    """A step of a run that the device cannot take. The session stands at the end of the step before."""
+
+    def __init__(self, message: str, index: int, t: float, run: Run) -> None:
+        super().__init__(message)
+        self.index = index
+        """Number of the step, from 0."""
+        self.t = t
+        """Time at its end [s]."""
+        self.run = run
+        """The steps before it."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return (type(self), (str(self), self.index, self.t, self.run))
+
+
+@dataclass(eq=False)
+class Lane:
+    """A session on its way along the times of a run."""
+
+    session: Session
+    values: Array
+    """Port values at each time (n×p), or one row for all."""
+    outputs: Array
+    currents: Array
+    charges: Array
+    done: int = 0
+    """Steps that are there."""
+    trials: int = 0
+    error: str = ""
+    """Why the next step has no answer; empty: it has."""
+    last: Any = field(default=None)
+    """The reply to the last step, as it travels."""
+
+    @classmethod
+    def of(cls, session: Session, values: Array, steps: int, signals: int, ports: bool) -> Lane:
+        """At its start."""
+        width = len(session.ports) if ports else 0
+        return cls(session, values, np.empty((steps, signals)), np.empty((steps, width)), np.empty((steps, width)))
+
+    def settle(self, times: Array) -> None:
+        """The session goes on from the last step."""
+        if self.last is None:
+            return
+        row = self.values[min(self.done, len(self.values)) - 1].tolist()
+        reply = self.session._named(self.last, float(times[self.done - 1]), row)
+        self.session._accept(reply, dict(reply.voltages))
+
+
+class Runs:
+    """What a session has of runs."""
+
+    def run(self: Any, times: ArrayLike, voltages: Given, signals: Sequence[str] | None = None) -> Run:
+        """Steps to each of these times [s] in turn, in one call: ``voltages`` are a number for each port, or one for each time; ports that
+        are not named keep what they have. Between two times they go linearly, as in :meth:`step`, and the results have its bits.
+
+        ``signals`` are those wanted of the opened ones, by default all. A run is taken as a whole: interrupted, it leaves the session
+        where it was (one of more than a million port values: at the end of a part of it).
+
+        Raises :class:`RunFailed` for a step that the device cannot take; its ``run`` has the steps before, after which the session stands.
+        """
+        with self._lock:
+            t = checked_times(times, self.t)
+            wanted = checked_signals(signals, self.signals)
+            lane = Lane.of(self, port_values(self, voltages, len(t)), len(t), len(wanted), True)
+            advance([lane], t, wanted, True)
+            return finished(lane, t, wanted)
+
+
+def finished(lane: Lane, times: Array, wanted: Sequence[str]) -> Run:
+    """What a lane has come to.
+
+    Raises :class:`RunFailed`.
+    """
+    n, session = lane.done, lane.session
+
+    def columns(names: Iterable[str], rows: Array) -> dict[str, Array]:
+        return dict(zip(names, np.ascontiguousarray(rows[:n].T)))
+
+    currents, charges = columns(session.ports, lane.currents), columns(session.ports, lane.charges)
+    units = {name: session.signals[name] for name in wanted}
+    run = Run(times[:n], columns(wanted, lane.outputs), units, currents, charges, lane.trials)
+    if lane.error:
+        at = float(times[n])
+        raise RunFailed(f"step {n}, to t = {at:.6g} s: {lane.error}", n, at, run)
+    return run
+
+
+def advance(
+    lanes: Sequence[Lane],
+    times: Array,
+    signals: Sequence[str],
+    ports: bool,
+    progress: Callable[[float], object] | None = None,
+) -> None:
+    """Runs sessions of one channel along the same times, and lets each go on from its last step. Each lane has its results."""
+    width = max((len(lane.session.ports) for lane in lanes), default=1) * len(lanes)
+    part = max(_PART // max(width, 1), 1)
+    for first in range(0, len(times), part):
+        check()
+        here = [lane for lane in lanes if not lane.error]
+        if not here:
+            return
+        for lane in here:
+            lane.session._own()
+        _advance(here, times, slice(first, first + part), signals, ports, progress)
+        for lane in here:
+            lane.settle(times)
+
+
+def _advance(
+    lanes: Sequence[Lane],
+    times: Array,
+    part: slice,
+    signals: Sequence[str],
+    ports: bool,
+    progress: Callable[[float], object] | None,
+) -> None:
+    channel: Channel = lanes[0].session._channel
+    here = times[part]
+    request = run_pb2.RunRequest(times=_packed(here), signals=signals, ports=ports)
+    shared = lanes[0].values if all(lane.values is lanes[0].values for lane in lanes) else None
+    if shared is not None:
+        request.values = _packed(shared if len(shared) == 1 else shared[part])
+    for lane in lanes:
+        session = lane.session
+        start = np.array([session._voltages[port] for port in session.ports], dtype=np.float64)
+        request.lanes.add(
+            session=session._session,
+            parent=session.accepted.token if session.accepted else 0,
+            t=session.t,
+            start=_packed(start),
+            values=b"" if shared is not None else _packed(lane.values if len(lane.values) == 1 else lane.values[part]),
+        )
+        lane.last = None
+    open_lanes = set(range(len(lanes)))
+    with _heard(channel, request, min(lane.session._timeout for lane in lanes)) as events:
+        for event in events:
+            for rows in event.rows:
+                lane = _lane(lanes, rows.lane, open_lanes)
+                _take(lane, rows, here, part.start, len(signals), ports)
+            for end in event.ends:
+                lane = _lane(lanes, end.lane, open_lanes)
+                _end(lane, end, here, part.start)
+                open_lanes.discard(end.lane)
+            if progress is not None:
+                progress((part.start + event.progress * len(here)) / len(times))
+    lanes[0].session._checked.require(not open_lanes, "the stream ended before the run did")
+
+
+def _lane(lanes: Sequence[Lane], number: int, open_lanes: set[int]) -> Lane:
+    lanes[0].session._checked.require(number in open_lanes, f"lane {number} does not run")
+    return lanes[number]
+
+
+def _take(lane: Lane, rows: Any, here: Array, start: int, signals: int, ports: bool) -> None:
+    """Steps that came."""
+    checked, first, count = lane.session._checked, rows.first, rows.count
+    begin = start + first
+    in_order = begin == lane.done and first + count <= len(here)
+    checked.require(in_order, f"rows: expected those from {lane.done - start} on, got {count} from {first}")
+    width = len(lane.session.ports) if ports else 0
+    for what, raw, into, columns in (
+        ("outputs", rows.outputs, lane.outputs, signals),
+        ("currents", rows.currents, lane.currents, width),
+        ("charges", rows.charges, lane.charges, width),
+    ):
+        checked.require(len(raw) == 8 * count * columns, f"{what}: expected {count * columns} numbers, got {len(raw)} bytes")
+        values = np.frombuffer(raw, dtype="<f8")
+        if not np.isfinite(values).all():
+            at = int(np.argmin(np.isfinite(values)))
+            checked.require(False, f"{what}[{at}]: expected a finite number, got {values[at]}")
+        into[begin : begin + count] = values.reshape(count, columns)
+    lane.done += count
+
+
+def _end(lane: Lane, end: Any, here: Array, start: int) -> None:
+    """The end of a lane."""
+    checked, session, came = lane.session._checked, lane.session, lane.done - start
+    whole = end.steps == came and (came == len(here)) == (not end.error)
+    checked.require(whole, f"end: expected that of {came} of {len(here)} steps, got one of {end.steps}")
+    checked.require(end.HasField("last") == (came > 0), "end: expected the reply to the last step")
+    if came > 0:
+        checked.require(end.last.status == device_pb2.TrialReply.STATUS_OK, "end: expected a step that was taken")
+        checked.trial(end.last, len(session.ports), len(session.signals), None)
+        lane.last = end.last
+    lane.trials += end.trials
+    lane.error = shown(end.error)
+
+
+@contextlib.contextmanager
+def _heard(channel: Channel, request: Any, timeout: float) -> Iterator[Iterator[Any]]:
+    """The events of a run, of which one comes within each ``timeout`` [s]; left early, the run is stopped."""
+    outer, own = current.get(), Stopping()
+    if outer is not None:
+        outer.begun(own.stop)
+    silence = _Silence(timeout, own.stop) if timeout < math.inf and channel.address != ADDRESS else None
+    before = current.set(own)
+    try:
+        # what stops it is found when it begins
+        stream = channel.stream("Run", request)
+        try:
+            yield _events(stream, silence)
+        except NotFound:
+            raise
+        except BimorphError as error:
+            if silence is not None and silence.fell:
+                raise Unavailable(f"server {channel.address}: no answer within {timeout} s") from None
+            raise error
+        finally:
+            close = getattr(stream, "close", None)
+            if close is not None:
+                close()
+    finally:
+        current.reset(before)
+        if silence is not None:
+            silence.end()
+
+
+def _events(stream: Iterator[Any], silence: _Silence | None) -> Iterator[Any]:
+    for event in stream:
+        if silence is not None:
+            silence.heard()
+        yield event
+
+
+class _Silence:
+    """Stops a call of which nothing was heard for a while."""
+
+    def __init__(self, timeout: float, stop: Callable[[], object]) -> None:
+        self._timeout, self._stop = timeout, stop
+        self._last = time.monotonic()
+        self._over = threading.Event()
+        self.fell = False
+        """Whether it did."""
+        threading.Thread(target=self._listen, daemon=True).start()
+
+    def heard(self) -> None:
+        self._last = time.monotonic()
+
+    def end(self) -> None:
+        self._over.set()
+
+    def _listen(self) -> None:
+        while not self._over.wait(max(self._last + self._timeout - time.monotonic(), 0.001)):
+            if time.monotonic() - self._last >= self._timeout:
+                self.fell = True
+                self._stop()
+                return
+
+
+def _packed(values: Array) -> bytes:
+    return np.ascontiguousarray(values, dtype="<f8").tobytes()
+
+
+def checked_times(times: ArrayLike, after: float) -> Array:
+    """Times of a run that begins after a time [s].
+
+    Raises :class:`InvalidRequest`.
+    """
+    found = numbers("times", times)
+    if found.ndim != 1 or found.size == 0:
+        raise InvalidRequest(f"times: expected a list of times [s], got an array of shape {found.shape}")
+    if found[0] <= after:
+        raise InvalidRequest(f"times[0]: expected a time after that of the session, {after:g} s, got {found[0]:g} s")
+    late = np.flatnonzero(np.diff(found) <= 0)
+    if late.size:
+        at = int(late[0])
+        raise InvalidRequest(f"times[{at + 1}]: expected ascending times, got {found[at + 1]:g} s after {found[at]:g} s")
+    return found
+
+
+def checked_signals(wanted: Sequence[str] | None, opened: Mapping[str, str]) -> list[str]:
+    """Names of opened signals; all of them where none is wanted by name.
+
+    Raises :class:`InvalidRequest`.
+    """
+    if wanted is None:
+        return list(opened)
+    return [one_of(f"signals[{k}]", name, opened, "signals of the session") for k, name in enumerate(names("signals", wanted))]
+
+
+def numbers(what: str, given: ArrayLike) -> Array:
+    """Finite numbers.
+
+    Raises :class:`InvalidRequest`.
+    """
+    try:
+        raw = np.asarray(given)
+        found = np.asarray(raw, dtype=np.float64) if raw.dtype.kind in "fiu" else None
+    except (TypeError, ValueError):
+        found = None
+    if found is None:
+        raise wrong_type(what, "numbers", given)
+    if not np.isfinite(found).all():
+        raise InvalidRequest(f"{what}: expected finite numbers, got {found[~np.isfinite(found)][0]}")
+    return found
+
+
+def port_values(session: Any, voltages: Given, steps: int, lane: int | None = None, lanes: int = 1) -> Array:
+    """Port values of a session at each time, or one row where none changes. Of one of several lanes an array may have a row for each."""
+    mapping("voltages", voltages, 'names of ports with their volts, as {"drive": 3.0}')
+    unknown = [name for name in voltages if name not in session.ports]
+    if unknown:
+        raise InvalidRequest(f"voltages: no port named {unknown[0]!r}; the session has {', '.join(session.ports) or 'none'}")
+    columns: list[Array] = []
+    for port in session.ports:
+        given = numbers(f"voltages[{port!r}]", voltages.get(port, session._voltages[port]))
+        if lane is not None and given.ndim == 2 and given.shape[0] == lanes:
+            given = given[lane]
+        if given.ndim == 0 or given.shape == (1,):
+            columns.append(given.reshape(1))
+        elif given.shape == (steps,):
+            columns.append(given)
+        else:
+            of_lanes = "" if lane is None else f", or an array of {lanes} rows"
+            raise InvalidRequest(
+                f"voltages[{port!r}]: expected a number, or one for each of {steps} times{of_lanes}, got an array of shape {given.shape}"
+            )
+    rows = max((len(column) for column in columns), default=1)
+    return np.column_stack([np.broadcast_to(column, rows) for column in columns]) if columns else np.empty((1, 0))
+
+
+def workers(channel: Channel, lanes: int) -> int:
+    """Calls among which lanes are divided: in this process as many as it has cores, on a server few, as it has other clients."""
+    cores = os.process_cpu_count() if hasattr(os, "process_cpu_count") else os.cpu_count()
+    most = (cores or 1) if channel.address == ADDRESS else min(cores or 1, 4)
+    return max(min(most, lanes), 1)

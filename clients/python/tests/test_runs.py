@@ -1,0 +1,216 @@
+"""Many steps in one call: the bits of the same steps one by one, and errors that name the step."""
+
+from __future__ import annotations
+
+import importlib.util
+import pickle
+import signal
+import threading
+import time
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import PLATE
+
+import bimorph
+
+HERE = importlib.util.find_spec("bimorph._native") is not None
+
+
+@pytest.fixture(params=["server", pytest.param("here", marks=pytest.mark.skipif(not HERE, reason="no models in process"))])
+def model(request: pytest.FixtureRequest, plate: bimorph.Model) -> bimorph.Model:
+    """The plate, on a server and in this process."""
+    return plate if request.param == "server" else bimorph.local().compile(bimorph.Netlist.text(PLATE, "plate.net"))
+
+
+def course(steps: int) -> tuple[Any, Any]:
+    """Times and voltages with jumps beyond pull-in and long steps, so that the device asks for pieces."""
+    lengths = np.where(np.arange(steps) % 50 == 49, 1e-4, 2e-6)
+    return np.cumsum(lengths), np.array([1.0, 5.5, 3.0, 0.0])[np.arange(steps) // 3 % 4]
+
+
+def one_by_one(model: bimorph.Model, times: Any, volts: Any, start: float = 1.0) -> list[bimorph.TrialReply]:
+    """The same steps by :meth:`Session.step`."""
+    with model.session(["m.x", "m.vx"]) as session:
+        session.operating_point({"drive": start})
+        return [session.step({"drive": v}, dt) for v, dt in zip(volts, np.diff(times, prepend=0.0))]
+
+
+def test_a_run_has_the_bits_of_its_steps(model: bimorph.Model) -> None:
+    """Signals, currents, charges and the whole last reply; the session goes on from there with the same bits. Signals may be left out."""
+    times, volts = course(300)
+    replies = one_by_one(model, times, volts)
+    with model.session(["m.x", "m.vx"]) as session:
+        session.operating_point({"drive": 1.0})
+        run = session.run(times, {"drive": volts})
+        assert run.t.tolist() == times.tolist()
+        assert run.units == {"m.x": "m", "m.vx": "m/s"}
+        for name in ("m.x", "m.vx"):
+            assert run.signals[name].tolist() == [reply.outputs[name] for reply in replies]
+        assert run.charges["drive"].tolist() == [reply.charges["drive"] for reply in replies]
+        assert run.currents["drive"].tolist() == [reply.currents["drive"] for reply in replies]
+        assert run.trials > 300, "no step was taken in pieces"
+        assert session.accepted is not None
+        last = replies[-1]
+        assert (session.accepted.token, session.accepted.dq_dv) == (last.token, last.dq_dv)
+        assert session.t == session.accepted.t == times[-1]
+        after = session.step({"drive": 2.0}, 1e-6)
+    with model.session(["m.x", "m.vx"]) as session:
+        session.operating_point({"drive": 1.0})
+        halves = [session.run(times[:100], {"drive": volts[:100]}, ["m.vx"]), session.run(times[100:], {"drive": volts[100:]}, ["m.vx"])]
+        assert np.concatenate([half.signals["m.vx"] for half in halves]).tolist() == run.signals["m.vx"].tolist()
+        assert list(halves[0].signals) == ["m.vx"]
+        assert session.step({"drive": 2.0}, 1e-6) == after
+
+
+def test_a_constant_voltage_and_parts(model: bimorph.Model, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A number holds for all times, ports that are not named keep theirs, and a run of several requests is the same."""
+    times = 1e-6 * np.arange(1, 101)
+    expected = [reply.outputs["m.x"] for reply in one_by_one(model, times, [2.0] * 100, 2.0)]
+    monkeypatch.setattr("bimorph.runs._PART", 7)
+    for voltages in ({"drive": 2.0}, {}, {"drive": np.full(100, 2.0)}):
+        with model.session(["m.x"]) as session:
+            session.operating_point({"drive": 2.0})
+            assert session.run(times, voltages).signals["m.x"].tolist() == expected
+
+
+def test_a_step_that_fails_names_itself(model: bimorph.Model) -> None:
+    """A device that asks for steps without end fails at that step: those before are there, the session stands after them, and goes on. The
+    error travels."""
+    times, volts = 1e-6 * np.arange(1, 11), np.full(10, 2.0)
+    # a jump of this size within 1 fs: pieces below a billionth of the step do not exist
+    times[6:] += 1.0
+    volts[6] = 1e12
+    with model.session(["m.x"]) as session:
+        session.operating_point({"drive": 2.0})
+        with pytest.raises(bimorph.RunFailed, match=r"^step 6, to t = 1") as caught:
+            session.run(times, {"drive": volts})
+        error = caught.value
+        assert (error.index, error.t, len(error.run)) == (6, times[6], 6)
+        assert session.t == times[5]
+        assert session.accepted is not None
+        assert session.accepted.outputs["m.x"] == error.run.signals["m.x"][-1]
+        session.run([session.t + 1e-6], {"drive": 2.0})
+    again = pickle.loads(pickle.dumps(error))
+    assert (str(again), again.index, again.run.t.tolist()) == (str(error), 6, error.run.t.tolist())
+
+
+@pytest.mark.parametrize(
+    ("times", "voltages", "signals", "message"),
+    [
+        ([], {}, None, "times: expected a list of times"),
+        (1e-6, {}, None, "times: expected a list of times"),
+        ([[1e-6]], {}, None, "times: expected a list"),
+        ([0.0, 1e-6], {}, None, r"times\[0\]: expected a time after that of the session, 0 s"),
+        ([1e-6, 1e-6], {}, None, r"times\[1\]: expected ascending"),
+        ([1e-6, float("nan")], {}, None, "times: expected finite"),
+        (["a"], {}, None, "times: expected numbers"),
+        (None, {}, None, "times: expected numbers"),
+        ([1e-6], None, None, "voltages: expected names of ports"),
+        ([1e-6], 3.0, None, "voltages: expected names of ports"),
+        ([1e-6], {"drove": 1.0}, None, "voltages: no port named 'drove'"),
+        ([1e-6], {"drive": None}, None, r"voltages\['drive'\]: expected numbers"),
+        ([1e-6], {"drive": True}, None, r"voltages\['drive'\]: expected numbers"),
+        ([1e-6], {"drive": "3"}, None, r"voltages\['drive'\]: expected numbers"),
+        ([1e-6], {"drive": [1.0, 2.0]}, None, r"voltages\['drive'\]: expected a number, or one for each of 1 times"),
+        ([1e-6], {"drive": float("inf")}, None, r"voltages\['drive'\]: expected finite"),
+        ([1e-6], {}, "m.x", "signals: expected a list of names"),
+        ([1e-6], {}, ["m.y"], r"signals\[0\]: 'm.y' is not among the signals of the session"),
+        ([1e-6], {}, [3], r"signals\[0\]: expected a name"),
+    ],
+)
+def test_what_does_not_fit_is_named(plate: bimorph.Model, times: Any, voltages: Any, signals: Any, message: str) -> None:
+    """Each argument by its name, before anything is computed."""
+    with plate.session(["m.x"]) as session:
+        session.operating_point({"drive": 1.0})
+        with pytest.raises(bimorph.InvalidRequest, match=message):
+            session.run(times, voltages, signals)
+        assert session.t == 0.0
+
+
+def test_ctrl_c_ends_a_run_and_leaves_the_session(model: bimorph.Model) -> None:
+    """A run of minutes is over soon after Ctrl-C; the session stands where it stood, and has the bits of a quiet one."""
+    times, volts = course(300)
+    expected = [reply.outputs["m.x"] for reply in one_by_one(model, times, volts)]
+    with model.session(["m.x"]) as session:
+        session.operating_point({"drive": 1.0})
+        long = 1e-7 * np.arange(1, 1_000_001)
+        timer = threading.Timer(0.3, signal.raise_signal, [signal.SIGINT])
+        timer.start()
+        with pytest.raises(KeyboardInterrupt):
+            for _ in range(100):
+                session.run(long, {"drive": 1.5})
+        left = time.monotonic()
+        assert session.t == 0.0
+        assert session.run(times, {"drive": volts}).signals["m.x"].tolist() == expected
+        assert time.monotonic() - left < 20.0
+
+
+def test_a_batch_has_the_bits_of_its_sessions(model: bimorph.Model) -> None:
+    """Voltages for all, for each session, at each time; a session that fails stops alone."""
+    times, volts = course(60)
+    with bimorph.Batch.of([model] * 5, ["m.x"]) as batch:
+        batch.operating_point({"drive": np.arange(5.0) / 2.0})
+        own = volts + 0.1 * np.arange(5)[:, None]
+        run = batch.run(times, {"drive": own})
+        assert run.signals["m.x"].shape == run.charges["drive"].shape == (5, 60)
+        assert not run.failures
+        more = batch.step({"drive": np.arange(5.0)}, 1e-6)
+        assert more.signals["m.x"].shape == (5, 1)
+    for k in range(5):
+        with model.session(["m.x"]) as session:
+            session.operating_point({"drive": k / 2.0})
+            alone = session.run(times, {"drive": own[k]})
+            assert run.signals["m.x"][k].tolist() == alone.signals["m.x"].tolist()
+            assert run.charges["drive"][k].tolist() == alone.charges["drive"].tolist()
+            assert session.run([times[-1] + 1e-6], {"drive": float(k)}).signals["m.x"].tolist() == more.signals["m.x"][k].tolist()
+
+
+def test_a_session_of_a_batch_that_fails_stops_alone(model: bimorph.Model) -> None:
+    """Its later values are NaN, and ``failures`` says where and why; the others go on."""
+    times = np.array([1e-6, 2e-6, 1.0, 1.000001])
+    volts = np.full((3, 4), 2.0)
+    volts[1, 2] = 1e12
+    with bimorph.Batch.of([model] * 3, ["m.x"]) as batch:
+        batch.operating_point({"drive": 2.0})
+        run = batch.run(times, {"drive": volts})
+        assert list(run.failures) == [1]
+        assert (run.failures[1].index, run.failures[1].t) == (2, 1.0)
+        assert run.failures[1].reason
+        assert np.isnan(run.signals["m.x"][1]).tolist() == [False, False, True, True]
+        assert np.isfinite(run.signals["m.x"][[0, 2]]).all()
+        with pytest.raises(bimorph.InvalidRequest, match="different times"):
+            batch.step({}, 1e-6)
+
+
+def test_variants_are_a_batch(client: bimorph.Client) -> None:
+    """Models of one netlist with other parameters: the softer spring moves further."""
+    netlist = bimorph.Netlist.text(PLATE, "plate.net")
+    models = [client.compile(netlist, set={"k": k}) for k in (1.0, 2.0, 4.0)]
+    with bimorph.Batch.of(models, ["m.x"]) as batch:
+        run = batch.run(1e-5 * np.arange(1, 5), {"drive": 2.0})
+    assert (np.diff(np.abs(run.signals["m.x"][:, -1])) < 0.0).all()
+
+
+def test_inputs_send_their_waveforms_once(plate: bimorph.Model, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A transient along inputs is one call, with the bits of steps one by one, and tells how far it has come."""
+    calls: list[str] = []
+    stream = bimorph.channel.Channel.stream
+
+    def counted(self: Any, method: str, request: Any) -> Any:
+        calls.append(method)
+        return stream(self, method, request)
+
+    monkeypatch.setattr(bimorph.channel.Channel, "stream", counted)
+    wave = ([0.0, 1e-5, 3e-5], [0.0, 3.0, 1.0])
+    seen: list[float] = []
+    run = plate.transient(4e-5, ["m.x"], points=41, inputs={"drive": wave}, estimate=False, progress=seen.append)
+    assert calls == ["Run"]
+    assert seen
+    assert seen[-1] == pytest.approx(1.0)
+    output = np.linspace(0.0, 4e-5, 41)
+    with plate.session(["m.x"]) as session:
+        found = [session.operating_point({"drive": 0.0}).outputs["m.x"]]
+        found += [session.step({"drive": float(np.interp(t, *wave))}, float(dt)).outputs["m.x"] for t, dt in zip(output[1:], np.diff(output))]
+    assert run.signals["m.x"].tolist() == found
