@@ -229,6 +229,7 @@ fn line(drawn: &crate::structure::Beam, points: &Arc<[Point]>) -> BeamLine {
         angle: drawn.angle,
         length: drawn.length,
         rigidity: drawn.material.youngs_modulus * drawn.thickness * drawn.width.powi(3) / 12.0,
+        width: drawn.width,
     }
 }
 

@@ -27,6 +27,8 @@ pub struct BeamLine {
     pub length: f64,
     /// Bending stiffness EI [N·m²].
     pub rigidity: f64,
+    /// Width in the plane of bending [m].
+    pub width: f64,
 }
 
 /// A side of a beam, seen along its drawn direction.

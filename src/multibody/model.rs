@@ -258,15 +258,15 @@ impl Model {
     }
 }
 
-/// Pivot of a translation that is held, where nothing is left of the other one [N/m].
-pub(super) const LEAST_HELD: f64 = 1e-100;
+/// Least pivot of a translation that is held [N/m]: where the body's own stiffness passes through 0, as at a fold, its pivot does not.
+pub(super) const LEAST_HELD: f64 = 1.0;
 
 /// P·A·P with pivots in what the projector P takes away: 1 for a rotation. A translation that is held at an angle mixes with the one that is free, so its
-/// pivot is of the size of that one: beside a contact of 10¹³ N/m a pivot of 1 would be rounding.
+/// pivot is of the size of both: beside a contact of 10¹³ N/m a pivot of 1 would be rounding.
 pub(super) fn projected<T: super::Scalar>(p: &Matrix3<f64>, a: &Matrix3<T>) -> Matrix3<T> {
     let lifted: Matrix3<T> = p.map(T::from_real);
     let block = lifted * a * lifted;
-    let size = block[(0, 0)].modulus() + block[(1, 1)].modulus() + LEAST_HELD;
+    let size = a[(0, 0)].modulus() + a[(1, 1)].modulus() + LEAST_HELD;
     let mut held = Matrix3::identity() - p;
     held.fixed_view_mut::<2, 2>(0, 0).apply(|x| *x *= size);
     block + held.map(T::from_real)

@@ -55,3 +55,13 @@ fn the_other_branch_is_the_mirror_image() {
     close(right.y, left.y, 1e-9);
     close(right.rz, -left.rz, 1e-9);
 }
+
+/// A moment that no beam at its node can bear: M/EI is a radius of 35 nm for the beam of 0.6 µm, and less for the other. Past the first loss of stability the
+/// part winds itself up, and the refusal says so.
+#[test]
+fn a_moment_that_winds_beams_up_is_refused_by_what_it_does() {
+    let text = "anchor p1 [a] []\nbeam2d p1 [a b] [l=100u w=0.5u]\nbeam2d p1 [b c] [l=80u w=0.6u oz=1.2]\nanchor p1 [c] []\n\
+        f2d * [b] [F=3m M=2e-7 oz=3.5]";
+    let error = static_fitted(&model(text, &CompileOptions::default()), &[]).unwrap_err().to_string();
+    assert!(error.contains("is bent to a radius of") || error.contains("winds up, by"), "{error}");
+}

@@ -34,10 +34,10 @@ fn options_vary_as_if_they_were_given() {
     let moves = || SweepAnalysis::Transient { stop: 2e-6, outputs: vec!["t.y".into()], voltages: vec![] };
     for analysis in [statics(), modes(), moves()] {
         for rest in [&[][..], &["w=1.8u:2.2u:3"]] {
-            let tol = "option.tol=1e-2,1e-4".parse().expect("an axis");
+            let tol = "option.tol=1e-2,1e-3".parse().expect("an axis");
             let axes: Vec<SweepParameter> = rest.iter().map(|text| text.parse().expect("an axis")).collect();
             let whole = run(&spec([vec![tol], axes].concat(), analysis.clone()));
-            for (k, tol) in [1e-2, 1e-4].into_iter().enumerate() {
+            for (k, tol) in [1e-2, 1e-3].into_iter().enumerate() {
                 let options = CompileOptions { tol, ..CompileOptions::default() };
                 let own = swept(BEAMS, rest, analysis.clone(), &options, Shard::default());
                 let part = &whole.rows[k * own.rows.len()..][..own.rows.len()];

@@ -131,10 +131,9 @@ impl LaneMatrix {
         let block = |from: &LaneBlock| load_block::<W>(simd, from);
         for (j, own) in held.iter().enumerate() {
             if let Some((p, rest)) = own {
-                let p = block(p);
-                let own = product(&product(&p, &block(&self.diagonal[j])), &p);
-                store_block(own, &mut self.diagonal[j]);
+                let (p, own) = (block(p), block(&self.diagonal[j]));
                 let size = own[0][0].abs() + own[1][1].abs() + W::splat(simd, LEAST_HELD);
+                store_block(product(&product(&p, &own), &p), &mut self.diagonal[j]);
                 let mut rest = block(rest);
                 for column in &mut rest[..2] {
                     column[..2].iter_mut().for_each(|x| *x = *x * size);

@@ -7,6 +7,7 @@ use crate::domains::{BeamLine, Domain, System};
 use crate::multibody::factor::ZeroPivot;
 use crate::multibody::planar::Pose;
 use crate::solve::SolveError;
+use std::sync::Arc;
 
 /// A body that gives way so many times as far as others hangs on next to nothing.
 const UNHELD: f64 = 1e8;
@@ -16,6 +17,10 @@ const TURNED: f64 = 1.0;
 const COARSE: [f64; 2] = [0.7, 1.0];
 /// Axial strain beyond which a segment is no beam [1].
 const CRUSHED: f64 = 0.3;
+/// Bending strain beyond which a segment is no beam [1]: its radius is less than half its width.
+const OVERBENT: f64 = 1.0;
+/// Turn along a beam beyond which it has a loop [rad]; a hairpin has π.
+const WOUND: f64 = 1.5 * std::f64::consts::PI;
 /// Longest displacement of a part that is still there, in lengths of the longest beam.
 const GONE: f64 = 100.0;
 
@@ -78,13 +83,21 @@ impl Equilibrium {
             (0..beam.segments()).filter_map(move |k| {
                 let state = beam.segment(k, q, linear);
                 let turn = state.turns[0].abs().max(state.turns[1].abs());
-                let over = (turn / TURNED).max(state.strain.abs() / CRUSHED);
-                (over > 1.0).then_some((over, beam, k, turn, state.strain))
+                let curvature = (state.turns[0] - state.turns[1]).abs() / beam.segment_length();
+                let bent = 0.5 * beam.width * curvature;
+                let over = (turn / TURNED).max(state.strain.abs() / CRUSHED).max(bent / OVERBENT);
+                (over > 1.0).then_some((over, beam, k, turn, state.strain, curvature))
             })
         });
-        let (_, beam, k, turn, strain) = states.max_by(|a, b| a.0.total_cmp(&b.0))?;
+        let (_, beam, k, turn, strain, curvature) = states.max_by(|a, b| a.0.total_cmp(&b.0))?;
         let place = format!("segment {} of beam {}", k + 1, beam.name);
-        Some(if turn > TURNED {
+        Some(if 0.5 * beam.width * curvature > OVERBENT {
+            format!(
+                "{place} is bent to a radius of {:.2e} m where the search ended, less than half its width of {:.2e} m: the load is beyond beams",
+                1.0 / curvature,
+                beam.width
+            )
+        } else if turn > TURNED {
             format!(
                 "{place} is turned {:.0}° from its chord where the search ended: finer segments are needed (--segments), or the load is beyond \
                  beams (strain {strain:.2})",
@@ -124,6 +137,13 @@ impl Equilibrium {
     }
 
     fn unsettled(&mut self, system: &System, why: Unsettled, q: &[Pose]) -> String {
+        if let (Unsettled::Budget, Some((beam, turn))) = (why, Self::wound(system, q)) {
+            return format!(
+                "beyond it beam {beam} winds up, by {:.0}° along its length where the search ended: a loop slides along its beam with next to no \
+                 resistance, so that nothing holds it",
+                turn.to_degrees()
+            );
+        }
         system.residual(q, &self.drive, &mut self.residual);
         let size = |body: &usize| self.residual[*body].amax();
         let worst = (0..self.residual.len()).max_by(|a, b| size(a).total_cmp(&size(b))).unwrap_or(0);
@@ -138,6 +158,17 @@ impl Equilibrium {
                  its parts differs too much, or the load is beyond beams"
             ),
         }
+    }
+
+    /// The beam that turns farthest along its length, by how much [rad], where that makes a loop.
+    fn wound(system: &System, q: &[Pose]) -> Option<(Arc<str>, f64)> {
+        let turn = |beam: &BeamLine| {
+            let turns = beam.points.iter().map(|point| point.rotation(q));
+            let [least, most] = turns.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], z| [a.min(z), b.max(z)]);
+            most - least
+        };
+        let turned = system.beams.iter().map(|beam| (beam.name.clone(), turn(beam)));
+        turned.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, turn)| *turn > WOUND)
     }
 
     /// Names the body that gives way most under a force on every body, if it does so far more than most.
