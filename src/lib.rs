@@ -4,7 +4,7 @@
 //! Data flows one way. A [`netlist`] describes what was drawn ([`layout`] reads masks); it becomes a [`structure`] (materials, beams, plates,
 //! anchors, gaps, combs, ports, all in SI). [`options`] is the one table of what a model may be told. `discretize` turns beams into rigid bodies and flexible joints;
 //! `multibody` holds those bodies and the O(n+m) recursion over them; `domains` are the forces and rest offsets that
-//! heat and voltage cause. `solve` advances or balances a model, [`refine`] chooses how fine it must be, [`analysis`]
+//! heat and voltage cause. `solve` advances or balances a model, [`refine`] chooses how fine it must be, [`readout`] finds signals and ports by name, [`analysis`]
 //! holds the verbs every front shares, and [`device`] is the electrical view that a circuit simulator drives. [`results`]
 //! writes tables and pictures, [`export`] a model for other simulators.
 //! [`compile`](mod@compile) walks that path once, from netlist text to a ready model.
@@ -29,6 +29,7 @@ pub mod layout;
 pub mod multibody;
 pub mod netlist;
 pub mod options;
+pub mod readout;
 pub mod refine;
 pub mod results;
 #[cfg(feature = "remote")]

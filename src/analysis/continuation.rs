@@ -1,11 +1,11 @@
 //! Equilibrium paths: how a mechanism's equilibria go on while one load, voltage, temperature or stress grows, past folds
 //! and through bifurcations.
 use super::contact_range::{comb_beyond_told, within_contact_range};
-use super::signal::{Signal, View};
 use super::statics::{OperatingPoint, beam_motions, node_motions, operating_point, source_vector, told_at, too_hot};
 use super::{AnalysisError, BeamMotions, NodeMotions, Watch};
 use crate::compile::Compiled;
 use crate::multibody::planar::Pose;
+use crate::readout::signal::{Signal, View};
 use crate::solve::continuation::{Branch, Continuation, ContinuationOptions, Event, PathEnd, Traced};
 use crate::solve::family::Blend;
 use serde::Serialize;

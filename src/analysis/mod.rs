@@ -20,7 +20,6 @@ pub mod pull_in;
 mod rotary_left_out;
 mod sensitivity;
 pub mod side_by_side;
-pub mod signal;
 mod stability;
 pub mod statics;
 pub(crate) mod statics_side_by_side;
@@ -28,6 +27,8 @@ pub mod step_error;
 pub mod transient;
 mod weak_parts;
 
+use crate::readout::ReadoutError;
+pub use crate::readout::signal;
 use serde::Serialize;
 use thiserror::Error;
 
@@ -113,6 +114,17 @@ pub type BeamMotions = Vec<Vec<NodeMotion>>;
 
 /// Voltages on ports for a whole analysis: (port name, volts). Ports not named are at 0 V.
 pub type PortVoltages = [(String, f64)];
+
+impl From<ReadoutError> for AnalysisError {
+    fn from(error: ReadoutError) -> Self {
+        match error {
+            ReadoutError::UnknownSignal { name, hint } => {
+                Self::BadRequest { what: format!("signal \"{name}\""), detail: hint }
+            }
+            other => Self::BadRequest { what: "ports".into(), detail: other.to_string() },
+        }
+    }
+}
 
 impl From<crate::solve::SolveError> for AnalysisError {
     fn from(error: crate::solve::SolveError) -> Self {

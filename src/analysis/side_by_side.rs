@@ -7,7 +7,6 @@
 use super::AnalysisError;
 use super::contact_range::within_contact_range;
 use super::formulation::Formulation;
-use super::signal::{Signal, View};
 use super::stability::Stability;
 use super::statics::source_vector;
 use super::transient::first_step::first_step;
@@ -15,6 +14,7 @@ use super::transient::options::{STEP_SHARE, TransientOptions, check};
 use super::transient::record::LOOKS;
 use crate::compile::Compiled;
 use crate::domains::{Drive, Ramp};
+use crate::readout::signal::{Signal, View};
 use crate::solve::baseline::SolverKind;
 use crate::solve::dense::interpolate;
 use crate::solve::time::method::Motion;

@@ -2,12 +2,12 @@
 pub use super::NodeMotion;
 use super::contact_range::within_contact_range;
 use super::loose_parts;
-use super::signal::{Signal, View};
 use super::weak_parts;
 use super::{AnalysisError, BeamMotions, PortVoltages};
 use crate::compile::Compiled;
 use crate::domains::Drive;
 use crate::multibody::planar::Pose;
+use crate::readout::signal::{Signal, View};
 use crate::solve::SolveError;
 use crate::solve::equilibrium::{Equilibrium, EquilibriumOptions, LossKind, Passed, Path};
 use crate::solve::path::{LoadPath, SourcePath};

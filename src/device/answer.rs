@@ -1,14 +1,14 @@
 //! What a trial answers: currents, charges, outputs and their partials from the state that it came to, and how long a step the
 //! circuit may take next.
 
-use super::ports::Answer;
 use super::session::Session;
 use super::shown::{Follow, Shown};
 use super::states::Snapshot;
 use super::{Trial, TrialReply};
-use crate::analysis::signal::{Signal, View};
 use crate::compile::Compiled;
 use crate::domains::System;
+use crate::readout::ports::Answer;
+use crate::readout::signal::{Signal, View};
 
 /// Share of the compilation's tolerance that one internal step may use.
 pub(super) const STEP_SHARE: f64 = 1e-2;

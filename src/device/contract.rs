@@ -1,7 +1,7 @@
 //! The contract of a device: what is asked, what is answered, and what may be refused.
 
-use super::port_kind::PortKind;
 use crate::netlist::Diagnostic;
+use crate::readout::{PortKind, ReadoutError};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -169,6 +169,18 @@ pub enum DeviceError {
         /// What happened.
         reason: String,
     },
+}
+
+impl From<ReadoutError> for DeviceError {
+    fn from(error: ReadoutError) -> Self {
+        match error {
+            ReadoutError::UnknownSignal { ref name, .. } => {
+                Self::UnknownSignal { name: name.clone(), hint: error.to_string() }
+            }
+            ReadoutError::UnknownPort { name, available } => Self::UnknownPort { name, available },
+            ReadoutError::BadPort { expected, got } => Self::BadRequest { what: "ports", expected, got },
+        }
+    }
 }
 
 /// The electrical contract. See the module for its rules.

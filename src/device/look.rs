@@ -4,9 +4,9 @@
 use super::DeviceError;
 use super::session::Session;
 use super::states::Snapshot;
-use crate::analysis::signal::{self, Signal, View};
 use crate::compile::Compiled;
 use crate::domains::{Domain, Point};
+use crate::readout::signal::{self, Signal, View};
 
 /// Quantities of a state as a whole, with what they are, by the names under which [`super::Device::look`] knows them beside signals.
 pub const WHOLE: [(&str, &str); 3] = [

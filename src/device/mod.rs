@@ -24,8 +24,6 @@ mod higher_modes;
 pub mod local;
 pub mod look;
 mod noise;
-mod port_kind;
-pub mod ports;
 mod ringing;
 pub mod run;
 mod saved;
@@ -38,8 +36,8 @@ pub mod states;
 mod trial;
 mod warned;
 
+pub use crate::readout::{PortKind, ports};
 pub use contract::{
     Agitation, Description, Device, DeviceError, Mode, OpenRequest, PortInfo, SignalInfo, SmallSignal, Status, Token,
     Trial, TrialReply,
 };
-pub use port_kind::PortKind;

@@ -13,17 +13,17 @@
 //! An answer is that with nothing else changed: the current of a port whose voltage is held, the motion of one whose force
 //! is. Left out: fluctuations of temperature, and what Johnson's noise heats.
 
-use super::ports::Answer;
 use super::seen::{Seen, surroundings};
 use super::session::Session;
 use super::states::Snapshot;
 use super::{DeviceError, Token};
-use crate::analysis::signal::{Signal, View};
 use crate::budget;
 use crate::compile::Compiled;
 use crate::domains::System;
 use crate::multibody::agitation::{BOLTZMANN, damped};
 use crate::multibody::planar::Pose;
+use crate::readout::ports::Answer;
+use crate::readout::signal::{Signal, View};
 use crate::solve::frequency::gyroscopic;
 use crate::solve::harmonic::ComplexPose;
 use nalgebra::Complex;

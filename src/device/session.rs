@@ -3,12 +3,10 @@
 use super::agitation::Shaken;
 use super::contact_steps::ContactSteps;
 use super::growth::{Difference, Growth};
-use super::ports::Ports;
 use super::ringing::Ringing;
 use super::seen::{Seen, surroundings};
 use super::states::{Snapshot, States};
 use super::{Description, DeviceError, Mode, OpenRequest, PortInfo, PortKind, SignalInfo, Token, Trial};
-use crate::analysis::signal::Signal;
 use crate::analysis::transient::first_step;
 use crate::budget;
 use crate::compile::Compiled;
@@ -17,6 +15,8 @@ use crate::domains::{Drive, System};
 use crate::equations::bodies::Weights;
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
+use crate::readout::ports::Ports;
+use crate::readout::signal::Signal;
 use crate::solve::equilibrium::{Equilibrium, EquilibriumOptions};
 use crate::solve::harmonic::{ComplexPose, Harmonic};
 use crate::solve::time::adaptive::Adaptive;
@@ -77,7 +77,6 @@ impl Session {
             .map(|name| {
                 budget::check();
                 Signal::find(compiled, name)
-                    .map_err(|e| DeviceError::UnknownSignal { name: name.clone(), hint: e.to_string() })
             })
             .collect::<Result<_, _>>()?;
         let description = Description {

@@ -3,7 +3,6 @@
 
 use super::growth::held_by_charge;
 use super::higher_modes::Split;
-use super::ports::Answer;
 use super::ringing::Accepted;
 use super::session::Session;
 use super::states::Snapshot;
@@ -11,6 +10,7 @@ use crate::analysis::mesh::{WARNING, told_moving, told_still};
 use crate::analysis::statics::OperatingPoint;
 use crate::compile::Compiled;
 use crate::netlist::Diagnostic;
+use crate::readout::ports::Answer;
 
 /// Code of the warning that a charge alone holds a mechanism.
 const HELD: &str = "W048";

@@ -3,14 +3,14 @@
 use super::linear::SignalShown;
 use super::{ExportError, Request};
 use crate::analysis::AnalysisError;
-use crate::analysis::signal::Signal;
 use crate::analysis::statics::operating_point;
 use crate::compile::Compiled;
 use crate::device::PortKind;
-use crate::device::ports::Ports;
 use crate::domains::{Drive, System};
 use crate::multibody::BlockMatrix;
 use crate::multibody::planar::Pose;
+use crate::readout::ports::Ports;
+use crate::readout::signal::Signal;
 use crate::solve::SolveError;
 use crate::solve::frequency::refined::{ROUNDING, Refined};
 

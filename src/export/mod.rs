@@ -34,6 +34,7 @@ pub use linear::Reduced;
 
 use crate::analysis::AnalysisError;
 use crate::device::DeviceError;
+use crate::readout::ReadoutError;
 use thiserror::Error;
 
 /// What is to be written.
@@ -51,6 +52,15 @@ pub struct Request {
     pub to: Option<f64>,
     /// Largest relative deviation from the exact small-signal answer [1].
     pub within: f64,
+}
+
+impl From<ReadoutError> for ExportError {
+    fn from(error: ReadoutError) -> Self {
+        match error {
+            ReadoutError::UnknownSignal { .. } => Self::Analysis(error.into()),
+            ReadoutError::UnknownPort { .. } | ReadoutError::BadPort { .. } => Self::Device(error.into()),
+        }
+    }
 }
 
 /// Why nothing can be written.

@@ -12,13 +12,13 @@ use super::basis::Basis;
 use super::linear::{Lag, Mode, Port, Reduced};
 pub use super::mechanism::{Mechanism, port_names};
 use super::mechanism::{Push, dot};
-use crate::analysis::signal::{Signal, View};
 use crate::device::PortKind;
-use crate::device::ports::Answer;
 use crate::device::scale::Scale;
 use crate::domains::loss_derivatives::LossDerivatives;
 use crate::multibody::forces::add_damping;
 use crate::multibody::planar::Pose;
+use crate::readout::ports::Answer;
+use crate::readout::signal::{Signal, View};
 use nalgebra::{DMatrix, DVector};
 
 /// Displacement that a volt of a mode's share stands for where the mode moves most [m].

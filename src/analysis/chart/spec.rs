@@ -97,7 +97,7 @@ impl Part {
 pub struct ChartSpec {
     /// Parts wanted.
     pub parts: Vec<Part>,
-    /// Signals whose error counts, see [`super::super::signal::Signal::find`].
+    /// Signals whose error counts, see [`crate::readout::signal::Signal::find`].
     pub signals: Vec<String>,
     /// End time [s]; none: five periods of the lowest mode.
     pub stop: Option<f64>,

@@ -1,6 +1,5 @@
 //! Motion of a linear frame in time, by Newmark's rule.
 
-use super::super::signal::{Signal, View, node_signal};
 use super::super::transient::options::{TransientOptions, check};
 use super::super::transient::result::{Counters, TransientResult};
 use super::super::{AnalysisError, Watch};
@@ -9,6 +8,7 @@ use crate::compile::Compiled;
 use crate::discretize::frame::Frame;
 use crate::domains::{Point, Ramp};
 use crate::multibody::planar::Pose;
+use crate::readout::signal::{Signal, View, node_signal};
 use crate::solve::baseline::frame_motion::Newmark;
 use crate::solve::baseline::sparse::Sparse;
 

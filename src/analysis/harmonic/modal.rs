@@ -11,12 +11,12 @@
 use super::exact::Exact;
 use super::named::Row;
 use crate::analysis::AnalysisError;
-use crate::analysis::signal::Signal;
-use crate::device::small_signal::{Constituent, Law, Moved};
 use crate::domains::{Drive, System};
 use crate::multibody::BlockMatrix;
 use crate::multibody::forces::{add_damping, add_inertia};
 use crate::multibody::planar::Pose;
+use crate::readout::signal::Signal;
+use crate::readout::small_signal::{Constituent, Law, Moved};
 use crate::solve::eigen::{Modes, RELIABLE, lowest_modes};
 use crate::solve::frequency::refined::{ROUNDING, Refined};
 use crate::solve::subspace;

@@ -1,10 +1,10 @@
 //! What drives and what is seen, by name.
 
 use crate::analysis::AnalysisError;
-use crate::analysis::signal::Signal;
 use crate::compile::Compiled;
-use crate::device::DeviceError;
-use crate::device::ports::{Answer, Ports};
+use crate::readout::ReadoutError;
+use crate::readout::ports::{Answer, Ports};
+use crate::readout::signal::Signal;
 
 /// What is seen.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,13 +37,13 @@ fn port_name(compiled: &Compiled, drive: &str) -> String {
 pub(crate) fn drive_port(compiled: &Compiled, drive: &str) -> Result<Ports, AnalysisError> {
     let refused = |detail: String| AnalysisError::BadRequest { what: format!("drive \"{drive}\""), detail };
     Ports::find(compiled, &[port_name(compiled, drive)]).map_err(|error| match error {
-        DeviceError::UnknownPort { available, .. } => {
+        ReadoutError::UnknownPort { available, .. } => {
             let ports = match available.as_slice() {
                 [] => "the netlist has no ports".to_owned(),
                 _ => format!("ports are {}", available.join(", ")),
             };
             let detail = match Signal::find(compiled, &port_name(compiled, drive)) {
-                Err(AnalysisError::BadRequest { detail, .. }) => detail,
+                Err(ReadoutError::UnknownSignal { hint, .. }) => hint,
                 _ => String::new(),
             };
             refused(format!(
@@ -51,8 +51,8 @@ pub(crate) fn drive_port(compiled: &Compiled, drive: &str) -> Result<Ports, Anal
                  {detail}"
             ))
         }
-        DeviceError::BadRequest { expected, got, .. } => refused(format!("expected {expected}, got {got}")),
-        other => refused(other.to_string()),
+        ReadoutError::BadPort { expected, got } => refused(format!("expected {expected}, got {got}")),
+        other @ ReadoutError::UnknownSignal { .. } => refused(other.to_string()),
     })
 }
 
@@ -81,7 +81,7 @@ pub(crate) fn row(compiled: &Compiled, name: &str) -> Result<Row, AnalysisError>
     }
     Signal::find(compiled, name).map(Row::Signal).map_err(|error| {
         let electrics = &compiled.parts.system.electrics;
-        match error {
+        match AnalysisError::from(error) {
             AnalysisError::BadRequest { what, detail } if electrics.ports > 0 => {
                 let ports = electrics.names[..electrics.ports].join(", ");
                 AnalysisError::BadRequest { what, detail: format!("{detail}; or PORT.i, with the ports {ports}") }

@@ -9,7 +9,7 @@
 use super::exact::Exact;
 use super::modal::Sum;
 use super::root::Root;
-use crate::device::small_signal::Law;
+use crate::readout::small_signal::Law;
 use crate::solve::frequency::pole::pole;
 use faer::Mat;
 use nalgebra::{Complex, DMatrix};

@@ -37,13 +37,13 @@ mod warnings;
 mod yielded;
 
 use super::linear_stress::left_out;
-use super::signal::Signal;
 use super::statics::{OperatingPoint, operating_point};
 use super::transient::TransientOptions;
 use super::{AnalysisError, PortVoltages};
 use crate::compile::Compiled;
 use crate::multibody::planar::Pose;
 use crate::netlist::Diagnostic;
+use crate::readout::signal::Signal;
 use crate::refine::model_order::ModelOrder;
 pub use equilibrium::static_fitted;
 use excited::told_of_motion;

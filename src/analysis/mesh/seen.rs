@@ -4,12 +4,12 @@
 //! [`SMALL`] of the largest of its unit where that is more: what swings less than that beside another is a small part of a picture.
 
 use super::super::chart::error::SMALL;
-use super::super::signal::{Signal, View};
 use super::super::statics::OperatingPoint;
 use super::super::step_error;
 use super::super::transient::TransientOptions;
 use crate::compile::Compiled;
 use crate::multibody::planar::Pose;
+use crate::readout::signal::{Signal, View};
 
 /// The signals of a run about a state.
 pub(super) struct Seen<'a> {

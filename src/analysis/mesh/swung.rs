@@ -16,7 +16,6 @@
 use super::super::AnalysisError;
 use super::super::chart::error::largest_error;
 use super::super::integrator::Integrator;
-use super::super::signal::Signal;
 use super::super::statics::{OperatingPoint, operating_point};
 use super::super::step_error;
 use super::super::transient::{TransientOptions, TransientResult, Until, transient};
@@ -24,6 +23,7 @@ use super::excited;
 use super::meshed::{chosen, meshed};
 use crate::compile::Compiled;
 use crate::multibody::planar::Pose;
+use crate::readout::signal::Signal;
 use crate::refine::doubling;
 use crate::refine::model_order::ModelOrder;
 

@@ -1,11 +1,12 @@
 //! Crossings of levels within the steps of a run: those asked for, and the contact of every gap that has one.
 
 use super::super::AnalysisError;
-use super::super::signal::{Signal, View};
 use super::options::{TransientOptions, Until};
 use super::result::Event;
 use crate::compile::Compiled;
 use crate::domains::Ramp;
+use crate::readout::ReadoutError;
+use crate::readout::signal::{Signal, View};
 use crate::solve::dense::interpolate;
 use crate::solve::time::event::{Detector, Direction};
 use crate::solve::time::method::Motion;
@@ -39,7 +40,7 @@ fn watched(compiled: &Compiled, options: &TransientOptions<'_>) -> Result<Vec<Wa
             let name = format!("{}.gap", compiled.parts.gap_names[g]);
             Ok(watch(name, Signal::Distance(g), touch, true))
         });
-    asked.chain(ending).chain(touching).collect()
+    Ok(asked.chain(ending).chain(touching).collect::<Result<_, ReadoutError>>()?)
 }
 
 /// True for the event that a run goes on until.

@@ -1,11 +1,11 @@
 //! The error of a run's signals over time, from the error of its motion, see [`crate::solve::time::defect`].
 
 use super::super::chart::error::{SMALL, half_range};
-use super::super::signal::{Signal, View};
 use super::options::TransientOptions;
 use crate::compile::Compiled;
 use crate::domains::Ramp;
 use crate::multibody::planar::Pose;
+use crate::readout::signal::{Signal, View};
 use crate::solve::time::method::Motion;
 
 /// Ends of steps at which signals are compared, at most.

@@ -1,7 +1,6 @@
 //! A run from its start to its end, and what is taken of it on the way: samples, crossings, and looks at its stability.
 
 use super::super::contact_range::within_contact_range;
-use super::super::signal::Signal;
 use super::super::stability::Stability;
 use super::super::statics::{operating_point, source_vector, told_at};
 use super::super::{AnalysisError, Watch};
@@ -15,6 +14,7 @@ use super::samples::Samples;
 use crate::compile::Compiled;
 use crate::domains::Ramp;
 use crate::multibody::Body;
+use crate::readout::signal::Signal;
 use crate::solve::time::adaptive::{Advance, Observer};
 use crate::solve::time::defect::SeeError;
 use crate::solve::time::method::{Motion, Work};

@@ -1,9 +1,9 @@
 //! Signals at equally spaced times, between the steps of a run.
 
-use super::super::signal::{Signal, View};
 use super::options::TransientOptions;
 use crate::compile::Compiled;
 use crate::domains::Ramp;
+use crate::readout::signal::{Signal, View};
 use crate::solve::dense::interpolate;
 use crate::solve::time::method::Motion;
 

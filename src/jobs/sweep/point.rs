@@ -9,11 +9,11 @@ use super::means::Means;
 use super::spec::{SweepAnalysis, SweepSpec};
 use crate::analysis::mesh::given::{Answer, Judged, judged, searched};
 use crate::analysis::mesh::{self, Request};
-use crate::analysis::signal::Signal;
 use crate::analysis::{AnalysisError, statics};
 use crate::budget;
 use crate::compile::{CompileError, CompileOptions, draw};
 use crate::netlist::{Setting, Severity, Source};
+use crate::readout::signal::Signal;
 use std::borrow::Cow;
 use std::collections::HashSet;
 

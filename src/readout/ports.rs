@@ -13,9 +13,9 @@
 //! A mechanical port is given the force and answers with the motion, not the other way round, so that one which nothing is
 //! connected to is free, and the mechanism's own integrator moves it whatever steps the circuit takes.
 
-use super::contract::DeviceError;
+use super::ReadoutError;
 use super::port_kind::PortKind;
-use crate::analysis::signal::Signal;
+use super::signal::Signal;
 use crate::compile::Compiled;
 use crate::domains::inputs::Input;
 use crate::domains::{Point, System};
@@ -52,8 +52,8 @@ impl Ports {
     /// Finds ports by name; no names: every electrical one.
     ///
     /// # Errors
-    /// [`DeviceError::UnknownPort`], [`DeviceError::BadRequest`] for a port that cannot be.
-    pub(crate) fn find(compiled: &Compiled, names: &[String]) -> Result<Self, DeviceError> {
+    /// [`ReadoutError::UnknownPort`], [`ReadoutError::BadPort`] for a port that cannot be.
+    pub(crate) fn find(compiled: &Compiled, names: &[String]) -> Result<Self, ReadoutError> {
         let system = &compiled.parts.system;
         let electrics = &system.electrics;
         let known: HashMap<&str, usize> =
@@ -69,8 +69,7 @@ impl Ports {
         for name in names {
             crate::budget::check();
             if !given.insert(name.as_str()) {
-                return Err(DeviceError::BadRequest {
-                    what: "ports",
+                return Err(ReadoutError::BadPort {
                     expected: "each port once: it has one voltage".into(),
                     got: format!("\"{name}\" twice"),
                 });
@@ -112,14 +111,13 @@ impl Ports {
 }
 
 /// The port that a node, a beam or the frame offers under this name.
-fn offered(compiled: &Compiled, name: &str) -> Result<(Input, PortKind, Answer), DeviceError> {
+fn offered(compiled: &Compiled, name: &str) -> Result<(Input, PortKind, Answer), ReadoutError> {
     let inertial = |input, kind| Ok((input, kind, Answer::Nothing));
     match name {
         "frame.ax" => return inertial(Input::Acceleration { axis: 0 }, PortKind::Acceleration),
         "frame.ay" => return inertial(Input::Acceleration { axis: 1 }, PortKind::Acceleration),
         "frame.wz" if compiled.joints.is_some() => {
-            return Err(DeviceError::BadRequest {
-                what: "ports",
+            return Err(ReadoutError::BadPort {
                 expected: "formulation=compliant, in which a frame may turn".into(),
                 got: format!("\"{name}\" with formulation={}", compiled.options.formulation.name()),
             });
@@ -128,7 +126,7 @@ fn offered(compiled: &Compiled, name: &str) -> Result<(Input, PortKind, Answer),
         _ => {}
     }
     let refused = |expected: &str, got: &str| {
-        Err(DeviceError::BadRequest { what: "ports", expected: expected.into(), got: format!("\"{name}\", {got}") })
+        Err(ReadoutError::BadPort { expected: expected.into(), got: format!("\"{name}\", {got}") })
     };
     match Signal::find(compiled, name) {
         Ok(signal @ (Signal::Displacement(point, direction) | Signal::Rate(point, direction))) => {
@@ -154,7 +152,7 @@ fn offered(compiled: &Compiled, name: &str) -> Result<(Input, PortKind, Answer),
         Err(_) => {
             let electrics = &compiled.parts.system.electrics;
             let available = electrics.names[..electrics.ports].to_vec();
-            Err(DeviceError::UnknownPort { name: name.into(), available })
+            Err(ReadoutError::UnknownPort { name: name.into(), available })
         }
     }
 }

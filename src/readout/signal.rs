@@ -1,6 +1,6 @@
 //! Quantities that can be read from a state by name.
 
-use super::AnalysisError;
+use super::ReadoutError;
 use crate::compile::Compiled;
 use crate::domains::Point;
 use crate::multibody::planar::{self, Pose};
@@ -45,12 +45,10 @@ impl Signal {
     /// `GAP.F`.
     ///
     /// # Errors
-    /// [`AnalysisError::BadRequest`] with what would be understood.
-    pub fn find(compiled: &Compiled, name: &str) -> Result<Self, AnalysisError> {
-        Self::lookup(compiled, name).ok_or_else(|| AnalysisError::BadRequest {
-            what: format!("signal \"{name}\""),
-            detail: hint(compiled, name),
-        })
+    /// [`ReadoutError::UnknownSignal`] with what would be understood.
+    pub fn find(compiled: &Compiled, name: &str) -> Result<Self, ReadoutError> {
+        Self::lookup(compiled, name)
+            .ok_or_else(|| ReadoutError::UnknownSignal { name: name.to_owned(), hint: hint(compiled, name) })
     }
 
     fn lookup(compiled: &Compiled, name: &str) -> Option<Self> {

@@ -1,0 +1,33 @@
+//! Names that a model does not have.
+
+use thiserror::Error;
+
+/// Why a signal or a port cannot be read.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum ReadoutError {
+    /// No signal of that name.
+    #[error("signal \"{name}\": {hint}")]
+    UnknownSignal {
+        /// The name asked for.
+        name: String,
+        /// What would be understood.
+        hint: String,
+    },
+    /// No port of that name.
+    #[error("no port named \"{name}\"; the netlist has {available:?}")]
+    UnknownPort {
+        /// The name asked for.
+        name: String,
+        /// The names there are.
+        available: Vec<String>,
+    },
+    /// A port that cannot be.
+    #[error("ports: expected {expected}, got {got}")]
+    BadPort {
+        /// What was expected.
+        expected: String,
+        /// What came.
+        got: String,
+    },
+}

@@ -1,0 +1,18 @@
+//! What can be read from a model, and where it can be driven, by name.
+//!
+//! | file | what |
+//! |---|---|
+//! | [`signal`] | quantities of a state: displacements, rates, temperatures, charges, distances |
+//! | [`ports`] | ports of the netlist, and those that any node, heated beam or the frame offers |
+//! | `small_signal` | what a small change at a port does to the forces, and what is seen of the motion that follows |
+//!
+//! Analyses and devices stand on it; it knows neither.
+
+mod error;
+mod port_kind;
+pub mod ports;
+pub mod signal;
+pub(crate) mod small_signal;
+
+pub use error::ReadoutError;
+pub use port_kind::PortKind;
