@@ -1,4 +1,4 @@
-//! One idea, one file: no file of src/ or tests/ has more than 350 lines, and no function more than 100. What is still longer stands
+//! One idea, one file: functions of src/ and tests/ have at most 100 lines, and files at most 600, where an idea needs them. Longer functions stand
 //! in a list, and leaves it with the change that makes it shorter.
 
 use crate::files;
@@ -7,12 +7,12 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Most lines of a file.
-const FILE: usize = 350;
+const FILE: usize = 600;
 /// Most lines of a function, from its name to its closing brace.
 const FUNCTION: usize = 100;
 
 /// Files that are longer.
-const LONG_FILES: &[&str] = &["tests/service/attacks.rs"];
+const LONG_FILES: &[&str] = &[];
 
 /// Functions that are longer, by file and name.
 const LONG_FUNCTIONS: &[&str] = &[
