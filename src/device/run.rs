@@ -199,7 +199,7 @@ pub fn steps(
             ran.charges.extend_from_slice(&run.last().charges);
         }
     }
-    (ran.trials, ran.last) = (run.trials, (ran.steps > 0).then(|| run.last));
+    (ran.trials, ran.last) = (run.trials, (ran.steps > 0).then_some(run.last));
     Ok(ran)
 }
 
