@@ -9,7 +9,7 @@ help:
 	@echo "make bench   measure (criterion)"
 	@echo "make pictures draw the scenes and the figures of docs/paper.md (docs/pictures)"
 	@echo "make charts  draw the charts of the README from counted work (docs/pictures); scripts/charts --time measures"
-	@echo "make wheel   the Python package with the command, the plug-in and models in process in it, tried in a fresh environment (out/wheel)"
+	@echo "make wheel   the Python package with the command, the plug-in and models in process in it, tried with every Python here (out/wheel)"
 	@echo "make clean   remove everything that was built"
 
 demo:
@@ -44,7 +44,6 @@ charts:
 
 # The Python package with the command, the plug-in and models in process of this machine (out/wheel).
 wheel:
-	@scripts/setup build
 	@scripts/wheel
 
 clean:
