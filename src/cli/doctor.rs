@@ -182,7 +182,7 @@ fn ask(path: &Path) -> Result<String, String> {
 
 fn python() -> Result<String, String> {
     let script = "import bimorph, sys; from importlib.metadata import version; \
-                  print(version('bimorph'), 'on Python', sys.version.split()[0])";
+                  print(version('bimorph-mems'), 'on Python', sys.version.split()[0])";
     let answer = Command::new("python3").args(["-c", script]).output().map_err(|e| format!("no python3: {e}"))?;
     if answer.status.success() {
         Ok(String::from_utf8_lossy(&answer.stdout).trim().to_owned())
