@@ -147,6 +147,19 @@ def test_ctrl_c_ends_a_run_and_leaves_the_session(model: bimorph.Model) -> None:
         assert time.monotonic() - left < 20.0
 
 
+def test_interrupts_leave_the_connection_as_it_was(plate: bimorph.Model) -> None:
+    """After each of ten interrupts of a run, with requests of 7 MB, other sessions of the same connection are opened and stepped."""
+    long = 1e-7 * np.arange(1, 900_001)
+    for k in range(10):
+        with plate.session(["m.x"], timeout=10.0) as session:
+            session.operating_point({"drive": 1.0})
+            threading.Timer(0.1 + 0.03 * k, signal.raise_signal, [signal.SIGINT]).start()
+            with pytest.raises(KeyboardInterrupt):
+                for _ in range(100):
+                    session.run(session.t + long, {"drive": 1.5})
+    assert threading.active_count() < 40
+
+
 def test_a_batch_has_the_bits_of_its_sessions(model: bimorph.Model) -> None:
     """Voltages for all, for each session, at each time; a session that fails stops alone."""
     times, volts = course(60)

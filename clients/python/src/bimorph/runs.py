@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 import os
+import queue
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -17,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import showing
 from .arguments import mapping, names, one_of, wrong_type
 from .channel import Channel
-from .errors import BimorphError, InvalidRequest, NotFound, StepFailed, Unavailable, shown
+from .errors import InvalidRequest, NotFound, StepFailed, Unavailable, shown
 from .local import ADDRESS
 from .stopping import Stopping, check, current
 from .v1 import device_pb2, run_pb2
@@ -31,6 +32,12 @@ Array = NDArray[np.float64]
 Given = Mapping[str, "ArrayLike"]
 """What the ports are given [V, or the unit of the port's kind], by name: a number, or one for each time."""
 
+_AHEAD = 4
+"""Most events that are read ahead of the caller."""
+_AGAIN = 4
+"""Attempts at a part of a run."""
+_STOPS = 0.05
+"""A server stops a run that its client leaves within this time [s]."""
 _PART = 1 << 20
 """Most port values of one request: longer runs are made of several."""
 
@@ -168,9 +175,30 @@ def advance(
             return
         for lane in here:
             lane.session._own()
-        _advance(here, times, slice(first, first + part), signals, ports, progress)
+        for again in range(_AGAIN):
+            try:
+                _advance(here, times, slice(first, first + part), signals, ports, progress)
+                break
+            except NotFound:
+                # the last steps of a run that was left push out states of this one; that it starts from is held by both
+                if again + 1 == _AGAIN or not all(_held(lane.session) for lane in here):
+                    raise
+                for lane in here:
+                    lane.done, lane.last = min(lane.done, first), None
+                time.sleep(_STOPS)
         for lane in here:
             lane.settle(times)
+
+
+def _held(session: Session) -> bool:
+    """Whether the server still has the accepted state of a session."""
+    if session.accepted is None:
+        return True
+    try:
+        session._channel.call("Snapshot", device_pb2.SnapshotRequest(session=session._session, token=session.accepted.token))
+    except NotFound:
+        return False
+    return True
 
 
 def _advance(
@@ -259,59 +287,72 @@ def _heard(channel: Channel, request: Any, timeout: float) -> Iterator[Iterator[
     outer, own = current.get(), Stopping()
     if outer is not None:
         outer.begun(own.stop)
-    silence = _Silence(timeout, own.stop) if timeout < math.inf and channel.address != ADDRESS else None
+    if channel.address != ADDRESS:
+        reader = _Reader(channel, request, own)
+        try:
+            yield reader.events(timeout)
+        finally:
+            reader.leave()
+            if not reader.ended:
+                # the server's steps on the way would push later states of the session out
+                time.sleep(_STOPS)
+        return
     before = current.set(own)
     try:
         # what stops it is found when it begins
-        stream = channel.stream("Run", request)
-        try:
-            yield _events(stream, silence)
-        except NotFound:
-            raise
-        except BimorphError as error:
-            if silence is not None and silence.fell:
-                raise Unavailable(f"server {channel.address}: no answer within {timeout} s") from None
-            raise error
-        finally:
-            close = getattr(stream, "close", None)
-            if close is not None:
-                close()
+        with contextlib.closing(channel.stream("Run", request)) as events:  # type: ignore[type-var]
+            yield events
     finally:
         current.reset(before)
-        if silence is not None:
-            silence.end()
 
 
-def _events(stream: Iterator[Any], silence: _Silence | None) -> Iterator[Any]:
-    for event in stream:
-        if silence is not None:
-            silence.heard()
-        yield event
+class _Reader:
+    """Reads the events of a run on a thread of its own: an interrupt of the caller never meets a lock of gRPC, which would stay locked."""
 
+    def __init__(self, channel: Channel, request: Any, stopping: Stopping) -> None:
+        self._channel, self._request, self._stopping = channel, request, stopping
+        self._events: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self._room: queue.SimpleQueue[None] = queue.SimpleQueue()
+        self._left = False
+        self.ended = False
+        """Whether the stream has ended by itself."""
+        for _ in range(_AHEAD):
+            self._room.put(None)
+        threading.Thread(target=self._read, daemon=True).start()
 
-class _Silence:
-    """Stops a call of which nothing was heard for a while."""
+    def _read(self) -> None:
+        current.set(self._stopping)
+        try:
+            for event in self._channel.stream("Run", self._request):
+                self._room.get()
+                if self._left:
+                    return
+                self._events.put(event)
+            self._events.put(None)
+        except BaseException as error:
+            self._events.put(error)
 
-    def __init__(self, timeout: float, stop: Callable[[], object]) -> None:
-        self._timeout, self._stop = timeout, stop
-        self._last = time.monotonic()
-        self._over = threading.Event()
-        self.fell = False
-        """Whether it did."""
-        threading.Thread(target=self._listen, daemon=True).start()
-
-    def heard(self) -> None:
-        self._last = time.monotonic()
-
-    def end(self) -> None:
-        self._over.set()
-
-    def _listen(self) -> None:
-        while not self._over.wait(max(self._last + self._timeout - time.monotonic(), 0.001)):
-            if time.monotonic() - self._last >= self._timeout:
-                self.fell = True
-                self._stop()
+    def events(self, timeout: float) -> Iterator[Any]:
+        """Each within ``timeout`` [s] after the one before."""
+        while True:
+            try:
+                event = self._events.get(timeout=None if timeout == math.inf else timeout)
+            except queue.Empty:
+                raise Unavailable(f"server {self._channel.address}: no answer within {timeout} s") from None
+            if event is None or isinstance(event, BaseException):
+                self.ended = True
+            if event is None:
                 return
+            if isinstance(event, BaseException):
+                raise event
+            self._room.put(None)
+            yield event
+
+    def leave(self) -> None:
+        """Stops what is under way."""
+        self._left = True
+        self._stopping.stop()
+        self._room.put(None)
 
 
 def _packed(values: Array) -> bytes:
