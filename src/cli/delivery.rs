@@ -15,10 +15,14 @@ pub(super) fn check(out: Option<&PathBuf>) -> Result<(), Failure> {
     check_folder(out)
 }
 
+/// Whether a table is a result: one in which no point has a result is none. One of a shard is: its reasons are rows of the whole.
+pub(super) fn is_result(table: &SweepTable, part: Option<&str>) -> bool {
+    part.is_some() || table.rows.is_empty() || table.failed() < table.rows.len()
+}
+
 /// Writes the table, where it is one; whether it is.
 pub(super) fn deliver(out: Option<&Path>, table: &SweepTable, part: Option<&str>) -> Result<bool, Failure> {
-    // A table in which no point has a result is no result. One of a shard is: its reasons are rows of the whole.
-    if part.is_none() && !table.rows.is_empty() && table.failed() == table.rows.len() {
+    if !is_result(table, part) {
         return Ok(false);
     }
     let text = part.map_or_else(|| table.to_csv(), |part| table.to_csv_of_part(part));

@@ -39,6 +39,7 @@ mod serve;
 mod solver;
 mod statics;
 mod sweep;
+mod sweep_files;
 mod tran;
 mod tran_report;
 mod value;

@@ -5,10 +5,11 @@ use super::failure::Failure;
 use super::model::ModelArgs;
 use super::output::print;
 use super::remote::{Remote, failure, follow};
-use super::{delivery, interrupt, progress, value};
+use super::{delivery, interrupt, progress, sweep_files, value};
 use bimorph::compile::CompileOptions;
 use bimorph::jobs::sweep::journal::{self, Journal, Kept};
 use bimorph::jobs::sweep::part::Part;
+use bimorph::jobs::sweep::statistics::{Limit, SweepStatistics};
 use bimorph::jobs::sweep::{
     self, Shard, SweepAnalysis, SweepError, SweepParameter, SweepProgress, SweepSpec, SweepTable,
 };
@@ -38,6 +39,8 @@ use std::sync::OnceLock;
     bimorph sweep switch.net --param gap=1u:3u:201 --analysis pullin --shard 0/4 --out part0.csv\n  \
     bimorph sweep bank.net --param wh=1.8u:2.2u:16 --analysis tran --stop 100u --port heat=2.2 --signals yoke.y\n  \
     bimorph sweep bank.net --vary wh=normal:2u:0.05u --samples 1000 --seed 7 --analysis modes --out mc.csv\n  \
+    bimorph sweep bank.net --vary wh=normal:2u:0.05u --samples 1000 --seed 7 --port heat=2.2 --signals yoke.y \
+      --limits 'yoke.y<-2.5u' --out mc.parquet --out mc.png\n  \
     bimorph sweep bank.net --param wh=1.8u:2.2u:5 --param heat.v=0:3:31 --signals yoke.y --out hv.csv\n  \
     bimorph sweep bank.net --points corners.csv --port heat=2.2 --signals yoke.y --out c.csv\n  \
     bimorph sweep bank.net --param option.tol=1e-2,1e-3,1e-4 --analysis modes\n  \
@@ -99,9 +102,15 @@ pub(crate) struct Sweep {
     #[command(flatten)]
     remote: Remote,
 
-    /// Write the table to a .csv file [default: standard output]
+    /// Write the table to a .csv or .parquet file, or a picture of every result to an .svg, .png or .html file: histograms of samples, else
+    /// curves over the last parameter. Repeatable [default: the table to standard output]
     #[arg(long, value_name = "FILE")]
-    out: Option<PathBuf>,
+    out: Vec<PathBuf>,
+
+    /// Print statistics of every result, and the fraction of points that keep to this limit: NAME>NUMBER, with <, <=, > or >=. A point without
+    /// a result is beyond it. Repeatable: the yield is of all of them
+    #[arg(long, value_name = "LIMIT")]
+    limits: Vec<Limit>,
 
     /// Go on with the points in FILE.csv.journal, if there are any
     #[arg(long, requires = "out", conflicts_with = "to")]
@@ -118,8 +127,9 @@ enum Analysis {
 
 impl Sweep {
     pub(crate) fn run(&self) -> Result<(), Failure> {
-        delivery::check(self.out.as_ref())?;
+        sweep_files::check(&self.out)?;
         let spec = self.spec()?;
+        sweep_files::check_limits(&spec, &self.limits)?;
         let (bundle, options) = (self.model.bundle()?, self.model.options()?);
         warn_of_netlist(&spec, &bundle, &options);
         if let Some(uri) = &self.remote.to {
@@ -168,9 +178,13 @@ impl Sweep {
     /// Writes the table and says what it has; whether there was anything to write.
     fn deliver(&self, table: &SweepTable, spec: &SweepSpec, part: Option<&str>) -> Result<bool, Failure> {
         let Shard { index, count } = spec.shard;
-        let written = delivery::deliver(self.out.as_deref(), table, part)?;
+        let shown = (spec.samples.is_some(), self.limits.as_slice());
+        let written = sweep_files::deliver(&self.out, &self.model.title(), table, part, shown)?;
         let shard = part.map(|_| format!(" (shard {index}/{count})")).unwrap_or_default();
         eprintln!("{}", delivery::summary(table, &shard));
+        if !self.limits.is_empty() {
+            eprintln!("{}", sweep_files::report(&SweepStatistics::of(table, &self.limits)?));
+        }
         Ok(written)
     }
 
@@ -209,9 +223,9 @@ impl Sweep {
         }
     }
 
-    /// FILE.csv.journal beside FILE.csv; none for a pipe or a device, which keeps nothing.
+    /// FILE.csv.journal beside FILE.csv; none for pictures alone, and for a pipe or a device, which keeps nothing.
     fn journal(&self) -> Option<PathBuf> {
-        let out = self.out.as_ref().filter(|out| !out.exists() || out.is_file())?;
+        let out = sweep_files::table_file(&self.out).filter(|out| !out.exists() || out.is_file())?;
         let mut name = out.file_name()?.to_owned();
         name.push(".journal");
         Some(out.with_file_name(name))

@@ -23,6 +23,7 @@ mod points;
 mod samples;
 pub(crate) mod sealed;
 mod spec;
+pub mod statistics;
 mod table;
 mod together;
 mod transient;

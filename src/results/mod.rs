@@ -6,6 +6,7 @@
 pub mod atomic;
 pub mod csv;
 pub mod format;
+pub mod parquet;
 pub mod plot;
 pub mod raw;
 pub mod table;

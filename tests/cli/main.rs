@@ -25,3 +25,4 @@ mod service;
 mod serving;
 mod stepping;
 mod survivors;
+mod yields;

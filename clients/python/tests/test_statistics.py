@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import csv
 import math
 import statistics as standard
+import subprocess
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -120,3 +123,32 @@ def test_pictures(client: bimorph.Client, plate: bimorph.Model) -> None:
     drawn = samples.plot("f1")
     assert drawn.get_ylabel() == "points" and drawn.get_xlabel() == "f1 [Hz]"
     pyplot.close("all")
+
+def test_parquet_of_the_command(program: str, tmp_path: Path) -> None:
+    """The Parquet file of `bimorph sweep` has the numbers of its CSV to the bit, its texts, and nulls where a point has no result, as another
+    program reads them; more columns than a short list of Thrift has, and rows of more than one group."""
+    pyarrow = pytest.importorskip("pyarrow")
+    from pyarrow import parquet
+
+    (tmp_path / "plate.net").write_text(PLATE)
+    words = ["--param", "k=0.1,1,2.5", "--analysis", "pullin", "--max", "4", "--out", "t.csv", "--out", "t.parquet"]
+    subprocess.run([program, "sweep", "plate.net", *words], cwd=tmp_path, check=True, capture_output=True)
+    table = parquet.read_table(tmp_path / "t.parquet")
+    rows = list(csv.DictReader((tmp_path / "t.csv").open(newline="")))
+    assert table.schema.field("point").type == pyarrow.int64() and table.schema.field("error").type == pyarrow.string()
+    assert table.schema.field("pull_in [V]").type == pyarrow.float64()
+    found = table.to_pylist()
+    assert list(found[0]) == list(rows[0])
+    for one, row in zip(found, rows, strict=True):
+        for name, text in row.items():
+            value = one[name]
+            assert value == (text if isinstance(value, str) else None if text == "" else float(text)), name
+    assert [one["pull_in [V]"] is None for one in found] == [False, True, True] and found[1]["error"]
+    words = ["--param", "k=1:2:70000", "--param", "V=0,one", "--analysis", "modes", "--count", "1", "--out", "m.parquet"]
+    subprocess.run([program, "sweep", "plate.net", *words], cwd=tmp_path, check=True, capture_output=True)
+    file = parquet.ParquetFile(tmp_path / "m.parquet")
+    assert (file.metadata.num_rows, file.metadata.num_row_groups) == (140_000, 3)
+    read = file.read()
+    assert read.column("point").to_pylist() == list(range(140_000))
+    assert read.column("V").to_pylist()[:2] == ["0e0", "one"]
+    assert read.column("f1 [Hz]").null_count == 0

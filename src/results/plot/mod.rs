@@ -7,6 +7,7 @@ pub mod animation;
 pub mod axis;
 pub mod bode;
 pub mod chart;
+pub mod histogram;
 pub mod log_axis;
 pub mod loglog;
 pub mod mechanism;
