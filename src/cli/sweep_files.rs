@@ -6,11 +6,11 @@ use super::output::{check_folder, write_picture};
 use bimorph::jobs::sweep::statistics::{self, ColumnStatistics, Fraction, Limit, SweepStatistics};
 use bimorph::jobs::sweep::{SweepAnalysis, SweepSpec, SweepTable};
 use bimorph::netlist::Setting;
+use bimorph::results::atomic;
 use bimorph::results::format::Format;
 use bimorph::results::parquet::{self, Column, Values};
 use bimorph::results::plot::plane::{Curve, Plane};
 use bimorph::results::plot::{Picture, histogram, plane, stack};
-use bimorph::results::atomic;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -56,7 +56,7 @@ pub(super) fn check_limits(spec: &SweepSpec, limits: &[Limit]) -> Result<(), Fai
         return Ok(());
     }
     let axes = spec.parameters.iter().map(|axis| &axis.name);
-    let varied = spec.samples.iter().flat_map(|samples| samples.vary.iter().map(|vary| &vary.name));
+    let varied = spec.samples.iter().flat_map(|samples| samples.asked.vary.iter().map(|vary| &vary.name));
     let known: Vec<&String> = axes.chain(varied).chain(&results).collect();
     match limits.iter().find(|limit| !known.contains(&&limit.name)) {
         Some(limit) => {
@@ -208,7 +208,9 @@ pub(super) fn report(found: &SweepStatistics) -> String {
         "{:<24}{:>14}{:>14}{:>14}{:>14}{:>14}{:>14}{:>14}",
         "result", "mean", "deviation", "minimum", "5 %", "50 %", "95 %", "maximum"
     )];
-    for ColumnStatistics { name, unit, mean, deviation, percentiles: [p5, p50, p95], range: [low, high], .. } in &found.columns {
+    for ColumnStatistics { name, unit, mean, deviation, percentiles: [p5, p50, p95], range: [low, high], .. } in
+        &found.columns
+    {
         let numbers = [mean, deviation, low, p5, p50, p95, high].map(|value| format!("{value:>14.6e}")).concat();
         lines.push(format!("{:<24}{numbers}", format!("{name} [{unit}]")));
     }

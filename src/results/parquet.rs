@@ -58,7 +58,8 @@ pub fn write(columns: &[Column], out: &mut dyn Write) -> io::Result<()> {
     }
     let footer = file_metadata(columns, rows, &groups);
     out.write_all(&footer)?;
-    let length = u32::try_from(footer.len()).map_err(|_| io::Error::new(io::ErrorKind::InvalidInput, "too many columns"))?;
+    let length =
+        u32::try_from(footer.len()).map_err(|_| io::Error::new(io::ErrorKind::InvalidInput, "too many columns"))?;
     out.write_all(&length.to_le_bytes())?;
     out.write_all(MAGIC)
 }
@@ -272,7 +273,8 @@ mod tests {
         let column = Column { name: "a".into(), values: Values::Texts(vec!["x".into(); 3]) };
         write(&[column], &mut bytes).expect("written");
         assert!(bytes.starts_with(MAGIC) && bytes.ends_with(MAGIC));
-        let length = u32::from_le_bytes(bytes[bytes.len() - 8..bytes.len() - 4].try_into().expect("four bytes")) as usize;
+        let length =
+            u32::from_le_bytes(bytes[bytes.len() - 8..bytes.len() - 4].try_into().expect("four bytes")) as usize;
         assert!(length + 12 < bytes.len());
     }
 }

@@ -27,9 +27,18 @@ fn statistics_and_yield() {
     );
     let done = bench.run(&words);
     assert_eq!(done.status, 0, "{}", done.stderr);
-    assert!(done.stderr.contains("yield: 50.00 % of 400 points, 95 % confidence 45.12 % to 54.88 %"), "{}", done.stderr);
+    assert!(
+        done.stderr.contains("yield: 50.00 % of 400 points, 95 % confidence 45.12 % to 54.88 %"),
+        "{}",
+        done.stderr
+    );
     assert!(done.stderr.contains("w < 1e-5: 100.00 % of 400 points"), "{}", done.stderr);
-    let y: Vec<f64> = done.stdout.lines().skip(1).map(|line| line.split(',').nth(2).expect("b.y").parse().expect("a number")).collect();
+    let y: Vec<f64> = done
+        .stdout
+        .lines()
+        .skip(1)
+        .map(|line| line.split(',').nth(2).expect("b.y").parse().expect("a number"))
+        .collect();
     let mean = format!("{:.6e}", y.iter().sum::<f64>() / 400.0);
     let line = done.stderr.lines().find(|line| line.starts_with("b.y [m]")).expect("statistics");
     assert!(line.contains(&mean), "{line} {mean}");

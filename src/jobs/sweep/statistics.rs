@@ -275,7 +275,10 @@ mod tests {
     /// mean 26.1/7 and deviation 2.7372561… are those of `statistics.mean` and `statistics.stdev`, the median that of `statistics.median`.
     #[test]
     fn moments() {
-        let found = SweepStatistics::of(&table(&[Some(3.0), Some(1.0), Some(4.0), Some(1.5), Some(9.0), Some(2.6), Some(5.0), None]), &[]);
+        let found = SweepStatistics::of(
+            &table(&[Some(3.0), Some(1.0), Some(4.0), Some(1.5), Some(9.0), Some(2.6), Some(5.0), None]),
+            &[],
+        );
         let found = found.expect("statistics");
         let one = &found.columns[0];
         assert!((one.mean - 26.1 / 7.0).abs() < 1e-14);

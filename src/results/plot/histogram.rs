@@ -1,9 +1,9 @@
 //! Histograms, with the limits that values must keep to.
 
+use super::PALETTE;
 use super::axis::axis;
 use super::chart::WIDTH;
 use super::svg::{Align, Paint, Picture};
-use super::PALETTE;
 
 /// A histogram of one quantity.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,7 +31,8 @@ pub fn draw(histogram: &Histogram) -> Picture {
     let width = WIDTH - LEFT - RIGHT;
     let mut picture = Picture::new(WIDTH, TOP + HEIGHT + 52.0);
     let ends = histogram.edges.iter().chain(&histogram.limits).filter(|value| value.is_finite());
-    let (low, high) = ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(*value), high.max(*value)));
+    let (low, high) =
+        ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(*value), high.max(*value)));
     let [name, unit] = &histogram.quantity;
     let x_axis = axis(low, high, unit, 8, true);
     let most = histogram.counts.iter().copied().max().unwrap_or(0).max(1) as f64;
